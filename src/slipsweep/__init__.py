@@ -1,0 +1,43 @@
+"""Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
+
+`sweep` solves a grid, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one
+time history.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
+`SlidingMode` name the codes of the results.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from slipsweep._version import __version__
+from slipsweep.errors import InputError, RunError
+from slipsweep.variables import SlidingMode, Validity
+
+if TYPE_CHECKING:
+    from slipsweep.history import simulate
+    from slipsweep.sweep import friction_parameters, sweep
+
+__all__ = [
+    "InputError",
+    "RunError",
+    "SlidingMode",
+    "Validity",
+    "__version__",
+    "friction_parameters",
+    "simulate",
+    "sweep",
+]
+
+#: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
+_LAZY = {"friction_parameters": "slipsweep.sweep", "simulate": "slipsweep.history", "sweep": "slipsweep.sweep"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(_LAZY[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,7 @@
+"""`python -m slipsweep`."""
+
+import sys
+
+from slipsweep.cli import main
+
+sys.exit(main())

@@ -1,0 +1,81 @@
+"""Figures: datasets in, matplotlib figures out.
+
+Figures are made without pyplot, hence without a window system or state between calls;
+`matplotlib.figure.Figure.savefig` writes them in any format.
+"""
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from slipsweep.variables import PARAMETERS
+
+# Okabe and Ito's colours: told apart with any kind of colour vision, and in grey
+_BLUE, _VERMILION = "#0072B2", "#D55E00"
+
+
+def history(dataset: xr.Dataset) -> Figure:
+    """Draw a time history in the manner of the paper's Figs. 5, 8 and 9.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What `slipsweep.simulate` returns.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panels over time: accelerations of plane and block, friction coefficient,
+        relative velocity, relative displacement; the parameters in a caption.
+    """
+    figure = Figure(figsize=(7.0, 8.0), layout="constrained")
+    accelerations, friction, velocity, displacement = figure.subplots(4, sharex=True)
+    time = dataset["time"]
+
+    accelerations.plot(time, dataset["ground_acceleration"], color=_BLUE, label="plane")
+    accelerations.plot(time, dataset["block_acceleration"], color=_VERMILION, linestyle="--", label="block")
+    accelerations.legend(loc="upper right", ncols=2)
+    accelerations.set_ylabel("acceleration (m/s²)")
+
+    friction.plot(time, dataset["friction_coefficient"], color=_VERMILION)
+    friction.set_ylabel("friction coefficient")
+
+    velocity.plot(time, dataset["relative_velocity"], color=_VERMILION)
+    velocity.set_ylabel("relative velocity (m/s)")
+
+    metres = float(abs(dataset["relative_displacement"]).max()) >= 1.0
+    displacement.plot(time, dataset["relative_displacement"] * (1 if metres else 1000), color=_VERMILION)
+    displacement.set_ylabel(f"relative displacement ({'m' if metres else 'mm'})")
+    displacement.set_xlabel("time (s)")
+
+    for axes in (accelerations, friction, velocity, displacement):
+        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+        axes.margins(x=0)
+        axes.grid(color="0.9")
+    figure.align_ylabels()
+    figure.supxlabel(_caption(dataset), fontsize="small")
+    return figure
+
+
+#: Symbols of the paper, for captions.
+_SYMBOLS = {
+    "theta": "θ",
+    "mu_s": "μs",
+    "amplitude": "A",
+    "displacement_amplitude": "d",
+    "frequency": "f",
+    "yield_acceleration": "Üy",
+    "decay_rate": "λ",
+    "delta_mu": "Δμ",
+    "minimum_friction": "μmin",
+    "structure_frequency": "fs",
+}
+
+
+def _caption(dataset: xr.Dataset) -> str:
+    units = {"degree": "°", "m s-2": " m/s²", "1": ""}
+    parts = []
+    for name, symbol in _SYMBOLS.items():
+        if name in dataset.coords:
+            unit = PARAMETERS[name]["units"]
+            parts.append(f"{symbol} = {dataset[name].item():.4g}{units.get(unit, f' {unit}')}")
+    return ", ".join(parts)

@@ -1,0 +1,529 @@
+"""Sweep files: TOML text in, the arguments of `slipsweep.sweep` out.
+
+Two steps, either of which may refuse a file: pydantic checks keys, types and words
+(the classes below are the schema), then plain functions check what one table cannot
+know of another, turn axes into arrays and convert their units.  Every refusal is an
+`InputError` of one line, ``FILE: key = VALUE: what is allowed``.
+"""
+
+import difflib
+import json
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from slipsweep.errors import InputError
+from slipsweep.parameters import BOUNDS
+from slipsweep.variables import DEFAULT_RESULTS, DIMENSION_ORDER, PARAMETERS, RESULT_DTYPES, RESULTS
+
+Floats = NDArray[np.float64]
+
+#: Parameters that [model] may give as one number for the whole sweep.
+_MODEL_PARAMETERS = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency")
+
+#: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
+_MOST_POINTS = 10_000_000
+
+# --------------------------------------------------------------------------- the schema
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Whole = Annotated[int, Field(strict=True)]
+Text = Annotated[str, Field(strict=True)]
+
+
+def _coulomb_or_number(value: object) -> object:
+    """Turn "coulomb" into None, which is what `sweep` takes for it."""
+    if value == "coulomb":
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError('must be "coulomb" or a number in m/s2')
+    return value
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Axis(_Table):
+    """One dimension: `values`, or `start`, `stop`, `num` and `spacing`; both in `units`."""
+
+    values: list[Number] | None = None
+    start: Number | None = None
+    stop: Number | None = None
+    num: Annotated[Whole, Field(ge=2, le=_MOST_POINTS)] | None = None
+    spacing: Literal["linear", "log"] = "linear"
+    units: Text | None = None
+
+
+class Axes(_Table):
+    """The dimensions of the grid."""
+
+    theta: Axis | None = None
+    mu_s: Axis | None = None
+    amplitude: Axis | None = None
+    displacement_amplitude: Axis | None = None
+    frequency: Axis | None = None
+    yield_acceleration: Axis | None = None
+    decay_rate: Axis | None = None
+    delta_mu: Axis | None = None
+    minimum_friction: Axis | None = None
+    structure_frequency: Axis | None = None
+
+
+class Case(_Table):
+    """One row of [[cases]]: parameters that change together, along the dimension ``case``."""
+
+    label: Text | None = None
+    theta: Number | None = None
+    mu_s: Number | None = None
+    amplitude: Number | None = None
+    displacement_amplitude: Number | None = None
+    frequency: Number | None = None
+    yield_acceleration: Number | None = None
+    decay_rate: Number | None = None
+    delta_mu: Number | None = None
+    minimum_friction: Number | None = None
+    structure_frequency: Number | None = None
+
+
+class Model(_Table):
+    """Which model, its options, and parameters that are one number for the whole sweep."""
+
+    friction: Literal["mendez", "newmark"] = "mendez"
+    rise: Literal["monotone", "literal"] = "monotone"
+    recoupling: Literal["eq12", "integrate"] = "eq12"
+    yield_acceleration: Annotated[Number | None, BeforeValidator(_coulomb_or_number)] = None
+    decay_rate: Number | None = None
+    delta_mu: Number | None = None
+    minimum_friction: Number | None = None
+    structure_frequency: Number | None = None
+    g: Annotated[Number, Field(gt=0)] = 9.81
+
+
+class Excitation(_Table):
+    """The shaking, but for its amplitude and frequency, which are axes."""
+
+    waveform: Literal["sine"] = "sine"
+    cycles: Annotated[Whole, Field(ge=1, le=1_000_000_000)] = 10
+
+
+class Solver(_Table):
+    """How cells are solved; `steps_per_cycle` and `rule` matter to the step solver alone."""
+
+    method: Literal["auto", "step", "cycle"] = "auto"
+    steps_per_cycle: Annotated[Whole, Field(ge=8, le=1_000_000, multiple_of=4)] | None = None
+    rule: Literal["rectangle", "trapezoid", "simpson"] = "trapezoid"
+
+
+class Output(_Table):
+    """Where the result goes and what it holds."""
+
+    path: Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None = None
+    title: Text = "Permanent displacement of a rigid block on a shaken inclined plane"
+    variables: Annotated[list[Text], Field(min_length=1)] = list(DEFAULT_RESULTS)
+    dtype: Literal["float64", "float32"] = "float64"
+
+
+class SweepFile(_Table):
+    """A sweep file as written: its tables, defaults filled in."""
+
+    axes: Axes = Axes()
+    cases: Annotated[list[Case], Field(min_length=1)] | None = None
+    model: Model = Model()
+    excitation: Excitation = Excitation()
+    solver: Solver = Solver()
+    output: Output = Output()
+
+
+# ----------------------------------------------------------------------- what comes out
+
+
+class Parameter(NamedTuple):
+    """Values of one input and the dimension they lie along (None: one number for all cells)."""
+
+    dim: str | None
+    values: Floats
+
+
+@dataclass(frozen=True)
+class SweepSpec:
+    """A checked sweep: its grid, its options and the text it came from.
+
+    Attributes
+    ----------
+    source : str
+        The file, as the user named it.
+    text : str
+        The sweep file, verbatim.
+    parameters : dict of str to Parameter
+        Inputs in the units of `slipsweep.variables.PARAMETERS`.
+    labels : tuple of str
+        Names of the rows of [[cases]]; empty without them.
+    model, excitation, solver, output
+        The tables of the sweep file.
+    """
+
+    source: str
+    text: str
+    parameters: dict[str, Parameter]
+    labels: tuple[str, ...]
+    model: Model
+    excitation: Excitation
+    solver: Solver
+    output: Output
+
+    @property
+    def shape(self) -> dict[str, int]:
+        """Dimensions in the order of the results, and their lengths."""
+        lengths = {p.dim: p.values.size for p in self.parameters.values() if p.dim is not None}
+        return {dim: lengths[dim] for dim in (*DIMENSION_ORDER, "case") if dim in lengths}
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the grid."""
+        return math.prod(self.shape.values())
+
+    def dtype(self, variable: str) -> np.dtype[Any]:
+        """Data type of a result in the file."""
+        return np.dtype(RESULT_DTYPES.get(variable, self.output.dtype))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all results, uncompressed."""
+        return self.cells * sum(self.dtype(name).itemsize for name in self.output.variables)
+
+    def with_solver(self, method: Literal["auto", "step", "cycle"]) -> "SweepSpec":
+        """Return the same sweep under another solver."""
+        return replace(self, solver=self.solver.model_copy(update={"method": method}))
+
+    def arguments(self, block: Mapping[str, slice] | None = None) -> dict[str, Any]:
+        """Return keyword arguments for `slipsweep.sweep`.
+
+        Parameters
+        ----------
+        block : mapping of dimension to slice, optional
+            The part of the grid that is wanted; dimensions not named are taken whole.
+        """
+        block = block or {}
+        arguments: dict[str, Any] = {}
+        for name, (dim, values) in self.parameters.items():
+            if dim is None:
+                arguments[name] = float(values)
+            elif dim == name:
+                arguments[name] = values[block.get(dim, slice(None))]
+            else:
+                import xarray as xr  # only zipped parameters need it; it is slow to import
+
+                arguments[name] = xr.DataArray(values[block.get(dim, slice(None))], dims=dim)
+        arguments |= {
+            "cycles": self.excitation.cycles,
+            "waveform": self.excitation.waveform,
+            "model": self.model.friction,
+            "g": self.model.g,
+            "solver": self.solver.method,
+            "rule": self.solver.rule,
+            "variables": list(self.output.variables),
+        }
+        if self.model.friction == "mendez":
+            arguments |= {"rise": self.model.rise, "recoupling": self.model.recoupling}
+        if self.solver.steps_per_cycle is not None:
+            arguments["steps_per_cycle"] = self.solver.steps_per_cycle
+        return arguments
+
+
+def load(path: str | Path) -> SweepSpec:
+    """Read and check a sweep.
+
+    Parameters
+    ----------
+    path : str or Path
+        A sweep file (TOML), or a netCDF file that `slipsweep run` wrote: then the sweep
+        it was made from.
+
+    Returns
+    -------
+    SweepSpec
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or something in it is not allowed: one line that names
+        the file, the key, its value and what is allowed.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            is_netcdf = path.suffix == ".nc" or file.read(4) == b"\x89HDF"
+            if not is_netcdf:
+                file.seek(0)
+                # utf-8-sig: some editors put a byte-order mark in front
+                return parse(file.read().decode("utf-8-sig"), str(path))
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a sweep file: it is not UTF-8 text") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    return _load_result(path)
+
+
+def _load_result(path: Path) -> SweepSpec:
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(path) as file:
+            attributes = {name: file.getncattr(name) for name in file.ncattrs() if name in ("sweep", "solver")}
+    except OSError:
+        raise InputError(f"{path}: not a netCDF file") from None
+    if "sweep" not in attributes:
+        raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
+    spec = parse(attributes["sweep"], str(path))
+    # the solver that ran: it may have been chosen on the command line, over the sweep file's
+    return spec.with_solver(attributes.get("solver", spec.solver.method))
+
+
+def parse(text: str, source: str) -> SweepSpec:
+    """Check the text of a sweep file; `source` names it in errors. See `load`."""
+    try:
+        # tomllib raises ValueError for integers too long to convert, RecursionError for deep nesting
+        content = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
+        raise InputError(f"{source}: not valid TOML: {error}") from None
+    try:
+        file = SweepFile.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{source}: {_words(error)}") from None
+    try:
+        parameters = _parameters(file)
+        _check_model(file)
+        _check_variables(file, parameters)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
+    return SweepSpec(source, text, parameters, labels, file.model, file.excitation, file.solver, file.output)
+
+
+# ------------------------------------------------------------- from tables to parameters
+
+
+def _parameters(file: SweepFile) -> dict[str, Parameter]:
+    """Gather the inputs from [axes], [[cases]] and [model]: each once, none missing."""
+    axes = {name: axis for name in PARAMETERS if (axis := getattr(file.axes, name)) is not None}
+    cases = _cases(file.cases or [])
+    # yield_acceleration = "coulomb" is None here: it only says what holds by default
+    numbers = {name: value for name in _MODEL_PARAMETERS if (value := getattr(file.model, name)) is not None}
+
+    for name in PARAMETERS:
+        tables = {"axes": axes, "cases": cases, "model": numbers}
+        places = [f"{table}.{name}" for table, names in tables.items() if name in names]
+        if len(places) > 1:
+            raise InputError(f"{places[0]}: given twice, also as {places[1]}: give it once")
+    given = {*axes, *cases, *numbers}
+    for name in ("theta", "mu_s", "frequency"):
+        if name not in given:
+            raise InputError(f"axes.{name}: missing: give it in [axes.{name}] or in every row of [[cases]]")
+    if not given & {"amplitude", "displacement_amplitude"}:
+        raise InputError("axes.amplitude: missing: give amplitude or displacement_amplitude, in [axes] or [[cases]]")
+    if given >= {"amplitude", "displacement_amplitude"}:
+        raise InputError("axes.displacement_amplitude: not allowed beside amplitude: give one of them")
+
+    parameters = {name: Parameter(name, _axis(name, axis, file.model.g)) for name, axis in axes.items()}
+    parameters |= {name: Parameter("case", values) for name, values in cases.items()}
+    for name, value in numbers.items():
+        if _first_bad(name, np.array([value])) is not None:
+            raise InputError(f"model.{name} = {value}: must be {BOUNDS[name].text}")
+        parameters[name] = Parameter(None, np.array(value))
+    return {name: parameters[name] for name in PARAMETERS if name in parameters}
+
+
+def _cases(rows: list[Case]) -> dict[str, Floats]:
+    """Return the columns of [[cases]]."""
+    if not rows:
+        return {}
+    columns = rows[0].model_fields_set - {"label"}
+    if not columns:
+        raise InputError("cases[row 1]: must give at least one parameter")
+    for number, row in enumerate(rows, 1):
+        given = row.model_fields_set - {"label"}
+        for name in sorted(columns - given):
+            raise InputError(f"cases[row {number}].{name}: missing: every row must give what row 1 gives")
+        for name in sorted(given - columns):
+            value = getattr(row, name)
+            raise InputError(f"cases[row {number}].{name} = {value}: every row must give what row 1 gives, no more")
+    table = {name: np.array([getattr(row, name) for row in rows]) for name in columns}
+    for name, values in table.items():
+        if (bad := _first_bad(name, values)) is not None:
+            raise InputError(f"cases[row {bad + 1}].{name} = {values[bad]}: must be {BOUNDS[name].text}")
+    return table
+
+
+def _axis(name: str, axis: Axis, g: float) -> Floats:
+    """Return an axis as an array in the parameter's own units."""
+    key = f"axes.{name}"
+    if axis.values is not None:
+        for other in sorted(axis.model_fields_set & {"start", "stop", "num", "spacing"}):
+            raise InputError(f"{key}.{other}: not allowed beside values")
+        if not axis.values:
+            raise InputError(f"{key}.values = []: must hold at least one number")
+        numbers = np.array(axis.values)
+        for i in np.flatnonzero(numbers[1:] <= numbers[:-1]):
+            where = f"{key}.values[entry {i + 2}] = {numbers[i + 1]}"
+            raise InputError(f"{where}: must be greater than the entry before it, {numbers[i]}")
+    else:
+        numbers = _spaced(key, axis)
+
+    with np.errstate(over="ignore"):
+        values = numbers * _unit_factor(name, axis.units, g)
+    if (bad := _first_bad(name, values)) is not None:
+        where = f"values[entry {bad + 1}]" if axis.values is not None else "start" if bad == 0 else "stop"
+        number = axis.stop if where == "stop" else numbers[bad]
+        raise InputError(f"{key}.{where} = {number}: must be {BOUNDS[name].text}")
+    if np.any(values[1:] <= values[:-1]):
+        raise InputError(f"{key}: neighbouring values are the same number in double precision")
+    return values
+
+
+def _spaced(key: str, axis: Axis) -> Floats:
+    for part in ("start", "stop", "num"):
+        if getattr(axis, part) is None:
+            raise InputError(f"{key}.{part}: missing: an axis is values = [...], or start, stop and num")
+    assert axis.start is not None
+    assert axis.stop is not None
+    assert axis.num is not None
+    if axis.stop <= axis.start:
+        raise InputError(f"{key}.stop = {axis.stop}: must be greater than start, {axis.start}")
+    if axis.spacing == "linear":
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.linspace(axis.start, axis.stop, axis.num)
+    if axis.start <= 0:
+        raise InputError(f'{key}.start = {axis.start}: must be positive with spacing = "log"')
+    return np.geomspace(axis.start, axis.stop, axis.num)
+
+
+def _first_bad(name: str, values: Floats) -> int | None:
+    """Return where the first value lies that no physics allows of this parameter."""
+    bad = np.flatnonzero(~BOUNDS[name].holds(values))
+    return int(bad[0]) if bad.size else None
+
+
+def _check_model(file: SweepFile) -> None:
+    if file.model.friction == "newmark":
+        for key in sorted(file.model.model_fields_set & {"rise", "recoupling"}):
+            value = getattr(file.model, key)
+            raise InputError(f'model.{key} = "{value}": not allowed with friction = "newmark"')
+
+
+def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> None:
+    variables = file.output.variables
+    for number, name in enumerate(variables, 1):
+        where = f"output.variables[entry {number}] = {_show(name)}"
+        if name not in RESULTS:
+            raise InputError(f"{where}: unknown variable; {_suggest(name, tuple(RESULTS))}")
+        if name in parameters:
+            raise InputError(f"{where}: it is an input of this sweep, hence a coordinate of the result already")
+        if name in variables[: number - 1]:
+            raise InputError(f"{where}: must not be repeated")
+
+
+# --------------------------------------------------------------------------------- units
+
+#: Spellings of each parameter's own unit that need no units library.
+_OWN_UNITS = {
+    "degree": ("degree", "degrees", "deg"),
+    "m s-2": ("m s-2", "m/s2", "m/s^2", "m/s**2"),
+    "Hz": ("Hz",),
+    "m": ("m",),
+    "1": ("1",),
+}
+
+#: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
+_FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
+_UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
+
+
+def _unit_factor(name: str, units: str | None, g: float) -> float:
+    """Return what to multiply a number in `units` by, to have it in the parameter's own unit.
+
+    "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
+    meant against the gravity that the block feels.
+    """
+    own = PARAMETERS[name]["units"]
+    if units is None or units in _OWN_UNITS[own]:
+        return 1.0
+    if own == "m s-2" and units == "g":
+        return g
+
+    refusal = InputError(f"axes.{name}.units = {_show(units)}: must be a unit that converts to {own}")
+    # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
+    text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
+    if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
+        raise refusal
+
+    import pint  # only here: it takes 0.2 s to import
+
+    registry = pint.get_application_registry()
+    target = "m/s**2" if own == "m s-2" else own
+    try:
+        quantity = registry.Quantity(1.0, text)
+        root = quantity.to_root_units().units
+        # Pint lets radians pass for pure numbers.  Here a slope in percent is no angle, and
+        # 60 rpm or 2 pi rad/s is 1 Hz: one turn a cycle.
+        if own == "Hz" and "radian" in str(root):
+            target = "turn/s"
+        if root != registry.Quantity(1.0, target).to_root_units().units:
+            raise refusal
+        return float(quantity.to(target).magnitude)
+    except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError):
+        raise refusal from None
+
+
+# --------------------------------------------------------------------- errors into words
+
+
+def _words(error: ValidationError) -> str:
+    """Put the first of pydantic's complaints as ``key = VALUE: what is allowed``."""
+    # an unknown key first: misspelling a key also makes it missing
+    found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")[0]
+    location, kind, message = found["loc"], found["type"], found["msg"]
+    key = ""
+    for part in location:
+        if isinstance(part, str):
+            key += f".{part}" if key else part
+        else:
+            key += f"[{'row' if key == 'cases' else 'entry'} {part + 1}]"
+    if kind == "extra_forbidden":
+        return f"{key}: unknown key; {_suggest(str(location[-1]), _keys_beside(location))}"
+    message = {"model_type": "must be a table", "list_type": "must be a list"}.get(kind, message)
+    message = re.sub("^(Input|String|List) should", "must", message.removeprefix("Value error, "))
+    message = message.removesuffix(" after validation, not 0")
+    return f"{key} = {_show(found['input'])}: {message}"
+
+
+def _keys_beside(location: tuple[int | str, ...]) -> tuple[str, ...]:
+    """Keys that the table of an unknown key may hold."""
+    table: type[BaseModel] = SweepFile
+    for part in location[:-1]:
+        if isinstance(part, str):
+            annotation = table.model_fields[part].annotation
+            # the table itself, or the one inside `list[...] | None`
+            while not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+                annotation = get_args(annotation)[0]
+            table = annotation
+    return tuple(table.model_fields)
+
+
+def _suggest(word: str, known: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(word, known, n=1)
+    return f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
+
+
+def _show(value: object) -> str:
+    """Write a value as TOML would, on one line of bearable length."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else f"{text[:57]}..."

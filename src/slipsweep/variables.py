@@ -1,0 +1,144 @@
+"""Names, units and CF attributes of everything slipsweep reads or returns, written once.
+
+`PARAMETERS` describes the inputs (they become coordinates), `RESULTS` what a sweep
+returns, `HISTORY` what `simulate` returns along time, `VALIDITY` and `SLIDING_MODE`
+the codes.  The xarray datasets, the netCDF files, the sweep-file schema and the figures
+all take their words from here.
+"""
+
+from enum import IntEnum, IntFlag
+from typing import Any
+
+REFERENCE = (
+    "B. C. Mendez, M. P. Romo, E. Botero (2012), Linearization of rigid body dynamics on "
+    "frictional interfaces under harmonic loading, Soil Dynamics and Earthquake Engineering "
+    "32, 152-158, https://doi.org/10.1016/j.soildyn.2011.08.007"
+)
+
+
+class SlidingMode(IntEnum):
+    """Sliding mode of a cell (Eq. 7 and the yield acceleration)."""
+
+    MISSING = -1
+    STUCK = 0
+    STICK_SLIP = 1
+    CONTINUOUS = 2
+
+
+class Validity(IntFlag):
+    """Why a cell's value is missing or to be read with care; 0 means all is well."""
+
+    STATICALLY_UNSTABLE = 1
+    UPLIFT = 2
+    LIMIT_UNDEFINED = 4
+    FRICTION_NOT_DECAYING = 8
+    EQ4_BELOW_YIELD = 16
+    KD_NOT_POSITIVE = 32
+    NOT_RECOUPLED = 64
+    FLEXIBLE_BLOCK = 128
+
+
+#: Flags under which a cell has no value (NaN, and sliding mode missing).
+VALUELESS = (
+    Validity.STATICALLY_UNSTABLE
+    | Validity.UPLIFT
+    | Validity.LIMIT_UNDEFINED
+    | Validity.FRICTION_NOT_DECAYING
+    | Validity.KD_NOT_POSITIVE
+)
+
+#: One line a flag, for people (`slipsweep info`).
+VALIDITY_TEXT: dict[Validity, str] = {
+    Validity.STATICALLY_UNSTABLE: "yield acceleration <= 0: the block slides under its own weight (no value)",
+    Validity.UPLIFT: "A tan(theta) >= g: the block loses contact within the cycle (no value)",
+    Validity.LIMIT_UNDEFINED: "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit (no value)",
+    Validity.FRICTION_NOT_DECAYING: "calibrated decay rate <= 0 (mu_s xi^2 >= 1) (no value)",
+    Validity.EQ4_BELOW_YIELD: "Eq. 4 stays below the yield value: the yield value governs",
+    Validity.KD_NOT_POSITIVE: "literal rise: Kd <= 0, Eq. 12 cannot stop the block (no value)",
+    Validity.NOT_RECOUPLED: "the block still slides when the next slide begins",
+    Validity.FLEXIBLE_BLOCK: "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold",
+}
+
+#: Dimensions of a result, in order; further ones follow.
+DIMENSION_ORDER = (
+    "theta",
+    "mu_s",
+    "amplitude",
+    "displacement_amplitude",
+    "frequency",
+    "yield_acceleration",
+    "decay_rate",
+    "delta_mu",
+    "minimum_friction",
+    "structure_frequency",
+)
+
+#: Inputs: attributes of their coordinates.
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "theta": {"units": "degree", "long_name": "plane inclination"},
+    "mu_s": {"units": "1", "long_name": "static friction coefficient"},
+    "amplitude": {"units": "m s-2", "long_name": "peak ground acceleration"},
+    "displacement_amplitude": {"units": "m", "long_name": "peak ground displacement"},
+    "frequency": {"units": "Hz", "long_name": "excitation frequency"},
+    "yield_acceleration": {"units": "m s-2", "long_name": "yield acceleration"},
+    "decay_rate": {"units": "1", "long_name": "friction decay with loading rate"},
+    "delta_mu": {"units": "1", "long_name": "friction above static"},
+    "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient"},
+    "structure_frequency": {"units": "Hz", "long_name": "natural frequency of the structure"},
+}
+
+#: Results of a sweep: attributes of the variables.
+RESULTS: dict[str, dict[str, Any]] = {
+    "permanent_displacement": {
+        "units": "m",
+        "long_name": "permanent displacement, downslope",
+        "ancillary_variables": "validity",
+    },
+    "peak_relative_velocity": {
+        "units": "m s-1",
+        "long_name": "largest downslope relative velocity",
+        "ancillary_variables": "validity",
+    },
+    "sliding_mode": {
+        "long_name": "sliding mode",
+        "flag_values": [int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING],
+        "flag_meanings": " ".join(mode.name.lower() for mode in SlidingMode if mode is not SlidingMode.MISSING),
+        "ancillary_variables": "validity",
+    },
+    "validity": {
+        "long_name": "where the model does not apply, 0: all well",
+        "flag_masks": [int(flag) for flag in Validity],
+        "flag_meanings": " ".join((flag.name or "").lower() for flag in Validity),
+    },
+    "yield_acceleration": {"units": "m s-2", "long_name": "yield acceleration"},
+    "limiting_acceleration": {"units": "m s-2", "long_name": "limiting acceleration (Eq. 7)"},
+    "acceleration_ratio": {"units": "1", "long_name": "peak ground over limiting acceleration"},
+    "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient (Eq. 9)"},
+    "delta_mu": {"units": "1", "long_name": "friction above static (Eqs. 10, 11)"},
+    "decay_rate": {"units": "1", "long_name": "friction decay with loading rate (Eq. 6 at the peak)"},
+}
+
+#: dtype of each result; everything else is float64.
+RESULT_DTYPES: dict[str, str] = {"sliding_mode": "int8", "validity": "int16"}
+
+#: What `sweep` returns when nothing is asked for by name.
+DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
+
+#: The parameters of Eqs. 7-11.
+FRICTION_PARAMETERS = (
+    "yield_acceleration",
+    "limiting_acceleration",
+    "acceleration_ratio",
+    "minimum_friction",
+    "delta_mu",
+    "decay_rate",
+)
+
+#: Variables of a time history.
+HISTORY: dict[str, dict[str, Any]] = {
+    "ground_acceleration": {"units": "m s-2", "long_name": "acceleration of the plane"},
+    "block_acceleration": {"units": "m s-2", "long_name": "acceleration of the block"},
+    "friction_coefficient": {"units": "1", "long_name": "instantaneous friction coefficient"},
+    "relative_velocity": {"units": "m s-1", "long_name": "relative velocity of the block"},
+    "relative_displacement": {"units": "m", "long_name": "relative displacement of the block"},
+}

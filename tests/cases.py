@@ -1,0 +1,93 @@
+"""The reference cases of data/cases.csv, and how to ask `slipsweep.sweep` for many of them at once."""
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import groupby
+from math import pi, radians, tan
+from pathlib import Path
+from typing import Any
+
+OPTIONAL_INPUTS = ("yield_acceleration", "decay_rate", "delta_mu")
+PARAMETERS = ("theta", "mu_s", "amplitude", "frequency")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of cases.csv; the two results as printed, to 17 digits."""
+
+    case: int
+    category: str
+    model: str
+    rise: str
+    recoupling: str
+    theta: float
+    mu_s: float
+    amplitude: float
+    frequency: float
+    cycles: int
+    given: tuple[tuple[str, float], ...]
+    permanent_displacement: str
+    peak_relative_velocity: str
+    sliding_mode: int
+    recoupled: bool
+    eq4_below_yield: bool
+
+    def __str__(self) -> str:
+        return f"{self.case}-{self.category}-{self.model}"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Everything but the four parameters."""
+        options = {"model": self.model, "rise": self.rise, "recoupling": self.recoupling, "cycles": self.cycles}
+        return {**options, **dict(self.given)}
+
+    @property
+    def displacement_scale(self) -> float:
+        """A / omega**2, m."""
+        return self.amplitude / (2 * pi * self.frequency) ** 2
+
+    @property
+    def velocity_scale(self) -> float:
+        """A / omega, m/s."""
+        return self.amplitude / (2 * pi * self.frequency)
+
+    @property
+    def uplift(self) -> bool:
+        """Whether A tan(theta) >= g, where the model gives no value (cases.csv has one such line)."""
+        return self.model == "mendez" and self.amplitude * tan(radians(self.theta)) >= 9.81
+
+
+def read_cases() -> list[Case]:
+    """All cases of cases.csv."""
+    with (Path(__file__).parent / "data" / "cases.csv").open(newline="") as file:
+        return [
+            Case(
+                case=int(row["case"]),
+                category=row["category"],
+                model=row["model"],
+                rise=row["rise"],
+                recoupling=row["recoupling"],
+                theta=float(row["theta"]),
+                mu_s=float(row["mu_s"]),
+                amplitude=float(row["amplitude"]),
+                frequency=float(row["frequency"]),
+                cycles=int(row["cycles"]),
+                given=tuple((name, float(row[name])) for name in OPTIONAL_INPUTS if row[name]),
+                permanent_displacement=row["permanent_displacement"],
+                peak_relative_velocity=row["peak_relative_velocity"],
+                sliding_mode=int(row["sliding_mode"]),
+                recoupled=row["recoupled"] == "1",
+                eq4_below_yield=row["eq4_below_yield"] == "1",
+            )
+            for row in csv.DictReader(file)
+        ]
+
+
+def groups(cases: Iterable[Case]) -> list[list[Case]]:
+    """The cases in groups that one call of `sweep` can take: alike in options, cycles and inputs given."""
+
+    def key(case: Case) -> tuple[object, ...]:
+        return (case.model, case.rise, case.recoupling, case.cycles, tuple(name for name, _ in case.given))
+
+    return [list(group) for _, group in groupby(sorted(cases, key=key), key)]

@@ -1,0 +1,344 @@
+"""Blocks, and netCDF files: what they hold, and that they are complete or not there."""
+
+import errno
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import slipsweep
+from slipsweep import spec, store, variables
+from slipsweep.errors import InputError, RunError
+
+GRID = """
+# θ in degrees
+[axes.theta]
+values = [0, 5, 10, 15, 20]
+[axes.mu_s]
+values = [0.2, 0.4, 0.6]
+[axes.amplitude]
+start = 0.5
+stop = 9
+num = 40
+[axes.frequency]
+values = [0.5, 1, 2, 4]
+"""
+
+CASES = """
+[[cases]]
+label = "θ 5°"
+theta = 5
+mu_s = 0.4
+[[cases]]
+theta = 6
+mu_s = 0.5
+[axes.amplitude]
+values = [2, 4, 6]
+[axes.frequency]
+values = [1, 2]
+[model]
+delta_mu = 0.1
+"""
+
+
+def run(text: str, path: Path, **options: Any) -> store.Report:
+    return store.run(spec.parse(text, "a.toml"), path, command="slipsweep run a.toml", **options)
+
+
+def stored(path: Path) -> dict[str, Any]:
+    """Return all variables of a file, as stored."""
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_mask(False)
+        return {name: variable[...] for name, variable in file.variables.items()}
+
+
+def assert_same_data(one: Path, other: Path) -> None:
+    first, second = stored(one), stored(other)
+    assert list(first) == list(second)
+    for name, values in first.items():
+        np.testing.assert_array_equal(values, second[name], err_msg=name)
+
+
+# ---------------------------------------------------------------------------------- blocks
+
+SHAPES = st.dictionaries(
+    st.sampled_from([*variables.DIMENSION_ORDER, "case"]), st.integers(1, 12), min_size=1, max_size=5
+)
+
+
+@given(shape=SHAPES, most=st.integers(1, 400))
+@settings(max_examples=200, deadline=None)
+def test_blocks_cover_the_grid_once_and_keep_within_the_limit(shape: dict[str, int], most: int) -> None:
+    chunks = store.chunk_lengths(shape, most)
+    parts = list(store.blocks(shape, most))
+    seen = np.zeros(tuple(shape.values()), int)
+    for part in parts:
+        block = seen[tuple(part.values())]
+        block += 1
+        assert block.size <= most
+        # a compressed chunk is written once, by one block
+        assert all(part[dim].start % chunks[dim] == 0 for dim in shape)
+    assert np.all(seen == 1)
+    assert np.prod(list(chunks.values())) <= most
+
+
+def test_blocks_cut_the_frequency_axis_last() -> None:
+    shape = {"theta": 50, "mu_s": 20, "amplitude": 300, "frequency": 1000, "case": 7}
+    assert store.block_lengths(shape, 4_000_000) == {
+        "theta": 1,
+        "mu_s": 1,
+        "amplitude": 300,
+        "frequency": 1000,
+        "case": 7,
+    }
+    assert store.block_lengths(shape, 400_000)["frequency"] == 1000
+
+
+# ----------------------------------------------------------------------------- what is in it
+
+
+def test_blocks_give_what_one_call_gives(tmp_path: Path) -> None:
+    run(GRID, tmp_path / "a.nc", block_cells=300)
+    run(GRID, tmp_path / "b.nc")
+    assert_same_data(tmp_path / "a.nc", tmp_path / "b.nc")
+    expected = slipsweep.sweep(**spec.parse(GRID, "a.toml").arguments())
+    for name, values in stored(tmp_path / "a.nc").items():
+        np.testing.assert_array_equal(values, expected[name].values, err_msg=name)
+
+
+def test_attributes_follow_the_conventions(tmp_path: Path) -> None:
+    run(GRID, tmp_path / "a.nc")
+    with netCDF4.Dataset(tmp_path / "a.nc") as file:
+        assert file.data_model == "NETCDF4"
+        assert file.Conventions == "CF-1.11"
+        assert file.source.startswith("slipsweep ")
+        assert file.history.endswith("Z slipsweep run a.toml")
+        assert "10.1016/j.soildyn.2011.08.007" in file.references
+        assert file.sweep == GRID
+        assert list(file.dimensions) == ["theta", "mu_s", "amplitude", "frequency"]
+        for name in file.dimensions:
+            assert file[name].units == variables.PARAMETERS[name]["units"]
+            assert file[name].long_name
+        for name in variables.DEFAULT_RESULTS:
+            assert file[name].dimensions == tuple(file.dimensions)
+            assert file[name].long_name
+        assert np.isnan(file["permanent_displacement"]._FillValue)
+        assert file["permanent_displacement"].units == "m"
+        assert file["sliding_mode"]._FillValue == -1
+        assert file["sliding_mode"].dtype == file["sliding_mode"].flag_values.dtype == np.int8
+        assert file["validity"].dtype == file["validity"].flag_masks.dtype == np.int16
+        assert "_FillValue" not in file["validity"].ncattrs()
+        for name in ("sliding_mode", "validity"):
+            codes = file[name].flag_values if name == "sliding_mode" else file[name].flag_masks
+            assert len(file[name].flag_meanings.split()) == len(codes)
+            # no filter that a stock netCDF build lacks
+            filters = file[name].filters()
+            assert {filter for filter, on in filters.items() if on} == {"zlib", "shuffle", "complevel"}
+
+
+def test_float32_and_chosen_variables(tmp_path: Path) -> None:
+    text = GRID + '[output]\ndtype = "float32"\nvariables = ["sliding_mode", "permanent_displacement"]\n'
+    report = run(text, tmp_path / "a.nc")
+    with netCDF4.Dataset(tmp_path / "a.nc") as file:
+        assert file["permanent_displacement"].dtype == np.float32
+        assert file["theta"].dtype == np.float64
+        assert set(file.variables) - set(file.dimensions) == {"sliding_mode", "permanent_displacement"}
+        # an attribute must not name a variable that is not there
+        assert "ancillary_variables" not in file["permanent_displacement"].ncattrs()
+    assert report.tally.modes is not None
+    assert report.tally.flags is None
+
+
+def test_cases_have_labels_and_no_string_type(tmp_path: Path) -> None:
+    run(CASES, tmp_path / "a.nc", block_cells=5)
+    with netCDF4.Dataset(tmp_path / "a.nc") as file:
+        assert all(variable.dtype is not str for variable in file.variables.values())
+        assert file["permanent_displacement"].dimensions == ("amplitude", "frequency", "case")
+        assert set(file["validity"].coordinates.split()) == {"theta", "mu_s", "delta_mu", "label"}
+    with xr.open_dataset(tmp_path / "a.nc") as dataset:
+        assert list(dataset["label"].values) == ["θ 5°", "2"]
+        np.testing.assert_array_equal(dataset["theta"], [5, 6])
+        assert dataset["theta"].dims == ("case",)
+        assert dataset["delta_mu"].item() == 0.1
+
+
+def test_displacement_amplitude_brings_the_amplitude_along(tmp_path: Path) -> None:
+    text = GRID.replace("axes.amplitude", "axes.displacement_amplitude").replace("stop = 9", "stop = 0.6")
+    run(text, tmp_path / "a.nc", block_cells=100)
+    with xr.open_dataset(tmp_path / "a.nc") as dataset:
+        expected = (2 * np.pi * dataset["frequency"]) ** 2 * dataset["displacement_amplitude"]
+        np.testing.assert_allclose(dataset["amplitude"], expected.transpose(*dataset["amplitude"].dims))
+        assert dataset["amplitude"].units == "m s-2"
+
+
+@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump is not installed")
+@pytest.mark.parametrize("text", [GRID, CASES])
+def test_ncdump_reads_it(tmp_path: Path, text: str) -> None:
+    run(text, tmp_path / "a.nc")
+    done = subprocess.run(["ncdump", tmp_path / "a.nc"], capture_output=True, text=True, check=True)
+    assert 'flag_meanings = "stuck stick_slip continuous"' in done.stdout
+    assert "string" not in done.stdout
+
+
+def test_a_result_repeats_its_run(tmp_path: Path) -> None:
+    sweep_spec = spec.parse(CASES, "a.toml").with_solver("step")
+    store.run(sweep_spec, tmp_path / "a.nc", command="x")
+    again = spec.load(tmp_path / "a.nc")
+    assert again.text == CASES
+    # the solver was not the sweep file's own: it is remembered all the same
+    assert again.solver.method == "step"
+    store.run(again, tmp_path / "b.nc", command="x")
+    assert_same_data(tmp_path / "a.nc", tmp_path / "b.nc")
+
+
+def test_the_tally_counts_modes_and_flags(tmp_path: Path) -> None:
+    report = run(GRID, tmp_path / "a.nc", block_cells=100)
+    values = stored(tmp_path / "a.nc")
+    assert report.tally.cells == values["validity"].size == 5 * 3 * 40 * 4
+    assert report.tally.modes == {mode: np.sum(values["sliding_mode"] == mode) for mode in variables.SlidingMode}
+    assert report.tally.flags == {flag: np.sum(values["validity"] & flag != 0) for flag in variables.Validity}
+    assert store.read_contents(tmp_path / "a.nc").tally == report.tally
+    assert report.nbytes == (tmp_path / "a.nc").stat().st_size
+
+
+def test_datasets_in_memory_are_written_by_the_same_rules(tmp_path: Path) -> None:
+    dataset = xr.Dataset(
+        {"relative_velocity": ("time", [0.0, 1.0], variables.HISTORY["relative_velocity"])},
+        {"time": ("time", [0.0, 0.1], {"units": "s"}), "theta": ((), 5.0, variables.PARAMETERS["theta"])},
+        {"permanent_displacement": 0.5},
+    )
+    store.write_dataset(dataset, tmp_path / "a.nc", title="History", command="x")
+    with xr.open_dataset(tmp_path / "a.nc") as read:
+        xr.testing.assert_equal(read, dataset)
+        assert read.attrs["Conventions"] == "CF-1.11"
+        assert read.attrs["permanent_displacement"] == 0.5
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", b"\x89HDF\r\n\x1a\nbut no more"])
+def test_other_files_have_no_contents(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.nc").write_bytes(content)
+    with pytest.raises(InputError, match=r"a\.nc: not a netCDF file"):
+        store.read_contents(tmp_path / "a.nc")
+
+
+def test_netcdf_of_others_has_no_contents(tmp_path: Path) -> None:
+    netCDF4.Dataset(tmp_path / "a.nc", "w").close()
+    with pytest.raises(InputError, match=r"a\.nc: not written by slipsweep"):
+        store.read_contents(tmp_path / "a.nc")
+    with pytest.raises(InputError, match=r'a\.nc: no attribute "sweep"'):
+        spec.load(tmp_path / "a.nc")
+
+
+# -------------------------------------------------------------------- complete or not there
+
+
+@pytest.mark.parametrize(
+    ("raised", "seen", "message"),
+    [
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), RunError, "No space left on device"),
+        (RuntimeError("NetCDF: HDF error"), RunError, "HDF error; is the disk full?"),
+        (KeyboardInterrupt(), KeyboardInterrupt, None),
+    ],
+)
+@pytest.mark.parametrize("existing", [False, True])
+def test_a_failed_run_leaves_nothing_behind(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    raised: BaseException,
+    seen: type[BaseException],
+    message: str | None,
+    existing: bool,
+) -> None:
+    path = tmp_path / "a.nc"
+    if existing:
+        path.write_text("an earlier result")
+    fill, calls = store._fill, 0
+
+    def failing(file: netCDF4.Dataset, dataset: xr.Dataset, block: Mapping[str, slice]) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 3:
+            raise raised
+        fill(file, dataset, block)
+
+    monkeypatch.setattr(store, "_fill", failing)
+    with pytest.raises(seen, match=message):
+        run(GRID, path, block_cells=300, overwrite=True)
+    assert [entry.name for entry in tmp_path.iterdir()] == (["a.nc"] if existing else [])
+    if existing:
+        assert path.read_text() == "an earlier result"
+
+
+def test_memory_that_runs_out_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(**arguments: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(slipsweep, "sweep", failing)
+    with pytest.raises(RunError, match="out of memory at a block of 2400 cells"):
+        run(GRID, tmp_path / "a.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_output_is_not_there_before_it_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    run(GRID, path, block_cells=300, progress=lambda cells: pytest.fail("too early") if path.exists() else None)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
+
+
+def test_a_rivals_output_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    with pytest.raises(RunError, match="was made by another process during the run"):
+        run(GRID, path, progress=lambda cells: path.write_text("rival"))
+    assert path.read_text() == "rival"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
+
+
+def test_file_systems_without_hard_links_will_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_links(source: Path, target: Path) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", no_links)
+    run(GRID, tmp_path / "a.nc")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
+
+
+def outputs(folder: Path) -> Iterator[tuple[Path, str]]:
+    (folder / "file").touch()
+    (folder / "folder").mkdir()
+    yield folder / "file", "exists already; give --overwrite"
+    yield folder / "folder", "exists and is not a file"
+    yield folder / "none" / "a.nc", "the folder .* does not exist"
+    yield folder / "file" / "a.nc", "the folder .* does not exist"
+
+
+def test_outputs_that_cannot_be_are_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(slipsweep, "sweep", lambda **arguments: pytest.fail("has begun"))
+    for path, message in outputs(tmp_path):
+        with pytest.raises(InputError, match=message):
+            run(GRID, path)
+    monkeypatch.setattr(os, "access", lambda *arguments: False)
+    with pytest.raises(InputError, match="is not writable"):
+        run(GRID, tmp_path / "a.nc")
+
+
+def test_a_grid_too_large_for_the_disk_is_refused(tmp_path: Path) -> None:
+    axes = ("theta", "mu_s", "amplitude", "frequency")
+    text = "".join(f"[axes.{name}]\nstart = 0.1\nstop = 9\nnum = 10000\n" for name in axes)
+    with pytest.raises(InputError, match=r"a grid of 1e\+16 cells makes .* TB, but .* free: take coarser axes"):
+        run(text, tmp_path / "a.nc")
+
+
+def test_a_block_too_large_for_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "available_memory", lambda: 50_000)
+    with pytest.raises(InputError, match=r"a block of 2400 cells \(5 theta x .*\) needs 91.2 kB of memory, but 50 kB"):
+        run(GRID, tmp_path / "a.nc")
+    run(GRID, tmp_path / "a.nc", block_cells=1000)
