@@ -139,9 +139,8 @@ minimum_friction, structure_frequency, model, rise, recoupling, g
         )
         validity = parameters.validity
         if structure_frequency is not None:
-            ratio = mpf(frequency) / mpf(structure_frequency)
-            if mpf(0.2) <= ratio <= mpf(1.3):
-                validity |= FLEXIBLE_BLOCK
+            in_band = 0.2 <= float(frequency) / float(structure_frequency) <= 1.3  # in doubles: 1/5 is 0.2
+            validity |= FLEXIBLE_BLOCK * in_band
         if parameters.sliding_mode == MISSING:
             return Solution(mp.nan, mp.nan, MISSING, validity, False, False)
         if parameters.sliding_mode == STUCK:

@@ -1,7 +1,7 @@
 """Outside checks: Newmark's block against pySLAMMER, every mode against SciPy's integrators."""
 
 from collections.abc import Callable
-from math import asin, atan, exp, pi, radians, sin, tan
+from math import asin, atan, exp, inf, pi, radians, sin, tan
 
 import numpy as np
 import pytest
@@ -72,6 +72,13 @@ class Integrated:
         size = abs(ground) - normal * (self.case.mu_s - self.tan_theta - friction) - G * self.tan_theta
         return size if ground >= 0 else -size
 
+    def following(self, least: float = -inf) -> Callable[[float], float]:
+        """Block acceleration of Eq. 4, not below `least`."""
+        return lambda phi: max(least, self.eq4(self.ground(phi)))
+
+    def holding(self, held: float) -> Callable[[float], float]:
+        return lambda phi: held
+
     def follow(self, block: Callable[[float], float], start: float, stop: float, may_stop: bool) -> float | None:
         """Integrate Ug - b; the phase of the stop if there is one."""
 
@@ -104,7 +111,7 @@ class Integrated:
     def continuous(self) -> None:
         start = asin(self.onset / self.case.amplitude)
         for quarter in range(1, 4 * self.case.cycles + 1):
-            self.follow(lambda phi: self.eq4(self.ground(phi)), start, quarter * pi / 2, may_stop=False)
+            self.follow(self.following(), start, quarter * pi / 2, may_stop=False)
             start = quarter * pi / 2
 
     def slide_begins(self, phi: float) -> float | None:
@@ -127,7 +134,7 @@ class Integrated:
             if held is None:
                 continue
             end = 2 * pi + (0.0 if last else onset_phase)
-            stopped = self.follow(lambda phi, held=held: held, pi / 2, end if integrate else pi, may_stop=True)
+            stopped = self.follow(self.holding(held), pi / 2, end if integrate else pi, may_stop=True)
             if stopped is None:
                 self.eq12(held, 0.0 if integrate else end - pi, last)
 
@@ -142,14 +149,14 @@ class Integrated:
                 phi = begins
             if self.case.model == "newmark":
                 first, held = self.onset, self.onset
-                block = lambda phi, first=first: first  # noqa: E731
+                block = self.holding(first)
             elif self.case.rise == "literal":
                 held = self.eq4(top)
-                block = lambda phi: self.eq4(self.ground(phi))  # noqa: E731
+                block = self.following()
             else:  # Eq. 4 is convex in these cells
                 first = max(self.onset, self.eq4(self.ground(phi)))
                 held = max(first, self.eq4(top))
-                block = lambda phi, first=first: max(first, self.eq4(self.ground(phi)))  # noqa: E731
+                block = self.following(first)
             stopped = self.follow(block, phi, pi / 2, may_stop=True)
             if stopped is None:
                 return held
@@ -202,7 +209,7 @@ def test_motion_against_scipy(case: Case) -> None:
         case.mu_s,
         case.amplitude,
         case.frequency,
-        **case.options,  # type: ignore[arg-type]
+        **case.options,
     )
     displacement, velocity = integrated.displacement / omega**2, integrated.peak / omega
     assert float(result.permanent_displacement) == pytest.approx(

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.variables import VALIDITY_TEXT
+from slipsweep.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,6 +158,12 @@ def simulate(
     )
     for path in outputs:
         writers[path.suffix](dataset, path, overwrite)
+    typer.echo(f"permanent displacement  {dataset['permanent_displacement'].item():.6g} m")
+    typer.echo(f"peak relative velocity  {dataset['peak_relative_velocity'].item():.6g} m/s")
+    typer.echo(f"sliding mode            {SlidingMode(dataset['sliding_mode'].item()).name.lower()}")
+    for flag in Validity(dataset["validity"].item()):
+        typer.echo(f"flag                    {(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
+    for path in outputs:
         typer.echo(path)
 
 
@@ -170,7 +176,7 @@ def _write_netcdf(dataset: "xr.Dataset", path: Path, overwrite: bool) -> None:
 def _write_csv(dataset: "xr.Dataset", path: Path, overwrite: bool) -> None:
     from slipsweep import store
 
-    columns = {"time": dataset["time"], **dataset.data_vars}
+    columns = {name: dataset[name] for name in ("time", *HISTORY)}
     with store.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(f"{name} ({array.attrs['units']})" for name, array in columns.items())
@@ -212,7 +218,7 @@ def _progress(cells: int, quiet: bool) -> Iterator[Callable[[int], None] | None]
 
     class Speed(ProgressColumn):
         def render(self, task: Task) -> str:
-            return f"{task.completed / task.elapsed:.3g} cells/s" if task.elapsed else ""
+            return f"{task.completed / task.elapsed:.3g} cells/s" if task.completed and task.elapsed else ""
 
     columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

@@ -16,7 +16,7 @@ from slipsweep import threads
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.grid import SOLVERS, Grid, Results, parameter_grid
+from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
 
 RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": step.SIMPSON}
@@ -128,9 +128,10 @@ def solve(
     periods = np.ascontiguousarray(1.0 / (2.0 * math.pi * np.asarray(frequency, np.float64))).reshape(-1)
     flat = tuple(np.array(values, np.float64).reshape(-1) for values in inputs)
     options = problem.options("peak_relative_velocity" in wanted)
-    solver = solver_of(problem)
-    table = step.sine_table(problem.steps_per_cycle) if solver == "step" else np.empty(0)
-    kernel = SOLVERS[solver]
+    if solver_of(problem) == "step":
+        kernel, table = STEP_KERNELS[options.rule], step.sine_table(problem.steps_per_cycle)
+    else:
+        kernel, table = CYCLE_KERNEL, np.empty(0)
 
     def work(first: int, last: int) -> None:
         kernel(grid, first, last, flat, periods, options, table, targets)

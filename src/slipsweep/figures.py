@@ -33,18 +33,18 @@ def history(dataset: xr.Dataset) -> Figure:
 
     accelerations.plot(time, dataset["ground_acceleration"], color=_BLUE, label="plane")
     accelerations.plot(time, dataset["block_acceleration"], color=_VERMILION, linestyle="--", label="block")
-    accelerations.legend(loc="upper right", ncols=2)
-    accelerations.set_ylabel("acceleration (m/s²)")
+    accelerations.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+    accelerations.set_ylabel("acceleration\n(m/s²)")
 
     friction.plot(time, dataset["friction_coefficient"], color=_VERMILION)
-    friction.set_ylabel("friction coefficient")
+    friction.set_ylabel("friction\ncoefficient")
 
     velocity.plot(time, dataset["relative_velocity"], color=_VERMILION)
-    velocity.set_ylabel("relative velocity (m/s)")
+    velocity.set_ylabel("relative\nvelocity (m/s)")
 
     metres = float(abs(dataset["relative_displacement"]).max()) >= 1.0
     displacement.plot(time, dataset["relative_displacement"] * (1 if metres else 1000), color=_VERMILION)
-    displacement.set_ylabel(f"relative displacement ({'m' if metres else 'mm'})")
+    displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
     displacement.set_xlabel("time (s)")
 
     for axes in (accelerations, friction, velocity, displacement):
@@ -78,4 +78,7 @@ def _caption(dataset: xr.Dataset) -> str:
         if name in dataset.coords:
             unit = PARAMETERS[name]["units"]
             parts.append(f"{symbol} = {dataset[name].item():.4g}{units.get(unit, f' {unit}')}")
-    return ", ".join(parts)
+    attributes = dataset.attrs
+    options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
+    shaking = f"{attributes['cycles']} cycles of a {attributes['waveform']}"
+    return f"{', '.join(parts)}\nmodel: {', '.join(options)}; {shaking}"

@@ -53,7 +53,11 @@ class _Table(BaseModel):
 
 
 class Axis(_Table):
-    """One dimension: `values`, or `start`, `stop`, `num` and `spacing`; both in `units`."""
+    """One dimension: `values`, or `start`, `stop`, `num` and `spacing`.
+
+    `units` is any unit that converts to the parameter's own, which is the default;
+    "g" is the gravity of the sweep's own [model].
+    """
 
     values: list[Number] | None = None
     start: Number | None = None

@@ -20,6 +20,11 @@ from slipsweep.variables import VALUELESS, Validity
 #: Relative accuracy of an event's phase ; an error there enters the result squared.
 EVENT_TOLERANCE = 1e-9
 
+#: Cells solved together; their inputs, states and results stay in the first-level cache.
+#: Rows of a tile's arrays lie this far apart, a constant: LLVM then sees that no two rows
+#: overlap, and vectorises loops over many of them (seen: 2.6 against 10.8 ns a cell).
+TILE = 256
+
 #: How the block's acceleration rises with the plane's (the `model` and `rise` options).
 NEWMARK, MONOTONE, LITERAL = 0, 1, 2
 

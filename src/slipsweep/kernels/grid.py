@@ -13,10 +13,7 @@ import numpy as np
 from slipsweep.compiled import Kernel
 from slipsweep.equations import scalar
 from slipsweep.kernels import cycle, step
-from slipsweep.kernels.block import Options, block_of, cell_of
-
-#: Cells solved together: their inputs and results stay in the first-level cache.
-_TILE = 256
+from slipsweep.kernels.block import TILE, Options, block_of, cell_of
 
 
 class Grid(NamedTuple):
@@ -118,31 +115,35 @@ def _cycle_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     table: np.ndarray, results: Results,
 ) -> None:  # fmt: skip
-    cells, offsets = np.empty((7, _TILE)), np.empty((2, _TILE), np.int64)
-    motion, codes = np.empty((2, _TILE)), np.empty((2, _TILE), np.int64)
-    for begin in range(first, last, _TILE):
-        count = min(_TILE, last - begin)
+    cells, offsets = np.empty((7, TILE)), np.empty((2, TILE), np.int64)
+    motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
         gather(grid, begin, count, inputs, cells, offsets)
         cycle.solve_cells(cells, count, options, table, motion, codes)
         scatter(grid, count, offsets, periods, motion, codes, results)
 
 
-def _step_grid(
-    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    table: np.ndarray, results: Results,
-) -> None:  # fmt: skip
-    cells, offsets = np.empty((7, _TILE)), np.empty((2, _TILE), np.int64)
-    motion, codes = np.empty((2, _TILE)), np.empty((2, _TILE), np.int64)
-    for begin in range(first, last, _TILE):
-        count = min(_TILE, last - begin)
-        gather(grid, begin, count, inputs, cells, offsets)
-        step.solve_cells(cells, count, options, table, motion, codes)
-        scatter(grid, count, offsets, periods, motion, codes, results)
+def _step_grid_of(rule: int) -> Kernel:
+    # a kernel a rule, so that only the one in use is compiled
+    def step_grid(
+        grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+        table: np.ndarray, results: Results,
+    ) -> None:  # fmt: skip
+        cells, offsets = np.empty((7, TILE)), np.empty((2, TILE), np.int64)
+        motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
+        for begin in range(first, last, TILE):
+            count = min(TILE, last - begin)
+            gather(grid, begin, count, inputs, cells, offsets)
+            step.solve_cells(cells, count, rule, options, table, motion, codes)
+            scatter(grid, count, offsets, periods, motion, codes, results)
+
+    return Kernel(step_grid)
 
 
-#: Kernels by the name of the solver.  Two plain functions rather than one made by a
-#: factory: numba does not find a closure over a jitted function in its cache again.
-SOLVERS = {"cycle": Kernel(_cycle_grid), "step": Kernel(_step_grid)}
+#: Kernels of the stepping solver by its rule, and of the cycle solver.
+STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (step.RECTANGLE, step.TRAPEZOID, step.SIMPSON)}
+CYCLE_KERNEL = Kernel(_cycle_grid)
 
 
 def _parameter_grid(
@@ -155,10 +156,10 @@ def _parameter_grid(
     mode: np.ndarray,
     validity: np.ndarray,
 ) -> None:
-    cells = np.empty((7, _TILE))
-    offsets = np.empty((2, _TILE), np.int64)
-    for begin in range(first, last, _TILE):
-        count = min(_TILE, last - begin)
+    cells = np.empty((7, TILE))
+    offsets = np.empty((2, TILE), np.int64)
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
         gather(grid, begin, count, inputs, cells, offsets)
         for j in range(count):
             block = block_of(cell_of(cells, j), options.rise, options.g)
