@@ -14,16 +14,17 @@ import numpy as np
 
 from slipsweep import equations as eq
 from slipsweep.elementary import inverse_versine
-from slipsweep.equations import STICK_SLIP, STUCK, scalar
+from slipsweep.kernels.jit import in_lanes, scalar
 from slipsweep.variables import VALUELESS, Validity
 
 #: Relative accuracy of an event's phase ; an error there enters the result squared.
 EVENT_TOLERANCE = 1e-9
 
-#: Cells solved together; their inputs, states and results stay in the first-level cache.
+#: Cells solved together; their inputs, states and results stay in the second-level cache.
 #: Rows of a tile's arrays lie this far apart, a constant: LLVM then sees that no two rows
-#: overlap, and vectorises loops over many of them (seen: 2.6 against 10.8 ns a cell).
-TILE = 256
+#: overlap, and vectorises loops over many of them (seen: 2.6 against 10.8 ns a cell).  A
+#: multiple of 32 (`whole_lanes`), but no power of two, whose rows would share cache sets.
+TILE = 1056
 
 #: How the block's acceleration rises with the plane's (the `model` and `rise` options).
 NEWMARK, MONOTONE, LITERAL = 0, 1, 2
@@ -91,51 +92,63 @@ class Motion(NamedTuple):
     validity: int
 
 
-@scalar
+@in_lanes
 def cell_of(cells: np.ndarray, j: int) -> Cell:
-    """Column j of an array whose rows are the fields of `Cell`."""
-    return Cell(cells[0, j], cells[1, j], cells[2, j], cells[3, j], cells[4, j], cells[5, j], cells[6, j])
+    """Cell j of a tile, whose rows are the fields of `Cell`."""
+    return Cell(
+        cells[j],
+        cells[TILE + j],
+        cells[2 * TILE + j],
+        cells[3 * TILE + j],
+        cells[4 * TILE + j],
+        cells[5 * TILE + j],
+        cells[6 * TILE + j],
+    )
 
 
-@scalar
+@in_lanes
+def _given(given: float, estimate: float) -> float:
+    """What is given, or where that is NaN its estimate."""
+    return estimate if math.isnan(given) else given
+
+
+@in_lanes
 def block_of(cell: Cell, rise: int, g: float) -> Block:
     """Friction parameters (Eqs. 7-11, λ from Eq. 6), sliding mode and a-priori validity of a cell."""
+    # estimates first, then what is given in their place: without branches, so that a loop
+    # over cells becomes SIMD (seen: 32 ns a cell with them)
     tan_theta, mu_s, amplitude = cell.tan_theta, cell.mu_s, cell.amplitude
-    yield_acceleration = cell.yield_acceleration
-    if math.isnan(yield_acceleration):
-        yield_acceleration = eq.coulomb_yield_acceleration(mu_s, tan_theta, g)
+    yield_acceleration = _given(cell.yield_acceleration, eq.coulomb_yield_acceleration(mu_s, tan_theta, g))
     limit = eq.limiting_acceleration(yield_acceleration, mu_s, tan_theta, g)
     ratio = eq.acceleration_ratio(amplitude, limit)
-    minimum_friction = cell.minimum_friction
-    if math.isnan(minimum_friction):
-        minimum_friction = eq.minimum_friction(mu_s, ratio)
-    delta_mu = cell.delta_mu
-    if math.isnan(delta_mu):
-        delta_mu = eq.delta_mu(mu_s, ratio)
-    decay_rate = cell.decay_rate
-    calibrated = math.isnan(decay_rate)
-    if calibrated:
-        decay_rate = eq.decay_rate(amplitude, mu_s, delta_mu, minimum_friction, g)
+    minimum_friction = _given(cell.minimum_friction, eq.minimum_friction(mu_s, ratio))
+    delta_mu = _given(cell.delta_mu, eq.delta_mu(mu_s, ratio))
+    decay_rate = _given(cell.decay_rate, eq.decay_rate(amplitude, mu_s, delta_mu, minimum_friction, g))
 
-    validity = 0
-    if yield_acceleration <= 0.0:
-        validity |= STATICALLY_UNSTABLE
-    if rise == NEWMARK:
-        mode = STUCK if amplitude <= yield_acceleration else STICK_SLIP
-    else:
-        mode = eq.sliding_mode(amplitude, yield_acceleration, limit)
-        if amplitude * tan_theta >= g:
-            validity |= UPLIFT
-        if eq.limit_denominator(mu_s, tan_theta) <= 0.0:
-            validity |= LIMIT_UNDEFINED
-        if calibrated and validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED) == 0 and decay_rate <= 0.0:
-            validity |= FRICTION_NOT_DECAYING
-    if validity & NO_VALUE:
-        mode = -1
+    newmark = rise == NEWMARK
+    unstable = yield_acceleration <= 0.0
+    uplift = (amplitude * tan_theta >= g) & (not newmark)
+    undefined = (eq.limit_denominator(mu_s, tan_theta) <= 0.0) & (not newmark)
+    # λ <= 0, said without the division by an amplitude that may be zero
+    rises = math.isnan(cell.decay_rate) & (mu_s + delta_mu <= minimum_friction) & (not (unstable | undefined | newmark))
+    validity = (
+        (STATICALLY_UNSTABLE if unstable else 0)
+        | (UPLIFT if uplift else 0)
+        | (LIMIT_UNDEFINED if undefined else 0)
+        | (FRICTION_NOT_DECAYING if rises else 0)
+    )
+    mode = eq.sliding_mode(amplitude, yield_acceleration, math.inf if newmark else limit)
+    mode = mode if validity == 0 else -1
     return Block(
         amplitude, yield_acceleration, limit, ratio, mu_s, tan_theta, minimum_friction, delta_mu, decay_rate, g,
         rise, mode, validity,
     )  # fmt: skip
+
+
+@scalar
+def block_at(cells: np.ndarray, j: int, options: Options) -> Block:
+    """The block of cell j of a tile: `block_of` where no loop wants it inlined."""
+    return block_of(cell_of(cells, j), options.rise, options.g)
 
 
 @scalar
@@ -252,3 +265,40 @@ def yield_governs(block: Block) -> bool:
     if bend > start and slope_and_curvature(block, start)[0] > 0.0 > slope_and_curvature(block, bend)[0]:
         highest = max(highest, response(block, slope_root(block, 0.0, start, bend)))
     return highest <= start
+
+
+#: Rows of lanes, blocks laid out for SIMD loops: row + j is cell j.  A solver's own rows
+#: follow from `LANE_ROWS` on.
+AMPLITUDE, YIELD, MU_S, TAN_THETA, DELTA_MU, DECAY_RATE, BEGAN = range(0, 7 * TILE, TILE)
+LANE_ROWS = 7
+
+#: Lanes are filled up to a multiple of this, so that no loop over them has a scalar remainder:
+#: its roundings would differ, and a cell's last digits depend on how many stand beside it.
+_LANE_MULTIPLE = 32
+
+
+@scalar
+def whole_lanes(count: int) -> int:
+    """`count` up to the next multiple that leaves no remainder."""
+    return -(-count // _LANE_MULTIPLE) * _LANE_MULTIPLE
+
+
+@in_lanes
+def lane_of(block: Block, lanes: np.ndarray, j: int) -> None:
+    """Lay a block out as lane j."""
+    lanes[AMPLITUDE + j], lanes[YIELD + j] = block.amplitude, block.yield_acceleration
+    lanes[MU_S + j], lanes[TAN_THETA + j] = block.mu_s, block.tan_theta
+    lanes[DELTA_MU + j], lanes[DECAY_RATE + j] = block.delta_mu, block.decay_rate
+    lanes[BEGAN + j] = -inverse_versine((block.amplitude - block.yield_acceleration) / block.amplitude)
+
+
+@in_lanes
+def lane_friction(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """μ(x) of a lane."""
+    return eq.friction_coefficient(x, lanes[MU_S + j], lanes[DELTA_MU + j], lanes[DECAY_RATE + j], g)
+
+
+@in_lanes
+def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """E(x) of a lane."""
+    return eq.block_acceleration(x, lane_friction(lanes, j, x, g), lanes[MU_S + j], lanes[TAN_THETA + j], g)

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.compiled import Kernel
-from slipsweep.equations import scalar
 from slipsweep.kernels import cycle, step
 from slipsweep.kernels.block import TILE, Options, block_of, cell_of
+from slipsweep.kernels.jit import scalar
 
 
 class Grid(NamedTuple):
@@ -43,7 +43,7 @@ class Results(NamedTuple):
 def gather(
     grid: Grid, first: int, count: int, inputs: tuple[np.ndarray, ...], cells: np.ndarray, offsets: np.ndarray
 ) -> None:
-    """Fill `cells` (7, count) and the offsets of 1/ω and of the results (2, count) for cells from `first` on."""
+    """Fill `cells` (7 rows of a tile) and the offsets of 1/ω and of the results for `count` cells from `first` on."""
     dimensions = grid.shape.size
     index = np.empty(dimensions, np.int64)
     rest = first
@@ -61,7 +61,7 @@ def gather(
         for row in range(7):
             values, at, stride = inputs[row], position[row], grid.strides[row, last]
             for j in range(run):
-                cells[row, done + j] = values[at + j * stride]
+                cells[row * TILE + done + j] = values[at + j * stride]
         for row in range(2):
             at, stride = position[7 + row], grid.strides[7 + row, last]
             for j in range(run):
@@ -115,7 +115,7 @@ def _cycle_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     table: np.ndarray, results: Results,
 ) -> None:  # fmt: skip
-    cells, offsets = np.empty((7, TILE)), np.empty((2, TILE), np.int64)
+    cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
@@ -130,7 +130,7 @@ def _step_grid_of(rule: int) -> Kernel:
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
         table: np.ndarray, results: Results,
     ) -> None:  # fmt: skip
-        cells, offsets = np.empty((7, TILE)), np.empty((2, TILE), np.int64)
+        cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
         motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
@@ -156,7 +156,7 @@ def _parameter_grid(
     mode: np.ndarray,
     validity: np.ndarray,
 ) -> None:
-    cells = np.empty((7, TILE))
+    cells = np.empty(7 * TILE)
     offsets = np.empty((2, TILE), np.int64)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)

@@ -10,10 +10,11 @@ import numpy as np
 
 from slipsweep import equations as eq
 from slipsweep.compiled import Kernel
-from slipsweep.equations import CONTINUOUS, scalar
+from slipsweep.equations import CONTINUOUS
 from slipsweep.kernels import cycle
-from slipsweep.kernels.block import NO_VALUE, Block, Options, block_of, cell_of, phase, response
+from slipsweep.kernels.block import NO_VALUE, Block, Options, block_at, phase, response
 from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, RECOUPLE, STICK
+from slipsweep.kernels.jit import scalar
 
 _HALF_PI = 0.5 * math.pi
 
@@ -107,7 +108,7 @@ def continuous_history(block: Block, options: Options, phases: np.ndarray, histo
 
 
 def _history(cells: np.ndarray, options: Options, phases: np.ndarray, history: np.ndarray) -> None:
-    block = block_of(cell_of(cells, 0), options.rise, options.g)
+    block = block_at(cells, 0, options)
     shaken = 2.0 * math.pi * options.cycles
     history[:] = 0.0
     if block.validity & NO_VALUE == 0:

@@ -22,12 +22,14 @@ import math
 import numpy as np
 from numba import literally
 
-from slipsweep import equations as eq
 from slipsweep.elementary import versine
-from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK, scalar
+from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
+    AMPLITUDE,
+    BEGAN,
     EQ4_BELOW_YIELD,
     INTEGRATE,
+    LANE_ROWS,
     LITERAL,
     MONOTONE,
     NEWMARK,
@@ -36,8 +38,9 @@ from slipsweep.kernels.block import (
     Block,
     Motion,
     Options,
-    block_of,
-    cell_of,
+    block_at,
+    lane_of,
+    lane_response,
     phase,
     response,
     response_and_slope,
@@ -46,8 +49,10 @@ from slipsweep.kernels.block import (
     slip_root,
     slope_root,
     starting_acceleration,
+    whole_lanes,
     yield_governs,
 )
+from slipsweep.kernels.jit import in_lanes, scalar
 from slipsweep.kernels.train import Pulse, attenuate, pause, train_of
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
@@ -74,7 +79,7 @@ VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS = range(0, 7 * TILE, 
 _STATE_SIZE = 7 * TILE
 
 
-@scalar
+@in_lanes
 def coefficients(rule: int, start: float, middle: float, end: float) -> tuple[float, float, float]:
     """c0, c1, c2 of the rate c0 + c1 s + c2 s², s in [0, 1] over the step."""
     if rule == RECTANGLE:
@@ -84,13 +89,13 @@ def coefficients(rule: int, start: float, middle: float, end: float) -> tuple[fl
     return start, 4.0 * middle - 3.0 * start - end, 2.0 * (start + end) - 4.0 * middle
 
 
-@scalar
+@in_lanes
 def velocity_gain(c0: float, c1: float, c2: float, h: float, s: float) -> float:
     """∫ of the rate from 0 to s, over a step of phase h."""
     return h * s * (c0 + s * (0.5 * c1 + s * c2 / 3.0))
 
 
-@scalar
+@in_lanes
 def displacement_gain(c0: float, c1: float, c2: float, h: float, s: float) -> float:
     """∫∫ of the rate from 0 to s, over a step of phase h."""
     return h * h * s * s * (0.5 * c0 + s * (c1 / 6.0 + s * c2 / 12.0))
@@ -255,27 +260,10 @@ def pulse(block: Block, options: Options, table: np.ndarray, velocity: float, la
 train = train_of(pulse)
 
 
-#: Rows of the lanes beside their state: what the inner loops need of a block, the phase
-#: (ψ) at which the plane passes the yield value, E (or D) at the last node, and whether
-#: something happens in the step.
-_AMPLITUDE, _MU_S, _TAN_THETA, _DELTA_MU, _DECAY_RATE, _BEGAN, _ASKED, _HAPPENS = range(0, 8 * TILE, TILE)
-_LANE_SIZE = 8 * TILE
-
-
-@scalar
-def lane_of(block: Block, lanes: np.ndarray, j: int) -> None:
-    """Lay out a block for the inner loops."""
-    lanes[_AMPLITUDE + j], lanes[_MU_S + j], lanes[_TAN_THETA + j] = block.amplitude, block.mu_s, block.tan_theta
-    lanes[_DELTA_MU + j], lanes[_DECAY_RATE + j] = block.delta_mu, block.decay_rate
-    lanes[_BEGAN + j] = phase(block, block.yield_acceleration)
-
-
-@scalar
-def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """E(x) of a lane."""
-    mu_s, tan_theta = lanes[_MU_S + j], lanes[_TAN_THETA + j]
-    mu = eq.friction_coefficient(x, mu_s, lanes[_DELTA_MU + j], lanes[_DECAY_RATE + j], g)
-    return eq.block_acceleration(x, mu, mu_s, tan_theta, g)
+#: Rows of the lanes beside the block's: E (or D) at the last node, and whether something
+#: happens in the step.
+_ASKED, _HAPPENS = LANE_ROWS * TILE, (LANE_ROWS + 1) * TILE
+_LANE_SIZE = (LANE_ROWS + 2) * TILE
 
 
 @scalar
@@ -290,15 +278,15 @@ def lockstep_rise(
     h = 2.0 * math.pi / options.steps_per_cycle
     first = quarter
     for j in range(count):
-        first = min(first, quarter + math.floor(lanes[_BEGAN + j] / h))
+        first = min(first, quarter + math.floor(lanes[BEGAN + j] / h))
     for j in range(count):
-        lanes[_ASKED + j] = lane_response(lanes, j, lanes[_AMPLITUDE + j] * table[2 * first], g)
+        lanes[_ASKED + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * table[2 * first], g)
     for node in range(first, quarter):
         s_start, s_middle, s_end = table[2 * node], table[2 * node + 1], table[2 * node + 2]
         psi, psi_end = (node - quarter) * h, (node + 1 - quarter) * h
         events = 0
         for j in range(count):
-            x, x_end = lanes[_AMPLITUDE + j] * s_start, lanes[_AMPLITUDE + j] * s_end
+            x, x_end = lanes[AMPLITUDE + j] * s_start, lanes[AMPLITUDE + j] * s_end
             slides, follows, held = state[SLIDES + j] > 0.0, state[FOLLOWS + j] > 0.0, state[HELD + j]
             asked = lanes[_ASKED + j]
             asked_end = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_end, g)
@@ -306,7 +294,7 @@ def lockstep_rise(
             held_end = asked_end if follows else held
             middle = 0.0
             if rule == SIMPSON:
-                x_middle = lanes[_AMPLITUDE + j] * s_middle
+                x_middle = lanes[AMPLITUDE + j] * s_middle
                 asked_middle = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_middle, g)
                 middle = x_middle - (asked_middle if follows else held)
             c0, c1, c2 = coefficients(rule, x - held, middle, x_end - held_end)
@@ -316,7 +304,7 @@ def lockstep_rise(
             switches = (rise == MONOTONE) & (follows & (asked_end < asked) | (not follows) & (asked_end > held))
             turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
             irregular = switches | turns | (after <= 0.0)
-            starts = (psi_end > lanes[_BEGAN + j]) & (x_end > asked_end)
+            starts = (psi_end > lanes[BEGAN + j]) & (x_end > asked_end)
             happens = irregular if slides else starts
             steps = slides & (not happens)
             state[VELOCITY + j] = after if steps else velocity
@@ -328,8 +316,8 @@ def lockstep_rise(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    block = block_of(cell_of(cells, where[j]), rise, g)
-                    rise_step(block, rule, max(psi, lanes[_BEGAN + j]), psi_end, state, j)
+                    block = block_at(cells, where[j], options)
+                    rise_step(block, rule, max(psi, lanes[BEGAN + j]), psi_end, state, j)
 
 
 @scalar
@@ -345,7 +333,7 @@ def lockstep_fall(
         s_start, s_middle, s_end = half_wave(table, at), half_wave(table, at + 1), half_wave(table, at + 2)
         events, going = 0, 0
         for j in range(count):
-            amplitude, held, velocity = lanes[_AMPLITUDE + j], state[HELD + j], state[VELOCITY + j]
+            amplitude, held, velocity = lanes[AMPLITUDE + j], state[HELD + j], state[VELOCITY + j]
             slides = state[SLIDES + j] > 0.0
             c0, c1, c2 = coefficients(
                 rule, amplitude * s_start - held, amplitude * s_middle - held, amplitude * s_end - held
@@ -366,7 +354,7 @@ def lockstep_fall(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    amplitude, held = lanes[_AMPLITUDE + j], state[HELD + j]
+                    amplitude, held = lanes[AMPLITUDE + j], state[HELD + j]
                     c0, c1, c2 = coefficients(
                         rule, amplitude * s_start - held, amplitude * s_middle - held, amplitude * s_end - held
                     )
@@ -400,26 +388,26 @@ def lockstep_half_cycle(
     g = options.g
     h = 2.0 * math.pi / options.steps_per_cycle
     for j in range(count):
-        x = side * lanes[_AMPLITUDE + j] * table[0]
+        x = side * lanes[AMPLITUDE + j] * table[0]
         lanes[_ASKED + j] = x - lane_response(lanes, j, x, g)
     for node in range(options.steps_per_cycle // 2):
         s_middle, s_end = table[2 * node + 1], table[2 * node + 2]
         psi, psi_end = node * h - _HALF_PI, (node + 1) * h - _HALF_PI
         events = 0
         for j in range(count):
-            x_end = side * lanes[_AMPLITUDE + j] * s_end
+            x_end = side * lanes[AMPLITUDE + j] * s_end
             rate, rate_end = lanes[_ASKED + j], x_end - lane_response(lanes, j, x_end, g)
             lanes[_ASKED + j] = rate_end
             middle = 0.0
             if rule == SIMPSON:
-                x_middle = side * lanes[_AMPLITUDE + j] * s_middle
+                x_middle = side * lanes[AMPLITUDE + j] * s_middle
                 middle = x_middle - lane_response(lanes, j, x_middle, g)
             c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
             velocity = state[VELOCITY + j]
             after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
             moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
-            began = (not starting) | (psi >= lanes[_BEGAN + j])
-            begins = (not began) & (psi_end > lanes[_BEGAN + j])
+            began = (not starting) | (psi >= lanes[BEGAN + j])
+            begins = (not began) & (psi_end > lanes[BEGAN + j])
             turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
             steps = began & (not turns)
             happens = (began & turns) | begins
@@ -431,8 +419,8 @@ def lockstep_half_cycle(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    block = block_of(cell_of(cells, where[j]), options.rise, g)
-                    start = max(psi, lanes[_BEGAN + j]) if starting else psi
+                    block = block_at(cells, where[j], options)
+                    start = max(psi, lanes[BEGAN + j]) if starting else psi
                     continuous_step(block, rule, side, start, psi_end, state, j)
 
 
@@ -443,19 +431,20 @@ def continuous_cells(
 ) -> None:  # fmt: skip
     """Continuous sliding: two cycles are stepped, the later ones follow from them (|Üg| repeats)."""
     literally(rule)
-    for j in range(count):
+    whole = whole_lanes(count)
+    for j in range(whole):
         state[VELOCITY + j] = state[DISPLACEMENT + j] = state[PEAK + j] = 0.0
-    lockstep_half_cycle(count, rule, options, table, cells, where, lanes, state, 1.0, True)
-    lockstep_half_cycle(count, rule, options, table, cells, where, lanes, state, -1.0, False)
+    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, 1.0, True)
+    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, -1.0, False)
     for j in range(count):
         motion[0, where[j]], motion[1, where[j]] = state[DISPLACEMENT + j], state[PEAK + j]
     if options.cycles == 1:
         return
-    first = np.empty(count)
-    for j in range(count):
+    first = np.empty(whole)
+    for j in range(whole):
         first[j] = state[PEAK + j] = state[VELOCITY + j]
-    lockstep_half_cycle(count, rule, options, table, cells, where, lanes, state, 1.0, False)
-    lockstep_half_cycle(count, rule, options, table, cells, where, lanes, state, -1.0, False)
+    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, 1.0, False)
+    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, -1.0, False)
     later = options.cycles - 1.0
     for j in range(count):
         drift = state[VELOCITY + j] - first[j]
@@ -471,20 +460,21 @@ def stick_slip_cells(
 ) -> None:  # fmt: skip
     """Stick-slip: the first pulse in lockstep; cells that do not come to rest in it go on one by one."""
     literally(rule)
-    for j in range(count):
-        block = block_of(cell_of(cells, where[j]), options.rise, options.g)
+    whole = whole_lanes(count)
+    for j in range(whole):
+        block = block_at(cells, where[j], options)
         begin(block, 0.0, state, j)
-    lockstep_rise(count, rule, options, table, cells, where, lanes, state)
+    lockstep_rise(whole, rule, options, table, cells, where, lanes, state)
     shortest = 2.0 * math.pi / _SHARE_OF_CYCLE  # a slide so short needs steps of its own
     quarters = 3 if options.recoupling == INTEGRATE else 1
-    lockstep_fall(count, rule, options, table, lanes, state, quarters * (options.steps_per_cycle // 4))
+    lockstep_fall(whole, rule, options, table, lanes, state, quarters * (options.steps_per_cycle // 4))
     for j in range(count):
-        block = block_of(cell_of(cells, where[j]), options.rise, options.g)
+        block = block_at(cells, where[j], options)
         velocity, moved = state[VELOCITY + j], state[DISPLACEMENT + j]
         if velocity > 0.0 and options.recoupling != INTEGRATE:
             velocity, slid = attenuate(state[HELD + j], velocity, math.inf if options.cycles == 1 else pause(block))
             moved += slid
-        if velocity > 0.0 or block.rise == LITERAL or -lanes[_BEGAN + j] < shortest:
+        if velocity > 0.0 or block.rise == LITERAL or -lanes[BEGAN + j] < shortest:
             answer = train(block, options, table)
         else:
             validity = EQ4_BELOW_YIELD if yield_governs(block) else 0
@@ -499,19 +489,19 @@ def stick_slip_cells(
 def solve_cells(
     cells: np.ndarray, count: int, rule: int, options: Options, table: np.ndarray, motion: np.ndarray, codes: np.ndarray
 ) -> None:
-    """Solve `count` cells (columns of `cells`, rows as in `Cell`) into W, V and mode, validity.
+    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
 
     `rule` is a compile-time constant: with it the loops over lanes lose the middle of the
     step, which only Simpson's rule wants (rectangle, 1.7 against 5.3 ns a step).
     """
     literally(rule)
-    where = np.empty(count, np.int64)
+    where = np.empty(TILE, np.int64)
     lanes = np.empty(_LANE_SIZE)
     state = np.empty(_STATE_SIZE)
     for wanted in (STICK_SLIP, CONTINUOUS):
         lane = 0
         for j in range(count):
-            block = block_of(cell_of(cells, j), options.rise, options.g)
+            block = block_at(cells, j, options)
             if wanted == STICK_SLIP:
                 codes[0, j], codes[1, j] = block.sliding_mode, block.validity
                 motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
@@ -519,6 +509,10 @@ def solve_cells(
                 lane_of(block, lanes, lane)
                 where[lane] = j
                 lane += 1
+        for spare in range(lane, whole_lanes(lane)):  # repeats the first, see `whole_lanes`
+            where[spare] = where[0]
+            for row in range(LANE_ROWS):
+                lanes[row * TILE + spare] = lanes[row * TILE]
         if lane > 0 and wanted == STICK_SLIP:
             stick_slip_cells(lane, rule, options, table, cells, where, lanes, state, motion, codes)
         elif lane > 0:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.equations import scalar
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
     INTEGRATE,
@@ -24,6 +23,7 @@ from slipsweep.kernels.block import (
     response,
     yield_governs,
 )
+from slipsweep.kernels.jit import scalar
 
 
 class Pulse(NamedTuple):
@@ -67,7 +67,8 @@ def train_of(
         """
         cycles = options.cycles
         if block.rise == LITERAL and response(block, block.amplitude) <= 0.0:
-            return Motion(math.nan, math.nan, KD_NOT_POSITIVE)
+            below = EQ4_BELOW_YIELD if yield_governs(block) else 0
+            return Motion(math.nan, math.nan, KD_NOT_POSITIVE | below)
         # integrated on, a literal block may run past the end of the shaking, the last time only
         last_differs = block.rise == LITERAL and options.recoupling == INTEGRATE
         velocity, displacement, peak = 0.0, 0.0, 0.0
