@@ -13,8 +13,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.history import simulate
-    from slipsweep.sweep import friction_parameters, sweep
+    from slipsweep.datasets import friction_parameters, simulate, sweep
 
 __all__ = [
     "InputError",
@@ -28,13 +27,14 @@ __all__ = [
 ]
 
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
-_LAZY = {"friction_parameters": "slipsweep.sweep", "simulate": "slipsweep.history", "sweep": "slipsweep.sweep"}
+#: No submodule may have one of these names: importing it would put the module in the function's place.
+_LAZY = ("friction_parameters", "simulate", "sweep")
 
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(_LAZY[name]), name)
+    value = getattr(importlib.import_module("slipsweep.datasets"), name)
     globals()[name] = value
     return value
 

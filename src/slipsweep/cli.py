@@ -21,9 +21,8 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from slipsweep.store import Tally
+    from slipsweep.tables import Table
 
 app = typer.Typer(
     help="Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.",
@@ -125,7 +124,7 @@ def simulate(
     points: Annotated[int, typer.Option(min=4, help="Points in time per cycle.")] = 512,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    writers: dict[str, Callable[[xr.Dataset, Path, bool], None]] = {
+    writers: dict[str, Callable[[Table, Path, bool], None]] = {
         ".nc": _write_netcdf,
         ".csv": _write_csv,
         **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
@@ -135,16 +134,16 @@ def simulate(
         if path.suffix not in writers:
             raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
 
-    import slipsweep
     from slipsweep import store
+    from slipsweep.history import history_table
 
     for path in outputs:
         store.check_output(path, overwrite)
-    dataset = slipsweep.simulate(
-        theta,
-        mu_s,
-        amplitude,
-        frequency,
+    table = history_table(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        frequency=frequency,
         cycles=cycles,
         yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,
@@ -157,36 +156,36 @@ def simulate(
         points_per_cycle=points,
     )
     for path in outputs:
-        writers[path.suffix](dataset, path, overwrite)
-    typer.echo(f"permanent displacement  {dataset['permanent_displacement'].item():.6g} m")
-    typer.echo(f"peak relative velocity  {dataset['peak_relative_velocity'].item():.6g} m/s")
-    typer.echo(f"sliding mode            {SlidingMode(dataset['sliding_mode'].item()).name.lower()}")
-    for flag in Validity(dataset["validity"].item()):
+        writers[path.suffix](table, path, overwrite)
+    typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
+    typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
+    typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
+    for flag in Validity(table["validity"].item()):
         typer.echo(f"flag                    {(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
     for path in outputs:
         typer.echo(path)
 
 
-def _write_netcdf(dataset: "xr.Dataset", path: Path, overwrite: bool) -> None:
+def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
     from slipsweep import store
 
-    store.write_dataset(dataset, path, title="Time history of a sliding block", command=_command(), overwrite=overwrite)
+    store.write_table(table, path, title="Time history of a sliding block", command=_command(), overwrite=overwrite)
 
 
-def _write_csv(dataset: "xr.Dataset", path: Path, overwrite: bool) -> None:
+def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
     from slipsweep import store
 
-    columns = {name: dataset[name] for name in ("time", *HISTORY)}
+    columns = {name: table[name] for name in ("time", *HISTORY)}
     with store.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(f"{name} ({array.attrs['units']})" for name, array in columns.items())
         writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
 
 
-def _write_figure(dataset: "xr.Dataset", path: Path, overwrite: bool) -> None:
+def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
     from slipsweep import figures, store
 
-    figure = figures.history(dataset)
+    figure = figures.history(table)
     with store.complete_or_absent(path, overwrite) as temporary:
         figure.savefig(temporary, format=path.suffix[1:], dpi=150)
 

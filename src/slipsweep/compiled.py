@@ -1,11 +1,19 @@
-"""How jitted kernels reach the processor: compiled once, kept on disk, one process at a time.
+"""How jitted kernels reach the processor: compiled once, kept on disk, shared by processes.
 
-numba's own on-disk cache fails in two ways that matter here.  Several processes that
-compile and save at the same moment can crash each other (numba issues 4807 and 10128);
-and it looks only at the file of the outermost function, so that a changed equation would
-not be noticed.  Here the first use of a kernel in a process, load or compile, happens
-under a lock between processes, and the folder is named for the content of every source
-file that a kernel is made of.
+numba's own on-disk cache will not do here.  Several processes that compile and save at the
+same moment can crash each other (numba issues 4807 and 10128); a damaged file ends the
+program; a file's time, which every installation changes, is taken for a change of its
+content; and it looks only at the file of the outermost function, so that a changed equation
+would not be noticed.  `_Disk` takes its place:
+
+* A file holds one kernel for one signature, after a checksum; it is written under another
+  name and renamed.  One that is missing or damaged is compiled anew.
+* Its name is a digest of all that the machine code depends on; the folder's name one of the
+  content of every source file that a kernel is made of.  Folders of the four latest versions
+  are kept, older ones removed when a kernel is compiled.
+* The first process to need a kernel compiles it under a lock, the others wait and load.
+  Where there is no lock to be had (some network folders) each compiles for itself.
+* Where no folder can be written, kernels are compiled in memory.
 
 `NUMBA_CACHE_DIR` moves the folder, as it does for numba; `NUMBA_DISABLE_JIT` is honoured.
 """
@@ -13,18 +21,41 @@ file that a kernel is made of.
 import contextlib
 import functools
 import hashlib
+import os
+import pickle
+import shutil
+import sys
 import tempfile
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import filelock
+import filelock  # here: imported in the middle of a fork, its own fork handlers would fail
+import llvmlite
 import numba
 import platformdirs
 from numba import njit
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
 
 _SOURCES = ("elementary.py", "equations.py", "variables.py", "kernels/*.py")
+
+#: Versions whose kernels are kept.
+_KEPT_FOLDERS = 4
+
+#: Seconds to wait for another process that compiles: four times what a slow machine takes.
+_PATIENCE = 120.0
+
+#: Held over the first use of any kernel in this process.
+_first_use = threading.RLock()
+if hasattr(os, "register_at_fork"):
+    # no fork in the middle of a compilation: the child would inherit locks that no thread of it can release
+    os.register_at_fork(
+        before=_first_use.acquire, after_in_parent=_first_use.release, after_in_child=_first_use.release
+    )
 
 
 @functools.cache
@@ -35,10 +66,9 @@ def cache_folder() -> Path | None:
     for pattern in _SOURCES:
         for source in sorted(here.glob(pattern)):
             digest.update(source.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:16]}"
+    name = f"slipsweep-{digest.hexdigest()[:16]}"
     given = numba.config.CACHE_DIR
-    bases = [Path(given)] if given else [platformdirs.user_cache_path("slipsweep"), Path(tempfile.gettempdir())]
-    for base in bases:
+    for base in [Path(given)] if given else [platformdirs.user_cache_path("slipsweep"), _temporary_folder()]:
         folder = base / name
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
@@ -47,11 +77,73 @@ def cache_folder() -> Path | None:
     return None
 
 
+def _temporary_folder() -> Path:
+    """A folder of this user's in the system's temporary one, where others may write, too."""
+    if not hasattr(os, "getuid"):
+        return Path(tempfile.gettempdir()) / "slipsweep"
+    folder = Path(tempfile.gettempdir()) / f"slipsweep-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+        # files are unpickled: none that another user could have put there
+        if status.st_uid == os.getuid() and not status.st_mode & 0o022:
+            return folder
+    return Path(os.devnull)
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove the kernels of all versions but the latest few."""
+    with contextlib.suppress(OSError):
+        others = [other for other in folder.parent.glob("slipsweep-" + "[0-9a-f]" * 16) if other != folder]
+        others.sort(key=lambda other: other.stat().st_mtime, reverse=True)
+        for other in others[_KEPT_FOLDERS - 1 :]:
+            shutil.rmtree(other, ignore_errors=True)
+
+
 @contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder against every other process."""
-    with filelock.FileLock(folder / "lock"):
+def _alone(path: Path) -> Iterator[None]:
+    """Hold a file's lock against other processes, where locks can be had."""
+    lock = filelock.FileLock(f"{path}.lock")
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError, NotImplementedError, filelock.Timeout):
+            lock.acquire(timeout=_PATIENCE)
+            stack.callback(lock.release)
         yield
+
+
+class _Disk(NullCache):
+    """Where a dispatcher looks for machine code before it compiles: one file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kernel as numba wants it, or None."""
+        target_context.refresh()
+        try:
+            content = self.path.read_bytes()
+            checksum, data = content[:32], content[32:]
+            if hashlib.sha256(data).digest() != checksum:
+                return None
+            return CompileResult._rebuild(target_context, *pickle.loads(data))
+        except Exception:  # not there, or of another make: whatever is wrong with it, it can be made anew
+            return None
+
+    def save_overload(self, sig: Any, cres: Any) -> None:
+        """Keep a kernel that has been compiled."""
+        # a full disk, or something in the kernel that holds in this process only: it runs all the same
+        with contextlib.suppress(Exception):
+            if cres.library.has_dynamic_globals:
+                return
+            data = dumps(cres._reduce())
+            with tempfile.NamedTemporaryFile(dir=self.path.parent, delete=False) as file:
+                try:
+                    file.write(hashlib.sha256(data).digest() + data)
+                    file.close()
+                    Path(file.name).replace(self.path)
+                finally:
+                    Path(file.name).unlink(missing_ok=True)
+            _remove_stale(self.path.parent)
 
 
 class Kernel:
@@ -67,29 +159,45 @@ class Kernel:
         functools.update_wrapper(self, function)
         self._function = function
         self._dispatcher: Callable[..., Any] | None = None
-        self._lock = threading.Lock()
 
     def __call__(self, *args: Any) -> Any:
         """Run on `args`; their types must be those of the first call."""
         if self._dispatcher is None:
-            with self._lock:
+            with _first_use:
                 if self._dispatcher is None:
-                    self._dispatcher = self._compile(tuple(numba.typeof(arg) for arg in args))
+                    self._dispatcher = self._ready(args)
         return self._dispatcher(*args)
 
-    def _compile(self, signature: tuple[Any, ...]) -> Callable[..., Any]:
-        folder = None if numba.config.DISABLE_JIT else cache_folder()
-        jit = functools.partial(njit, nogil=True, error_model="numpy")
-        if folder is None:
-            return jit(self._function)
-        with _alone(folder):
-            given = numba.config.CACHE_DIR
-            numba.config.CACHE_DIR = str(folder)
-            try:
-                dispatcher = jit(self._function, cache=True)
-            finally:
-                numba.config.CACHE_DIR = given
-            dispatcher.compile(signature)
-        # a call with other types is a bug here, and would compile outside the lock
-        dispatcher.disable_compile()
-        return dispatcher
+    def _ready(self, args: tuple[Any, ...]) -> Callable[..., Any]:
+        jitted: Any = njit(nogil=True, error_model="numpy")(self._function)
+        if numba.config.DISABLE_JIT:
+            return jitted
+        signature = tuple(numba.typeof(arg) for arg in args)
+        folder = cache_folder()
+        with warnings.catch_warnings():
+            # numba's advice is for us, not for those who run a sweep
+            warnings.simplefilter("ignore", numba.NumbaWarning)
+            if folder is None:
+                jitted.compile(signature)
+            else:
+                path = folder / f"{self._function.__name__.strip('_')}-{self._digest(jitted, signature)}"
+                jitted._cache = _Disk(path)
+                with contextlib.nullcontext() if path.exists() else _alone(path):
+                    jitted.compile(signature)
+        # a call with other types is a bug here, and would compile unseen
+        jitted.disable_compile()
+        return jitted
+
+    def _digest(self, jitted: Any, signature: tuple[Any, ...]) -> str:
+        """Digest of all that the machine code depends on, but for the sources (the folder's name)."""
+        cells = self._function.__closure__ or ()
+        parts = (
+            self._function.__module__,
+            self._function.__qualname__,
+            dumps(tuple(cell.cell_contents for cell in cells)),  # the kernels of a factory differ in nothing else
+            str(signature),
+            jitted.targetctx.codegen().magic_tuple(),  # processor
+            (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__),
+            (int(numba.config.OPT), bool(numba.config.BOUNDSCHECK), bool(numba.config.DEBUGINFO_DEFAULT)),
+        )
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]

@@ -5,9 +5,11 @@ to the shape of the result; a dimension along which only the frequency varies is
 by the scaling law and costs no kernel call.
 """
 
+import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,12 @@ from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
+
+#: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
+_FRICTION_CELLS = 65536
+
+#: Results in which `mark_flexible_blocks` sets flags together.
+_FLAGS = 65536
 
 RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": step.SIMPSON}
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
@@ -33,6 +41,7 @@ Array = NDArray[np.float64]
 class Problem:
     """What all cells of a grid share: the options of `slipsweep.sweep`, checked."""
 
+    waveform: str
     model: str
     rise: str
     recoupling: str
@@ -91,10 +100,9 @@ def solve(
     problem: Problem,
     shape: tuple[int, ...],
     arrays: Mapping[str, Array],
-    frequency: Array,
     wanted: tuple[str, ...],
     progress: Callable[[int], None] | None = None,
-) -> dict[str, NDArray[np.generic]]:
+) -> dict[str, NDArray[Any]]:
     """Solve a grid.
 
     Parameters
@@ -103,11 +111,10 @@ def solve(
         Options common to all cells.
     shape : tuple of int
         Shape of the results.
-    arrays : mapping of str to array or None
-        `theta` (degrees), `mu_s`, `amplitude` and the optional parameters, each with as
-        many dimensions as `shape`, of length 1 where it does not vary.
-    frequency : array
-        Hz, likewise.
+    arrays : mapping of str to array
+        `theta` (degrees), `mu_s`, `amplitude`, `frequency` (Hz) and the optional
+        parameters, each with as many dimensions as `shape`, of length 1 where it does
+        not vary.
     wanted : tuple of str
         Names from `MOTION_RESULTS`; nothing else is computed.
     progress : callable, optional
@@ -118,18 +125,21 @@ def solve(
     dict of str to ndarray
         Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
     """
-    inputs = cell_inputs(arrays, len(shape))
+    inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
     results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     grid = _layout(shape, scaled, [*inputs, frequency])
     targets = Results(
         *(results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS)
     )
-    periods = np.ascontiguousarray(1.0 / (2.0 * math.pi * np.asarray(frequency, np.float64))).reshape(-1)
-    flat = tuple(np.array(values, np.float64).reshape(-1) for values in inputs)
+    periods = _flat(1.0 / (2.0 * math.pi * frequency))
+    flat = tuple(_flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in wanted)
+    # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
+    work_per_cell = 1 + grid.frequencies // 32
     if solver_of(problem) == "step":
         kernel, table = STEP_KERNELS[options.rule], step.sine_table(problem.steps_per_cycle)
+        work_per_cell += problem.steps_per_cycle // 16
     else:
         kernel, table = CYCLE_KERNEL, np.empty(0)
 
@@ -139,37 +149,89 @@ def solve(
             progress((last - first) * grid.frequencies)
 
     if math.prod(shape):
-        threads.spread(math.prod(int(size) for size in grid.shape), work)
+        threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
+    if "structure_frequency" in arrays and "validity" in results:
+        mark_flexible_blocks(results["validity"], frequency, arrays["structure_frequency"])
     return results
 
 
 def friction_parameters(
-    problem: Problem, shape: tuple[int, ...], arrays: Mapping[str, Array]
-) -> dict[str, NDArray[np.generic]]:
-    """Eqs. 7-11 and λ of every cell, with `sliding_mode` and the validity known before the motion.
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion.
 
-    `shape` and `arrays` as in `solve`.
+    Parameters and results as in `solve`; there is no frequency.
     """
-    inputs = cell_inputs(arrays, len(shape))
-    grid = _layout(shape, None, [*inputs, np.ones((1,) * len(shape))])
-    size = math.prod(shape)
-    parameters = np.empty((len(FRICTION_PARAMETERS), size))
-    mode, validity = np.empty(size, np.int8), np.empty(size, np.int16)
-    flat = tuple(np.array(values, np.float64).reshape(-1) for values in inputs)
+    results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     options = problem.options(False)
-    threads.spread(
-        size, lambda first, last: parameter_grid(grid, first, last, flat, options, parameters, mode, validity)
-    )
-    results: dict[str, NDArray[np.generic]] = {
-        name: row.reshape(shape) for name, row in zip(FRICTION_PARAMETERS, parameters, strict=True)
-    }
-    return results | {"sliding_mode": mode.reshape(shape), "validity": validity.reshape(shape)}
+    parts = list(slabs(shape, _FRICTION_CELLS))
+
+    def solve_slab(slab: tuple[slice, ...]) -> None:
+        inputs = cell_inputs(cut(arrays, slab), len(shape))
+        sizes = tuple(part.stop - part.start for part in slab)
+        grid = _layout(sizes, None, [*inputs, np.ones((1,) * len(shape))])
+        cells = math.prod(sizes)
+        parameters = np.empty((len(FRICTION_PARAMETERS), cells))
+        codes = {name: np.empty(cells, RESULT_DTYPES[name]) for name in ("sliding_mode", "validity")}
+        flat = tuple(_flat(values) for values in inputs)
+        parameter_grid(grid, 0, cells, flat, options, parameters, codes["sliding_mode"], codes["validity"])
+        found = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
+        for name in wanted:
+            results[name][slab] = found[name].reshape(sizes)
+        if progress is not None:
+            progress(cells)
+
+    def work(first: int, last: int) -> None:
+        for slab in parts[first:last]:
+            solve_slab(slab)
+
+    # the kernel gives all parameters: slab by slab, those not wanted take no room
+    threads.spread(len(parts), work, _FRICTION_CELLS)
+    return results
 
 
-def flexible_block(frequency: Array, structure_frequency: Array) -> NDArray[np.int16]:
-    """The validity bit of a block that is not rigid: 0.2 ≤ f/fs ≤ 1.3."""
-    ratio = frequency / structure_frequency
-    return np.where((ratio >= 0.2) & (ratio <= 1.3), Validity.FLEXIBLE_BLOCK, 0).astype(np.int16)
+def mark_flexible_blocks(validity: NDArray[np.int16], frequency: Array, structure_frequency: Array) -> None:
+    """Set the validity bit of blocks that are not rigid, 0.2 ≤ f/fs ≤ 1.3."""
+    varying = np.broadcast_shapes(frequency.shape, structure_frequency.shape)
+    # in slabs: temporaries stay small even where the two vary along every dimension
+    for slab in slabs(varying, _FLAGS):
+        part = cut({"f": frequency, "fs": structure_frequency}, slab)
+        ratio = part["f"] / part["fs"]
+        flags = ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(Validity.FLEXIBLE_BLOCK)
+        where: Any = (one if size > 1 else slice(None) for one, size in zip(slab, varying, strict=True))
+        validity[(*where, ...)] |= flags
+
+
+def cut(arrays: Mapping[str, Array], slices: tuple[slice, ...]) -> dict[str, Array]:
+    """A part of a grid: `arrays` cut along the dimensions in which they vary."""
+    parts: dict[str, Array] = {}
+    for name, values in arrays.items():
+        where: Any = (part if size > 1 else slice(None) for part, size in zip(slices, values.shape, strict=True))
+        parts[name] = values[(*where, ...)]  # the dots keep an array without dimensions an array
+    return parts
+
+
+def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
+    """Cut a grid into slabs of at most `most` cells, whole along its last dimensions."""
+    axis, row = 0, math.prod(shape[1:])
+    while row > most:
+        axis += 1
+        row //= shape[axis]
+    lengths = [1] * axis + [max(1, most // max(row, 1))] + list(shape[axis + 1 :])
+    starts = (range(0, size, length) for size, length in zip(shape, lengths, strict=False))
+    for corner in itertools.product(*starts):
+        yield tuple(
+            slice(start, min(start + length, size)) for start, length, size in zip(corner, lengths, shape, strict=False)
+        )
+
+
+def _flat(values: Array) -> Array:
+    """One row of float64 as the kernels are compiled for; a copy only where there is no other way."""
+    return np.require(values, np.float64, ["C", "ALIGNED", "WRITEABLE"]).reshape(-1)
 
 
 def _layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:

@@ -1,25 +1,26 @@
-"""Figures: datasets in, matplotlib figures out.
+"""Figures: tables in, matplotlib figures out.
 
 Figures are made without pyplot, hence without a window system or state between calls;
 `matplotlib.figure.Figure.savefig` writes them in any format.
 """
 
-import xarray as xr
+import numpy as np
 from matplotlib.figure import Figure
 
-from slipsweep.variables import PARAMETERS
+from slipsweep.tables import Table
+from slipsweep.variables import HISTORY, PARAMETERS
 
 # Okabe and Ito's colours: told apart with any kind of colour vision, and in grey
 _BLUE, _VERMILION = "#0072B2", "#D55E00"
 
 
-def history(dataset: xr.Dataset) -> Figure:
+def history(table: Table) -> Figure:
     """Draw a time history in the manner of the paper's Figs. 5, 8 and 9.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        What `slipsweep.simulate` returns.
+    table : Table
+        What `slipsweep.history.history_table` returns.
 
     Returns
     -------
@@ -27,23 +28,24 @@ def history(dataset: xr.Dataset) -> Figure:
         Panels over time: accelerations of plane and block, friction coefficient,
         relative velocity, relative displacement; the parameters in a caption.
     """
-    figure = Figure(figsize=(7.0, 8.0), layout="constrained")
+    figure = Figure(figsize=(7.0, 7.0), layout="constrained")
     accelerations, friction, velocity, displacement = figure.subplots(4, sharex=True)
-    time = dataset["time"]
+    values = {name: table[name].values for name in ("time", *HISTORY)}
+    time = values["time"]
 
-    accelerations.plot(time, dataset["ground_acceleration"], color=_BLUE, label="plane")
-    accelerations.plot(time, dataset["block_acceleration"], color=_VERMILION, linestyle="--", label="block")
+    accelerations.plot(time, values["ground_acceleration"], color=_BLUE, label="plane")
+    accelerations.plot(time, values["block_acceleration"], color=_VERMILION, linestyle="--", label="block")
     accelerations.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
     accelerations.set_ylabel("acceleration\n(m/s²)")
 
-    friction.plot(time, dataset["friction_coefficient"], color=_VERMILION)
+    friction.plot(time, values["friction_coefficient"], color=_VERMILION)
     friction.set_ylabel("friction\ncoefficient")
 
-    velocity.plot(time, dataset["relative_velocity"], color=_VERMILION)
+    velocity.plot(time, values["relative_velocity"], color=_VERMILION)
     velocity.set_ylabel("relative\nvelocity (m/s)")
 
-    metres = float(abs(dataset["relative_displacement"]).max()) >= 1.0
-    displacement.plot(time, dataset["relative_displacement"] * (1 if metres else 1000), color=_VERMILION)
+    metres = float(np.abs(values["relative_displacement"]).max()) >= 1.0
+    displacement.plot(time, values["relative_displacement"] * (1 if metres else 1000), color=_VERMILION)
     displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
     displacement.set_xlabel("time (s)")
 
@@ -52,7 +54,7 @@ def history(dataset: xr.Dataset) -> Figure:
         axes.margins(x=0)
         axes.grid(color="0.9")
     figure.align_ylabels()
-    figure.supxlabel(_caption(dataset), fontsize="small")
+    figure.supxlabel(_caption(table), fontsize="small")
     return figure
 
 
@@ -71,14 +73,14 @@ _SYMBOLS = {
 }
 
 
-def _caption(dataset: xr.Dataset) -> str:
+def _caption(table: Table) -> str:
     units = {"degree": "°", "m s-2": " m/s²", "1": ""}
     parts = []
     for name, symbol in _SYMBOLS.items():
-        if name in dataset.coords:
+        if name in table.coords:
             unit = PARAMETERS[name]["units"]
-            parts.append(f"{symbol} = {dataset[name].item():.4g}{units.get(unit, f' {unit}')}")
-    attributes = dataset.attrs
+            parts.append(f"{symbol} = {table[name].item():.4g}{units.get(unit, f' {unit}')}")
+    attributes = table.attrs
     options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
     shaking = f"{attributes['cycles']} cycles of a {attributes['waveform']}"
     return f"{', '.join(parts)}\nmodel: {', '.join(options)}; {shaking}"

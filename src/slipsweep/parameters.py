@@ -57,6 +57,15 @@ RULES = ("rectangle", "trapezoid", "simpson")
 #: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (README).
 STEPS_PER_CYCLE = 1024
 
+#: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
+MOST_CYCLES = 1_000_000_000
+MOST_STEPS = 16_777_216
+
+
+def number_text(value: float) -> str:
+    """A number as people write it, and as precise as it is."""
+    return repr(value).removesuffix(".0")
+
 
 def check_values(name: str, values: Any) -> NDArray[np.float64]:
     """Return `values` as float64 if all are in the bounds of parameter `name`.
@@ -76,7 +85,7 @@ def check_values(name: str, values: Any) -> NDArray[np.float64]:
     bound = BOUNDS[name]
     wrong = ~bound.holds(array)
     if wrong.any():
-        raise InputError(f"{name} = {array[wrong].flat[0]:.17g}: must be {bound.text}")
+        raise InputError(f"{name} = {number_text(float(array[wrong].flat[0]))}: must be {bound.text}")
     return array
 
 
@@ -87,8 +96,8 @@ def check_choice(name: str, value: Any, allowed: Collection[str]) -> str:
     return str(value)
 
 
-def check_whole(name: str, value: Any, least: int, multiple_of: int = 1) -> int:
-    """Return `value` as an int if it is a whole number, at least `least` and a multiple of `multiple_of`."""
+def check_whole(name: str, value: Any, least: int, most: int | None = None, multiple_of: int = 1) -> int:
+    """Return `value` as an int if it is a whole number from `least` to `most`, and a multiple of `multiple_of`."""
     kind = "a whole number" if multiple_of == 1 else f"a multiple of {multiple_of}"
     try:
         if isinstance(value, (bool, str)) or float(value) != math.floor(float(value)):
@@ -98,4 +107,6 @@ def check_whole(name: str, value: Any, least: int, multiple_of: int = 1) -> int:
         raise InputError(f"{name} = {value!r}: must be {kind} >= {least}") from None
     if whole < least or whole % multiple_of:
         raise InputError(f"{name} = {value!r}: must be {kind} >= {least}")
+    if most is not None and whole > most:
+        raise InputError(f"{name} = {value!r}: must be {kind} <= {most}")
     return whole

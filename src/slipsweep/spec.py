@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from slipsweep.errors import InputError
-from slipsweep.parameters import BOUNDS
+from slipsweep.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
+from slipsweep.tables import Variable
 from slipsweep.variables import DEFAULT_RESULTS, DIMENSION_ORDER, PARAMETERS, RESULT_DTYPES, RESULTS
 
 Floats = NDArray[np.float64]
@@ -116,14 +117,14 @@ class Excitation(_Table):
     """The shaking, but for its amplitude and frequency, which are axes."""
 
     waveform: Literal["sine"] = "sine"
-    cycles: Annotated[Whole, Field(ge=1, le=1_000_000_000)] = 10
+    cycles: Annotated[Whole, Field(ge=1, le=MOST_CYCLES)] = 10
 
 
 class Solver(_Table):
     """How cells are solved; `steps_per_cycle` and `rule` matter to the step solver alone."""
 
     method: Literal["auto", "step", "cycle"] = "auto"
-    steps_per_cycle: Annotated[Whole, Field(ge=8, le=1_000_000, multiple_of=4)] | None = None
+    steps_per_cycle: Annotated[Whole, Field(ge=8, le=MOST_STEPS, multiple_of=4)] | None = None
     rule: Literal["rectangle", "trapezoid", "simpson"] = "trapezoid"
 
 
@@ -209,7 +210,7 @@ class SweepSpec:
         return replace(self, solver=self.solver.model_copy(update={"method": method}))
 
     def arguments(self, block: Mapping[str, slice] | None = None) -> dict[str, Any]:
-        """Return keyword arguments for `slipsweep.sweep`.
+        """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.plans.plan_sweep`).
 
         Parameters
         ----------
@@ -224,9 +225,7 @@ class SweepSpec:
             elif dim == name:
                 arguments[name] = values[block.get(dim, slice(None))]
             else:
-                import xarray as xr  # only zipped parameters need it; it is slow to import
-
-                arguments[name] = xr.DataArray(values[block.get(dim, slice(None))], dims=dim)
+                arguments[name] = Variable((dim,), values[block.get(dim, slice(None))])
         arguments |= {
             "cycles": self.excitation.cycles,
             "waveform": self.excitation.waveform,

@@ -16,20 +16,17 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-import slipsweep
 from slipsweep.errors import InputError, RunError
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
+from slipsweep.tables import Table
 from slipsweep.variables import SlidingMode, Validity
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
 BLOCK_CELLS = 4_000_000
@@ -237,14 +234,15 @@ def run(
     """
     check_output(path, overwrite)
     _check_size(spec, path, block_cells)
-    sweep = slipsweep.sweep  # imports numba and xarray: not to be counted as computing time
+    from slipsweep.plans import plan_sweep  # imports numba: not for `info`, and not to be counted as computing time
+
     started = time.perf_counter()
     tally = Tally(spec.cells)
     with complete_or_absent(path, overwrite) as temporary:
         with _netcdf(temporary, path) as file:
             for number, block in enumerate(blocks(spec.shape, block_cells)):
                 try:
-                    results = sweep(**spec.arguments(block), progress=progress)
+                    results = plan_sweep(**spec.arguments(block)).solve(progress)
                 except MemoryError:
                     raise RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}") from None
                 with _writing(path):
@@ -261,18 +259,18 @@ def run(
     return Report(path, spec.shape, time.perf_counter() - started, nbytes, tally)
 
 
-def write_dataset(dataset: "xr.Dataset", path: Path, *, title: str, command: str, overwrite: bool = False) -> None:
-    """Write a dataset that is in memory (a time history) by the rules that sweeps are written by."""
+def write_table(table: Table, path: Path, *, title: str, command: str, overwrite: bool = False) -> None:
+    """Write a table that is in memory (a time history) by the rules that sweeps are written by."""
     check_output(path, overwrite)
     with (
         complete_or_absent(path, overwrite) as temporary,
         _netcdf(temporary, path) as file,
         _writing(path),
     ):
-        shape = {str(dim): length for dim, length in dataset.sizes.items()}
-        _define(file, shape, chunk_lengths(shape), dataset, lambda name: dataset[name].dtype)
-        _describe(file, {**dataset.attrs, "title": title, **_provenance(command)})
-        _fill(file, dataset, {})
+        shape = table.sizes
+        _define(file, shape, chunk_lengths(shape), table, lambda name: table[name].values.dtype)
+        _describe(file, {**table.attrs, "title": title, **_provenance(command)})
+        _fill(file, table, {})
 
 
 def _check_size(spec: SweepSpec, path: Path, block_cells: int) -> None:
@@ -322,29 +320,28 @@ def _define(
     file: netCDF4.Dataset,
     shape: Mapping[str, int],
     chunks: Mapping[str, int],
-    dataset: "xr.Dataset",
+    table: Table,
     dtype: Callable[[str], np.dtype[Any]],
 ) -> None:
-    """Define dimensions and variables for `dataset` or, where it is a block, for the grid of `shape`."""
+    """Define dimensions and variables for `table` or, where it is a block, for the grid of `shape`."""
     for dim, length in shape.items():
         file.createDimension(dim, length)
-    for name, coordinate in dataset.coords.items():
-        variable = file.createVariable(str(name), coordinate.dtype, tuple(map(str, coordinate.dims)))
+    for name, coordinate in table.coords.items():
+        variable = file.createVariable(name, coordinate.values.dtype, coordinate.dims)
         _describe(variable, coordinate.attrs)
-    for name, result in dataset.data_vars.items():
-        dims = tuple(map(str, result.dims))
-        kind = dtype(str(name))
+    for name, result in table.data_vars.items():
+        dims, kind = result.dims, dtype(name)
         options: dict[str, Any] = {"contiguous": True}
         if kind.kind != "f" and dims:
             options = {"chunksizes": [chunks[dim] for dim in dims], "zlib": True, "complevel": 1, "shuffle": True}
         fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name == "sliding_mode" else None
-        variable = file.createVariable(str(name), kind, dims, fill_value=fill, **options)
+        variable = file.createVariable(name, kind, dims, fill_value=fill, **options)
         attributes = dict(result.attrs)
-        if attributes.get("ancillary_variables") not in dataset:
+        if attributes.get("ancillary_variables") not in table:
             attributes.pop("ancillary_variables", None)
-        auxiliary = [c for c in dataset.coords if c not in shape and {*dataset[c].dims} <= {*dims}]
+        auxiliary = [c for c in table.coords if c not in shape and {*table[c].dims} <= {*dims}]
         if auxiliary:
-            attributes["coordinates"] = " ".join(map(str, auxiliary))
+            attributes["coordinates"] = " ".join(auxiliary)
         _describe(variable, attributes)
 
 
@@ -384,12 +381,12 @@ def _provenance(command: str) -> dict[str, str]:
     }
 
 
-def _fill(file: netCDF4.Dataset, dataset: "xr.Dataset", block: Mapping[str, slice]) -> None:
+def _fill(file: netCDF4.Dataset, table: Table, block: Mapping[str, slice]) -> None:
     """Write the values of a block; dimensions that `block` does not name are whole."""
-    for name, array in {**dataset.coords, **dataset.data_vars}.items():
-        variable = file[str(name)]
+    for name, array in {**table.coords, **table.data_vars}.items():
+        variable = file[name]
         variable.set_auto_maskandscale(False)
-        where = tuple(block.get(str(dim), slice(None)) for dim in array.dims)
+        where = tuple(block.get(dim, slice(None)) for dim in array.dims)
         variable[where or ...] = array.values.astype(variable.dtype, copy=False)
 
 

@@ -9,17 +9,19 @@ One policy, here and nowhere else:
   user's own pool) computes on that thread: whoever started it already shares the cores.
 * The number of threads is the least of the processor affinity, `NUMBA_NUM_THREADS` and
   `OMP_NUM_THREADS`; 1 computes everything on the caller.
+* Threads live as long as the call: none is left to be lost in a fork or to hold up the
+  exit.  Ctrl-C is heard between two calls of a kernel, a fraction of a second apart.
 """
 
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
 import numba
 
-#: Cells that one call of a kernel takes: long enough to hide the call (some 5 µs), short
-#: enough that Ctrl-C is heard and that threads finish together.
+#: Cells of the cycle solver that one call of a kernel takes: long enough to hide the call
+#: (some 20 µs), short enough that Ctrl-C is heard and that threads finish together.
 MOST_CELLS_PER_CALL = 65536
 LEAST_CELLS_PER_CALL = 1024
 
@@ -30,10 +32,11 @@ def thread_count() -> int:
         return 1
     # the setting, not numba.get_num_threads(): that call starts a threading layer
     limits = [numba.config.NUMBA_NUM_THREADS, _affinity()]
+    # a list has a number for each level of nesting; ours is the first
     asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
     if asked.isdigit() and int(asked) > 0:
         limits.append(int(asked))
-    return min(limits)
+    return int(min(limits))
 
 
 def _affinity() -> int:
@@ -42,20 +45,40 @@ def _affinity() -> int:
     return os.cpu_count() or 1
 
 
-def spread(cells: int, work: Callable[[int, int], None]) -> None:
-    """Call ``work(first, last)`` over all of ``range(cells)``, on as many threads as the policy allows."""
+def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1) -> None:
+    """Call ``work(first, last)`` over all of ``range(cells)``, on as many threads as the policy allows.
+
+    Parameters
+    ----------
+    cells : int
+        Number of cells.
+    work : callable
+        Does a part; the first exception of any part ends the whole.
+    work_per_cell : int
+        What a cell takes, in cells of the cycle solver.
+    """
     threads = thread_count()
-    size = min(max(-(-cells // (4 * threads)), LEAST_CELLS_PER_CALL), MOST_CELLS_PER_CALL)
-    parts = [(first, min(first + size, cells)) for first in range(0, cells, size)]
-    if min(threads, len(parts)) <= 1:
-        for first, last in parts:
-            work(first, last)
+    share = -(-cells // (4 * threads))
+    size = max(min(max(share, LEAST_CELLS_PER_CALL // work_per_cell), MOST_CELLS_PER_CALL // work_per_cell), 1)
+    starts = iter(range(0, cells, size))
+    taking, over = threading.Lock(), threading.Event()
+
+    def take_parts() -> None:
+        while not over.is_set():
+            with taking:
+                first = next(starts, None)
+            if first is None:
+                return
+            work(first, min(first + size, cells))
+
+    if min(threads, -(-cells // size)) <= 1:
+        take_parts()
         return
     with ThreadPoolExecutor(threads) as pool:
-        futures = [pool.submit(work, first, last) for first, last in parts]
         try:
-            for future in futures:
-                future.result()
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+            futures = [pool.submit(take_parts) for _ in range(threads)]
+            done, _ = wait(futures, return_when=FIRST_EXCEPTION)
+        finally:  # whatever ended the wait, Ctrl-C too: the threads find no more to do
+            over.set()
+    for future in done:
+        future.result()
