@@ -7,8 +7,13 @@ value; `anything` draws from the whole parameter space, cells without a value in
 from math import cos, pi, radians, sin, tan
 from typing import Any
 
-from hypothesis import assume
+from hypothesis import HealthCheck, assume, settings
 from hypothesis import strategies as st
+
+#: Settings of every property test: the same cells on each run, none cut short by compilation.
+reproducible = settings(
+    max_examples=60, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+)
 
 G = 9.81
 Cell = dict[str, Any]

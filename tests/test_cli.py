@@ -300,13 +300,20 @@ def imported(code: str, folder: Path) -> set[str]:
 
 
 def test_help_is_there_at_once(tmp_path: Path) -> None:
-    heavy = {"numba", "xarray", "netCDF4", "pydantic", "pint", "matplotlib", "dask", "pandas", "scipy"}
+    heavy = {"numpy", "numba", "xarray", "netCDF4", "pydantic", "pint", "matplotlib", "dask", "pandas", "scipy"}
     assert not heavy & imported("from slipsweep.cli import main; main(['--help'])", tmp_path)
 
 
-def test_run_imports_no_more_than_it_needs(small: Path) -> None:
-    # not ours to choose: xarray imports dask and pint wherever they are installed
-    assert "matplotlib" not in imported("from slipsweep.cli import main; main(['run', 'small.toml', '-q'])", small)
+@pytest.mark.parametrize("sweep", ["small.toml", SWEEPS / "paper.toml"], ids=["axes", "cases"])
+def test_run_imports_no_more_than_it_needs(small: Path, sweep: Path | str) -> None:
+    heavy = {"xarray", "pandas", "dask", "pint", "matplotlib"}
+    assert not heavy & imported(f"from slipsweep.cli import main; main(['run', {str(sweep)!r}, '-q'])", small)
+
+
+def test_info_imports_no_more_than_it_needs(small: Path) -> None:
+    slipsweep(small, "run", "small.toml", "-q")
+    heavy = {"numba", "xarray", "pandas", "dask", "pint", "matplotlib", "scipy"}
+    assert not heavy & imported("from slipsweep.cli import main; main(['info', 'small.nc'])", small)
 
 
 @pytest.mark.parametrize("command", [(), ("run",), ("info",), ("simulate",)])

@@ -1,5 +1,7 @@
 """What must hold for every block: scaling, signs, order, symmetry, and indifference to how a sweep is written."""
 
+import subprocess
+import sys
 from math import isclose, isnan, pi, radians, tan
 from typing import Any
 
@@ -21,9 +23,6 @@ SOLVERS = pytest.mark.parametrize("solver", ["cycle", "step"])
 #: Steps for which a mendez cell of the step solver is compared (a few for what does not depend on them).
 FINE, COARSE = 8192, 256
 
-settings.register_profile("physics", max_examples=60, deadline=None)
-settings.load_profile("physics")
-
 
 def respond(cell: strategies.Cell, **changes: Any) -> xr.Dataset:
     return slipsweep.sweep(**{**cell, **changes})
@@ -44,6 +43,7 @@ def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.sliding_cells, power=st.integers(-20, 20))
 def test_scaling_law_is_exact_for_powers_of_two(solver: str, cell: strategies.Cell, power: int) -> None:
     """u goes with f^-2 and v with f^-1: a power of two changes no digit."""
@@ -56,6 +56,7 @@ def test_scaling_law_is_exact_for_powers_of_two(solver: str, cell: strategies.Ce
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.sliding_cells, other=st.floats(1e-6, 1e6))
 def test_scaling_law_to_rounding(solver: str, cell: strategies.Cell, other: float) -> None:
     """A frequency axis, one after another or each on its own, gives W/omega^2 to a few roundings."""
@@ -74,6 +75,7 @@ def test_scaling_law_to_rounding(solver: str, cell: strategies.Cell, other: floa
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark(), options=strategies.model_options)
 def test_stick_slip_never_moves_upslope(solver: str, cell: strategies.Cell, options: dict[str, str]) -> None:
     result = respond(cell, **options, solver=solver, steps_per_cycle=COARSE)
@@ -85,6 +87,7 @@ def test_stick_slip_never_moves_upslope(solver: str, cell: strategies.Cell, opti
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.stuck(), model=st.sampled_from(["mendez", "newmark"]))
 def test_no_slip_at_or_below_yield(solver: str, cell: strategies.Cell, model: str) -> None:
     result = respond(cell, model=model, solver=solver)
@@ -95,6 +98,7 @@ def test_no_slip_at_or_below_yield(solver: str, cell: strategies.Cell, model: st
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark())
 def test_one_ulp_above_yield_slips_hardly(solver: str, cell: strategies.Cell) -> None:
     """A = Uy sticks; the next double above it slides, by nothing that a double of size A/omega^2 could show."""
@@ -111,6 +115,7 @@ def test_one_ulp_above_yield_slips_hardly(solver: str, cell: strategies.Cell) ->
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark(), options=strategies.model_options)
 def test_recoupled_pulses_add_up(solver: str, cell: strategies.Cell, options: dict[str, str]) -> None:
     """Where each pulse ends at rest, N cycles are N times one, so that displacement grows with the cycles."""
@@ -123,6 +128,7 @@ def test_recoupled_pulses_add_up(solver: str, cell: strategies.Cell, options: di
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.stick_slip(), options=strategies.model_options)
 def test_displacement_grows_with_cycles(solver: str, cell: strategies.Cell, options: dict[str, str]) -> None:
     cell = {**cell, **options, "solver": solver, "steps_per_cycle": COARSE}
@@ -152,6 +158,7 @@ def test_run_out_may_exceed_another_cycle() -> None:
         assert value(result) == pytest.approx(float(expected.permanent_displacement), rel=1e-11)
 
 
+@strategies.reproducible
 @given(cell=strategies.newmark(), factor=st.floats(1.0, 3.0))
 def test_newmark_grows_with_amplitude(cell: strategies.Cell, factor: float) -> None:
     larger = respond(cell, amplitude=cell["amplitude"] * factor)
@@ -162,6 +169,7 @@ def test_newmark_grows_with_amplitude(cell: strategies.Cell, factor: float) -> N
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.continuous(theta=0.0))
 def test_level_plane_velocity_repeats(solver: str, cell: strategies.Cell) -> None:
     """theta = 0, continuous: pushed as far down as up, the block gains nothing in a whole cycle."""
@@ -181,16 +189,19 @@ def test_level_plane_velocity_repeats(solver: str, cell: strategies.Cell) -> Non
 # The two solvers
 
 
+@strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark(), options=strategies.model_options)
 def test_solvers_agree_in_stick_slip(cell: strategies.Cell, options: dict[str, str]) -> None:
     assert_solvers_agree({**cell, **options})
 
 
+@strategies.reproducible
 @given(cell=strategies.continuous())
 def test_solvers_agree_in_continuous_mode(cell: strategies.Cell) -> None:
     assert_solvers_agree(cell)
 
 
+@strategies.reproducible
 @given(cell=strategies.given_friction(), options=strategies.model_options)
 def test_solvers_agree_with_given_friction(cell: strategies.Cell, options: dict[str, str]) -> None:
     assert_solvers_agree({**cell, **options})
@@ -242,7 +253,7 @@ def near_a_limit(cell: strategies.Cell) -> bool:
 
 
 @SOLVERS
-@settings(max_examples=150)
+@settings(strategies.reproducible, max_examples=150)
 @given(cell=strategies.anything())
 def test_validity_says_why(solver: str, cell: strategies.Cell) -> None:
     """Each bit is set where, and only where, its condition holds; NaN and mode -1 with the valueless ones."""
@@ -337,7 +348,7 @@ def test_input_that_no_physics_allows_is_named(name: str, wrong: float) -> None:
 AXES: dict[str, Any] = {
     "theta": np.array([0.0, 4.0, 11.0, 19.0, 33.0]),
     "mu_s": np.array([0.25, 0.5, 0.75, 1.25]),
-    "amplitude": np.array([0.0, 0.5, 1.25, 2.0, 3.5, 5.0, 7.5, 11.0, 16.0]),
+    "amplitude": np.array([0.0, 0.5, 1.25, 2.0, 3.5, 5.0, 7.5, 11.0, 16.0, 23.0]),
     "frequency": np.array([0.5, 1.0, 4.0]),
 }
 WRITTEN = pytest.mark.parametrize(
@@ -447,6 +458,7 @@ def test_default_given_back_changes_nothing(name: str) -> None:
 
 
 @SOLVERS
+@strategies.reproducible
 @given(cell=strategies.sliding_cells)
 def test_displacement_amplitude_is_the_amplitude_it_makes(solver: str, cell: strategies.Cell) -> None:
     """A = omega^2 d."""
@@ -479,3 +491,14 @@ def test_grazing_displacement_has_its_leading_term() -> None:
             exact = reference.solve(10.0, 0.6, amplitude, 1.0, yield_acceleration=onset, cycles=1, model="newmark")
             error = abs(mpf(value(result)) - exact.permanent_displacement) / exact.permanent_displacement
             assert error < 8 * mp.mpf(2) ** -52 / excess, "no digits lost beyond those of A/Uy - 1"
+
+
+@pytest.mark.parametrize("first", ["sweep", "simulate", "friction_parameters"])
+def test_public_functions_whichever_is_used_first(first: str) -> None:
+    """Loaded lazily, none hides another (`slipsweep.sweep` is a function, and also a module's name)."""
+    program = (
+        f"import slipsweep; slipsweep.{first}(5.0, 0.38, 3.55{', 1.8' if first != 'friction_parameters' else ''}); "
+        "assert all(callable(getattr(slipsweep, name)) for name in ('sweep', 'simulate', 'friction_parameters'))"
+    )
+    finished = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert finished.returncode == 0, finished.stderr

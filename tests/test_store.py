@@ -16,8 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slipsweep
-from slipsweep import spec, store, variables
+from slipsweep import plans, spec, store, variables
 from slipsweep.errors import InputError, RunError
+from slipsweep.tables import Table, Variable
 
 GRID = """
 # θ in degrees
@@ -210,15 +211,21 @@ def test_the_tally_counts_modes_and_flags(tmp_path: Path) -> None:
     assert report.nbytes == (tmp_path / "a.nc").stat().st_size
 
 
-def test_datasets_in_memory_are_written_by_the_same_rules(tmp_path: Path) -> None:
-    dataset = xr.Dataset(
-        {"relative_velocity": ("time", [0.0, 1.0], variables.HISTORY["relative_velocity"])},
-        {"time": ("time", [0.0, 0.1], {"units": "s"}), "theta": ((), 5.0, variables.PARAMETERS["theta"])},
+def test_tables_in_memory_are_written_by_the_same_rules(tmp_path: Path) -> None:
+    table = Table(
+        {
+            "time": Variable(("time",), np.array([0.0, 0.1]), {"units": "s"}),
+            "theta": Variable((), np.array(5.0), variables.PARAMETERS["theta"]),
+        },
+        {"relative_velocity": Variable(("time",), np.array([0.0, 1.0]), variables.HISTORY["relative_velocity"])},
         {"permanent_displacement": 0.5},
     )
-    store.write_dataset(dataset, tmp_path / "a.nc", title="History", command="x")
+    store.write_table(table, tmp_path / "a.nc", title="History", command="x")
     with xr.open_dataset(tmp_path / "a.nc") as read:
-        xr.testing.assert_equal(read, dataset)
+        expected = xr.Dataset(
+            {"relative_velocity": ("time", [0.0, 1.0])}, {"time": ("time", [0.0, 0.1]), "theta": ((), 5.0)}
+        )
+        xr.testing.assert_equal(read, expected)
         assert read.attrs["Conventions"] == "CF-1.11"
         assert read.attrs["permanent_displacement"] == 0.5
 
@@ -263,12 +270,12 @@ def test_a_failed_run_leaves_nothing_behind(
         path.write_text("an earlier result")
     fill, calls = store._fill, 0
 
-    def failing(file: netCDF4.Dataset, dataset: xr.Dataset, block: Mapping[str, slice]) -> None:
+    def failing(file: netCDF4.Dataset, table: Table, block: Mapping[str, slice]) -> None:
         nonlocal calls
         calls += 1
         if calls == 3:
             raise raised
-        fill(file, dataset, block)
+        fill(file, table, block)
 
     monkeypatch.setattr(store, "_fill", failing)
     with pytest.raises(seen, match=message):
@@ -279,10 +286,10 @@ def test_a_failed_run_leaves_nothing_behind(
 
 
 def test_memory_that_runs_out_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(**arguments: object) -> None:
+    def failing(*arguments: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(slipsweep, "sweep", failing)
+    monkeypatch.setattr(plans.Plan, "solve", failing)
     with pytest.raises(RunError, match="out of memory at a block of 2400 cells"):
         run(GRID, tmp_path / "a.nc")
     assert not list(tmp_path.iterdir())
@@ -321,7 +328,7 @@ def outputs(folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def test_outputs_that_cannot_be_are_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slipsweep, "sweep", lambda **arguments: pytest.fail("has begun"))
+    monkeypatch.setattr(plans.Plan, "solve", lambda *arguments: pytest.fail("has begun"))
     for path, message in outputs(tmp_path):
         with pytest.raises(InputError, match=message):
             run(GRID, path)

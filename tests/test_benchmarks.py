@@ -1,0 +1,47 @@
+"""Every measurement still runs, and writes what it says, on a few cells."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+WRITES = {
+    "report": ["report.md"],
+    "roofline": ["roofline.md"],
+    "model_choices": ["model_choices.md", "model_choices.png"],
+    "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
+}
+
+
+@pytest.fixture(autouse=True)
+def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.chdir(ROOT)
+
+
+@pytest.mark.filterwarnings("ignore")  # of the packages compared with
+@pytest.mark.parametrize("name", WRITES)
+def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # the outside solvers that compile take most of a minute
+    monkeypatch.setitem(sys.modules, "diffrax", None)
+    monkeypatch.setitem(sys.modules, "CyRK", None)
+    monkeypatch.setattr(sys, "argv", [name, "--tiny", "--folder", str(tmp_path)])
+    runpy.run_module(f"benchmarks.{name}", run_name="__main__")
+    for file in WRITES[name]:
+        assert (tmp_path / file).stat().st_size > 0, file
+
+
+def test_the_sample_is_the_references() -> None:
+    """A few cells of benchmarks/data/sample.csv, solved again."""
+    from reference import solve
+
+    from benchmarks import sample
+
+    for groups in sample.read().values():
+        group = groups[-1]
+        inputs = {name: float(values[0]) for name, values in group.inputs.items() if values[0] == values[0]}
+        answer = solve(**inputs, model=group.model, cycles=1)  # type: ignore[arg-type]
+        assert float(answer.permanent_displacement) == group.reference[0]

@@ -1,0 +1,264 @@
+"""Machine code on disk: written once, shared by processes, and never in the way."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import filelock
+import numba
+import numpy as np
+import pytest
+
+from slipsweep import compiled
+
+#: A small kernel, so that compiling it takes a second; says what it gives and whether it was compiled here.
+PROGRAM = """
+import sys, warnings
+warnings.simplefilter("error")
+import numba.core.event as events
+from slipsweep.compiled import Kernel
+import numpy as np
+
+def twice(values):
+    total = 0.0
+    for i in range(values.size):
+        total += np.sin(values[i]) ** 2
+    return total
+
+with events.install_recorder("numba:compile") as recorder:
+    result = Kernel(twice)(np.arange(100.0))
+print(result.hex(), any(event.is_start for _, event in recorder.buffer))
+"""
+
+SWEEP = """
+import slipsweep
+result = slipsweep.sweep([0.0, 5.0], 0.38, [1.0, 4.0], [1.0, 2.0])
+print(*(value.hex() for value in result.permanent_displacement.values.ravel().tolist()))
+"""
+
+
+def start(program: str, cache: Path, **environment: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-c", program],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finish(process: "subprocess.Popen[str]") -> str:
+    """What a process printed; it must have succeeded without a word on stderr."""
+    output, errors = process.communicate(timeout=300)
+    assert (process.returncode, errors) == (0, "")
+    return output
+
+
+def files(cache: Path) -> list[Path]:
+    """Kernels in a cache."""
+    return sorted(path for path in cache.glob("*/*") if path.suffix != ".lock")
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A cache of its own for this process."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    compiled.cache_folder.cache_clear()
+    yield tmp_path / "cache"
+    compiled.cache_folder.cache_clear()
+
+
+def double(value: float) -> float:
+    return 2.0 * value
+
+
+# -------------------------------------------------------------------------- many processes
+
+
+def test_eight_processes_compile_once(tmp_path: Path) -> None:
+    outputs = [finish(process) for process in [start(PROGRAM, tmp_path / "cache") for _ in range(8)]]
+    results, compiling = zip(*(output.split() for output in outputs), strict=True)
+    assert len(set(results)) == 1
+    assert sorted(compiling) == ["False"] * 7 + ["True"]
+    assert len(files(tmp_path / "cache")) == 1
+    assert finish(start(PROGRAM, tmp_path / "cache")).split() == [results[0], "False"]
+
+
+def test_eight_sweeps_at_once_on_an_empty_cache(tmp_path: Path) -> None:
+    outputs = {finish(process) for process in [start(SWEEP, tmp_path / "cache") for _ in range(8)]}
+    assert len(outputs) == 1
+    kernels = files(tmp_path / "cache")
+    assert len(kernels) == 1
+    written = [path.stat().st_mtime_ns for path in kernels]
+    assert {finish(start(SWEEP, tmp_path / "cache"))} == outputs
+    assert [path.stat().st_mtime_ns for path in files(tmp_path / "cache")] == written
+
+
+def test_a_process_that_dies_while_it_compiles_holds_up_nobody(tmp_path: Path) -> None:
+    first = start(SWEEP, tmp_path / "cache")
+    end = time.monotonic() + 60
+    while not list((tmp_path / "cache").glob("*/*.lock")):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    first.kill()
+    first.communicate()
+    assert finish(start(PROGRAM, tmp_path / "cache"))
+
+
+# ----------------------------------------------------------------- caches that are no good
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "altered", "other", "unreadable", "folder"])
+def test_a_damaged_file_is_compiled_anew(tmp_path: Path, damage: str) -> None:
+    result, _ = finish(start(PROGRAM, tmp_path)).split()
+    (path,) = files(tmp_path)
+    content = path.read_bytes()
+    if damage == "empty":
+        path.write_bytes(b"")
+    elif damage == "cut":
+        path.write_bytes(content[:-100])
+    elif damage == "altered":
+        middle = len(content) // 2
+        path.write_bytes(content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :])
+    elif damage == "other":
+        path.write_bytes(b"something else altogether" * 10)
+    elif damage == "unreadable":
+        path.chmod(0)
+        if os.access(path, os.R_OK):
+            pytest.skip("nothing is unreadable to this user")
+    else:
+        path.unlink()
+        path.mkdir()
+    assert finish(start(PROGRAM, tmp_path)).split() == [result, "True"]
+    if damage != "folder":
+        assert finish(start(PROGRAM, tmp_path)).split() == [result, "False"]
+
+
+def test_no_folder_to_write_in(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cache.write_text("a file where the folder should be")
+    assert compiled.cache_folder() is None
+    assert compiled.Kernel(double)(2.0) == 4.0
+    assert finish(start(PROGRAM, cache)).split()[1] == "True"
+
+
+def test_a_full_disk(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled.cache_folder()
+
+    def full(**options: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(compiled.tempfile, "NamedTemporaryFile", full)
+    assert compiled.Kernel(double)(2.0) == 4.0
+    assert files(cache) == []
+
+
+@pytest.mark.parametrize(
+    "error", [OSError(37, "No locks available"), NotImplementedError("no flock"), filelock.Timeout("lock")], ids=repr
+)
+def test_no_lock_to_be_had(cache: Path, monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    def refuse(self: object, **options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(filelock.FileLock, "acquire", refuse)
+    assert compiled.Kernel(double)(2.0) == 4.0
+    assert len(files(cache)) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="owners and modes the POSIX way")
+def test_a_temporary_folder_that_others_can_write_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
+    folder = compiled._temporary_folder()
+    assert folder == tmp_path / f"slipsweep-{os.getuid()}"
+    assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(0o777)
+    assert not compiled._temporary_folder().is_dir()
+
+
+def test_kernels_of_the_latest_versions_are_kept(cache: Path) -> None:
+    others = [cache / f"slipsweep-{number:016x}" for number in range(6)]
+    for age, folder in enumerate(others):
+        folder.mkdir(parents=True)
+        os.utime(folder, (1e9 - age, 1e9 - age))
+    (cache / "slipsweep-mine").mkdir()
+    assert compiled.Kernel(double)(2.0) == 4.0
+    assert set(cache.iterdir()) == {compiled.cache_folder(), *others[:3], cache / "slipsweep-mine"}
+
+
+def test_the_folder_is_named_for_the_sources(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = compiled.cache_folder()
+    compiled.cache_folder.cache_clear()
+    monkeypatch.setattr(compiled, "_SOURCES", ("equations.py",))
+    assert compiled.cache_folder() != first
+
+
+# ------------------------------------------------------------------------------ in a process
+
+
+def test_kernels_of_a_factory_are_told_apart(cache: Path) -> None:
+    def times(factor: int) -> compiled.Kernel:
+        def multiply(value: float) -> float:
+            return factor * value
+
+        return compiled.Kernel(multiply)
+
+    for _ in range(2):
+        assert [times(factor)(2.0) for factor in (2, 3)] == [4.0, 6.0]
+    assert len(files(cache)) == 2
+
+
+def test_other_types_are_refused(cache: Path) -> None:
+    kernel = compiled.Kernel(double)
+    assert kernel(2.0) == 4.0
+    with pytest.raises(TypeError):
+        kernel(np.zeros(3))
+
+
+def test_first_use_by_several_threads(cache: Path) -> None:
+    compilations: list[Any] = []
+    ready = compiled.Kernel._ready
+    kernel = compiled.Kernel(double)
+
+    def counting(args: tuple[Any, ...]) -> Any:
+        compilations.append(args)
+        return ready(kernel, args)
+
+    kernel._ready = counting  # type: ignore[method-assign]
+    results: list[float] = []
+    threads = [threading.Thread(target=lambda: results.append(kernel(2.0))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert results == [4.0] * 8
+    assert len(compilations) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_fork_during_a_compilation_can_compile(tmp_path: Path) -> None:
+    program = PROGRAM.replace('simplefilter("error")', 'filterwarnings("ignore", ".*fork")')
+    program = program.split("with events")[0] + (
+        "import os, threading, time\n"
+        "thread = threading.Thread(target=Kernel(twice), args=(np.arange(100.0),))\n"
+        "thread.start(); time.sleep(0.05)\n"
+        "child = os.fork()\n"
+        "value = Kernel(lambda x: 3.0 * x)(2.0)\n"
+        "if not child: os._exit(int(value))\n"
+        "thread.join(); print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), value)\n"
+    )
+    assert finish(start(program, tmp_path)) == "6 6.0\n"
+
+
+def test_without_jit(tmp_path: Path) -> None:
+    program = "from slipsweep.compiled import Kernel; print(Kernel(lambda x: x + 'b')('a'))"
+    assert finish(start(program, tmp_path, NUMBA_DISABLE_JIT="1")) == "ab\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_warning_reaches_a_user(tmp_path: Path) -> None:
+    strict = "import warnings; warnings.simplefilter('error')\n"
+    assert finish(start(strict + SWEEP, tmp_path))

@@ -1,0 +1,229 @@
+"""What README.md and docs/ say is so: their blocks run, their tables are those of the program."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+import slipsweep
+from slipsweep import spec
+from slipsweep.variables import VALIDITY_TEXT, VALUELESS, Validity
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = ("README.md", "docs/files.md", "docs/model.md", "docs/sweep-files.md")
+
+
+class Block(NamedTuple):
+    """A fenced block: its language, the line it begins in, its text."""
+
+    language: str
+    line: int
+    text: str
+
+
+def read(document: str) -> str:
+    return (ROOT / document).read_text(encoding="utf-8")
+
+
+def blocks(document: str) -> list[Block]:
+    text = read(document)
+    return [
+        Block(match[1], text.count("\n", 0, match.start()) + 1, match[2])
+        for match in re.finditer(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    ]
+
+
+def rows(text: str) -> list[list[str]]:
+    """The rows of all tables in some Markdown, without the rulers."""
+    lines = (line.strip("|").split("|") for line in text.splitlines() if line.startswith("|"))
+    cells = [[cell.strip() for cell in line] for line in lines]
+    return [row for row in cells if not set("".join(row)) <= set("-: ")]
+
+
+def section(document: str, heading: str) -> str:
+    """The text under a heading, up to the next of its level or above."""
+    level = heading.split(" ")[0]
+    after = read(document).split(f"\n{heading}\n", 1)[1]
+    return re.split(rf"^#{{1,{len(level)}}} ", after, maxsplit=1, flags=re.MULTILINE)[0]
+
+
+# --------------------------------------------------------------------------- blocks that run
+
+
+def pattern(expected: str) -> str:
+    """A regular expression for a printed output in which `...` stands for anything."""
+    return ".*".join(map(re.escape, expected.split("...")))
+
+
+def commands(console: str) -> Iterator[tuple[list[str], str]]:
+    """The commands of a console block and the output that each is said to have."""
+    for part in re.split(r"^\$ ", console, flags=re.MULTILINE)[1:]:
+        command, _, output = part.partition("\n")
+        yield shlex.split(command), output
+
+
+def output_of(arguments: list[str], folder: Path) -> str:
+    environment = {**os.environ, "MPLBACKEND": "agg", "PYTHONUTF8": "1"}
+    done = subprocess.run(
+        arguments, cwd=folder, env=environment, capture_output=True, encoding="utf-8", timeout=300, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
+    """The blocks of a document, in order, in one folder that holds what a clone holds."""
+    shutil.copytree(ROOT / "sweeps", tmp_path / "sweeps")
+    found = blocks(document)
+    for block, after in zip_longest(found, found[1:]):
+        where = f"{document}, line {block.line}"
+        if block.language == "console":
+            for (program, *arguments), expected in commands(block.text):
+                run = [sys.executable, "-m", "slipsweep"] if program == "slipsweep" else [shutil.which(program) or ""]
+                if run == [""]:
+                    continue  # a program of others, not on this machine
+                printed = output_of([*run, *arguments], tmp_path)
+                assert re.fullmatch(pattern(expected), printed, re.DOTALL), f"{where} printed:\n{printed}"
+        elif block.language == "python":
+            printed = output_of([sys.executable, "-c", block.text], tmp_path)
+            assert printed == (after.text if after and after.language == "text" else ""), where
+        elif block.language == "toml":
+            spec.parse(block.text, where)
+
+
+def test_the_two_commands_of_the_readme() -> None:
+    """.ci/run takes them from the blocks after these markers and runs them."""
+    text = read("README.md")
+    marked = dict(re.findall(r"^<!-- ci: (\w+) -->\n```sh\n(.*)\n```$", text, re.MULTILINE))
+    assert list(marked) == ["run", "test"]
+    for command in marked.values():
+        assert command.startswith("python3 -m venv .venv && .venv/bin/pip install ")
+    assert marked["run"].endswith(" && .venv/bin/slipsweep run sweeps/design_chart.toml")
+    assert marked["test"].endswith(" && .venv/bin/pytest")
+
+
+def test_figures_are_those_of_the_report() -> None:
+    """.ci/include-report copies benchmarks/results/report.md into README.md."""
+    done = subprocess.run([sys.executable, ROOT / ".ci" / "include-report", "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("document", [*DOCUMENTS, "CHANGELOG.md"])
+def test_links_lead_somewhere(document: str) -> None:
+    text = read(document)
+    for target in re.findall(r'\]\(([^)]+)\)|src="([^"]+)"', text):
+        path, _, anchor = "".join(target).partition("#")
+        if "://" in path:
+            continue
+        other = (ROOT / document).parent / path if path else ROOT / document
+        assert other.exists(), f"{document}: {path}"
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", other.read_text(encoding="utf-8"), re.MULTILINE)
+            # the anchors that GitHub makes of headings
+            anchors = [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
+            assert anchor in anchors, f"{document}: #{anchor}"
+
+
+# ------------------------------------------------------------------------ against the paper
+
+STICK_SLIP: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "yield_acceleration": 0.59}
+CONTINUOUS: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "yield_acceleration": 0.08}
+
+
+def five_cycles(experiment: dict[str, Any], frequency: float, **friction: Any) -> tuple[str, str]:
+    """Displacement in mm and peak velocity in m/s, as the README prints them."""
+    result = slipsweep.sweep(**experiment, frequency=frequency, cycles=5, **friction)
+    return f"{result.permanent_displacement.item() * 1000:.0f}", f"{result.peak_relative_velocity.item():.3f}"
+
+
+def test_comparison_with_the_paper() -> None:
+    table = rows(section("README.md", "## Against the paper"))[1:]
+    stated = {re.sub(r"\W+", " ", row[0]).strip(): (row[2].strip("*"), row[4].strip("*")) for row in table}
+    assert len(stated) == len(table) == 10
+
+    def eqs(name: str) -> tuple[str, ...]:
+        cells = (slipsweep.friction_parameters(**experiment)[name] for experiment in (STICK_SLIP, CONTINUOUS))
+        return tuple(f"{cell.item():.2f}" for cell in cells)
+
+    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, cycles=1, decay_rate=2.70)
+    attenuation = history.block_acceleration.max().item() / 9.81
+    printed = five_cycles(STICK_SLIP, 1.8, decay_rate=2.70), five_cycles(CONTINUOUS, 3.5, decay_rate=2.30)
+    own = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
+    computed = [
+        eqs("limiting_acceleration"),
+        eqs("acceleration_ratio"),
+        eqs("delta_mu"),
+        eqs("minimum_friction"),
+        eqs("decay_rate"),
+        (f"{attenuation:.3f}", "–"),
+        *zip(*printed, strict=True),
+        *zip(*own, strict=True),
+    ]
+    for (quantity, values), expected in zip(stated.items(), computed, strict=True):
+        assert values == expected, quantity
+
+
+def test_numbers_of_the_paper_sweep() -> None:
+    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction above static of Table 2."""
+    text = " ".join(section("README.md", "## Against the paper").split())
+    for experiment, frequency, decay_rate, delta_mu in ((STICK_SLIP, 1.8, 2.70, 0.09), (CONTINUOUS, 3.5, 2.30, 0.11)):
+        displacement, velocity = five_cycles(experiment, frequency, decay_rate=decay_rate, delta_mu=delta_mu)
+        assert f"{displacement} mm and {velocity} m/s" in text
+    assert slipsweep.Validity(slipsweep.sweep(**STICK_SLIP, frequency=1.8, cycles=5).validity.item()) == (
+        Validity.NOT_RECOUPLED
+    )
+
+
+# ------------------------------------------------------------------- tables of the program
+
+
+@pytest.mark.parametrize(
+    ("document", "heading"), [("README.md", "## What the numbers mean"), ("docs/model.md", "## Validity")]
+)
+def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
+    stated = [(int(bit), name.strip("`"), value) for bit, name, _, value in rows(section(document, heading))[1:]]
+    assert [(bit, name) for bit, name, _ in stated] == [
+        (int(flag), (flag.name or "").lower()) for flag in VALIDITY_TEXT
+    ]
+    for bit, name, value in stated:
+        assert value.startswith(("missing", "NaN")) == bool(bit & VALUELESS), name
+
+
+@pytest.mark.parametrize(
+    ("heading", "table"),
+    [
+        ("## `[axes.NAME]`", spec.Axis),
+        ("## `[[cases]]`", spec.Case),
+        ("## `[model]`", spec.Model),
+        ("## `[excitation]`", spec.Excitation),
+        ("## `[solver]`", spec.Solver),
+        ("## `[output]`", spec.Output),
+    ],
+)
+def test_keys_are_those_of_the_schema(heading: str, table: Any) -> None:
+    keys = {row[0].strip("`"): row for row in rows(section("docs/sweep-files.md", heading)) if len(row) == 4}
+    axes = {name: keys.pop(name) for name in list(keys) if table is spec.Axis and name in spec.Axes.model_fields}
+    assert list(keys) == ["key", *table.model_fields] + (["NAME"] if axes else [])
+    if axes:
+        assert list(axes) == list(spec.Axes.model_fields)
+    for name, field in table.model_fields.items():
+        default = keys[name][2].strip("`")
+        if field.default is not None:
+            assert default.replace('"', "'") == (repr(field.default)), name
+
+
+def test_the_table_of_contents_of_a_file_names_every_dimension() -> None:
+    from slipsweep.variables import DIMENSION_ORDER
+
+    text = section("docs/files.md", "## What is in a file")
+    places = [text.index(f"`{name}`") for name in (*DIMENSION_ORDER, "case")]
+    assert places == sorted(places)

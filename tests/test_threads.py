@@ -1,0 +1,206 @@
+"""Threads and processes: the policy of `slipsweep.threads`, under everything that may call a sweep."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+import slipsweep
+from slipsweep import threads
+
+GRID: dict[str, Any] = {
+    "theta": np.linspace(0.0, 15.0, 60),
+    "mu_s": np.linspace(0.2, 0.9, 50),
+    "amplitude": np.linspace(0.5, 13.0, 20),
+    "frequency": [1.0, 2.0],
+}
+
+
+def displacement() -> np.ndarray:
+    return slipsweep.sweep(**GRID, variables=["permanent_displacement"]).permanent_displacement.values
+
+
+@pytest.fixture(scope="module")
+def expected() -> np.ndarray:
+    return displacement()
+
+
+def count_in_process(**environment: str) -> int:
+    """Threads that a fresh process would use."""
+    clean = {name: value for name, value in os.environ.items() if name not in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    code = environment.pop("code", "")
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\nfrom slipsweep.threads import thread_count; print(thread_count())"],
+        env={**clean, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return int(done.stdout)
+
+
+# ------------------------------------------------------------------------------ how many
+
+
+def test_as_many_threads_as_cores() -> None:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    assert count_in_process() == cores
+
+
+@pytest.mark.parametrize("name", ["NUMBA_NUM_THREADS", "OMP_NUM_THREADS"])
+def test_environment_limits_threads(name: str) -> None:
+    assert count_in_process(**{name: "1"}) == 1
+
+
+@pytest.mark.parametrize("value", ["", "0", "-1", "many", "9999"])
+def test_a_limit_that_is_none_changes_nothing(value: str) -> None:
+    assert count_in_process(OMP_NUM_THREADS=value) == count_in_process()
+
+
+@pytest.mark.parametrize(("value", "count"), [("1,4", 1), (" 1 ", 1)])
+def test_lists_as_openmp_takes_them(value: str, count: int) -> None:
+    assert count_in_process(OMP_NUM_THREADS=value) == count
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity here")
+def test_affinity_limits_threads() -> None:
+    assert count_in_process(code="import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})") == 1
+    # even where it changes later
+    late = "import os, slipsweep.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
+    assert count_in_process(code=late) == 1
+
+
+# ------------------------------------------------------------------------------- spreading
+
+
+@pytest.mark.parametrize("cells", [1, 1023, 1024, 65536, 1_000_003])
+@pytest.mark.parametrize("work_per_cell", [1, 100, 10**6])
+def test_every_cell_is_done_once(cells: int, work_per_cell: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    if cells // max(threads.MOST_CELLS_PER_CALL // work_per_cell, 1) > 10_000:
+        pytest.skip("a million calls")
+    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+    done = np.zeros(cells, np.int64)
+
+    def work(first: int, last: int) -> None:
+        done[first:last] += 1
+        assert (last - first) * work_per_cell <= max(threads.MOST_CELLS_PER_CALL, work_per_cell)
+
+    threads.spread(cells, work, work_per_cell)
+    assert (done == 1).all()
+
+
+def test_an_error_ends_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "thread_count", lambda: 2)
+    calls: list[int] = []
+
+    def work(first: int, last: int) -> None:
+        calls.append(first)
+        time.sleep(0.005)
+        if first:
+            raise ZeroDivisionError(str(first))
+
+    before = threading.active_count()
+    with pytest.raises(ZeroDivisionError):
+        threads.spread(100 * threads.MOST_CELLS_PER_CALL, work)
+    assert len(calls) < 20
+    assert threading.active_count() == before
+
+
+def test_one_thread_is_the_callers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "thread_count", lambda: 1)
+    seen: set[int] = set()
+    threads.spread(10**6, lambda first, last: seen.add(threading.get_ident()))
+    assert seen == {threading.get_ident()}
+
+
+# ------------------------------------------------------------------------------- who calls
+
+
+def test_threads_of_others_compute_on_themselves(expected: np.ndarray) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda _: threads.thread_count(), range(4))) == [1] * 4
+        for result in pool.map(lambda _: displacement(), range(8)):
+            np.testing.assert_array_equal(result, expected)
+
+
+def test_dasks_threads(expected: np.ndarray) -> None:
+    lazy = slipsweep.sweep(**GRID, variables=["permanent_displacement"], chunks={"theta": 7, "mu_s": 13})
+    np.testing.assert_array_equal(lazy.permanent_displacement.data.compute(scheduler="threads"), expected)
+
+
+@pytest.mark.parametrize("method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()])
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_processes(method: str, expected: np.ndarray) -> None:
+    """Forked after a sweep, too: no thread is left that a child could miss."""
+    with ProcessPoolExecutor(2, multiprocessing.get_context(method)) as pool:
+        for result in [pool.submit(displacement) for _ in range(2)]:
+            np.testing.assert_array_equal(result.result(timeout=120), expected)
+
+
+def test_no_threading_layer_is_started() -> None:
+    code = (
+        "import numba, slipsweep; slipsweep.sweep([0., 5.], .38, [1., 4.], 1.)\n"
+        "try: print(numba.threading_layer())\n"
+        "except ValueError: print('none')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "none\n"
+
+
+# ---------------------------------------------------------------------------------- Ctrl-C
+
+LONG = {
+    "cycle": "np.linspace(0, 20, 2000), np.linspace(0.2, 0.9, 2000), np.linspace(0.5, 13, 500), 1.0, "
+    "variables=['sliding_mode']",
+    "frequencies": "np.linspace(0, 20, 300), np.linspace(0.2, 0.9, 300), 3.0, np.linspace(0.1, 9, 20_000), "
+    "variables=['sliding_mode']",
+    "step": "np.linspace(0, 20, 200), np.linspace(0.2, 0.9, 200), np.linspace(0.5, 13, 500), 1.0, "
+    "solver='step', steps_per_cycle=1_000_000, variables=['permanent_displacement']",
+}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize("limit", ["", "1"], ids=["threads", "one"])
+@pytest.mark.parametrize("kind", LONG)
+def test_an_interrupt_is_heard_at_once(kind: str, limit: str) -> None:
+    program = (
+        (
+            "import numpy as np, slipsweep\n"
+            "options = dict(solver='step', steps_per_cycle=8) if 'step' in ARGUMENTS else {}\n"
+            "slipsweep.sweep(1.0, 0.38, 3.0, 1.0, **options)  # machine code\n"
+            "print('ready', flush=True)\n"
+            "try: slipsweep.sweep(LONG)\n"
+            "except KeyboardInterrupt: print('interrupted', flush=True)\n"
+        )
+        .replace("ARGUMENTS", repr(LONG[kind]))
+        .replace("LONG", LONG[kind])
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "OMP_NUM_THREADS": limit},
+    ) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n", process.communicate()[1]
+            time.sleep(0.5)
+            assert process.poll() is None, "over before it could be interrupted"
+            process.send_signal(signal.SIGINT)
+            sent = time.monotonic()
+            output, errors = process.communicate(timeout=60)
+            taken = time.monotonic() - sent
+        finally:
+            process.kill()
+    assert (process.returncode, output, errors) == (0, "interrupted\n", "")
+    # generous: a call of a kernel takes a tenth of a second at most, on a machine that others use, too
+    assert taken < 5.0
