@@ -1,0 +1,55 @@
+"""The grids that are measured: the range of a design chart, whole and regime by regime."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import slipsweep
+from slipsweep import SlidingMode, Validity
+
+G = 9.81
+
+#: Regimes, and the options that go with them.
+REGIMES: dict[str, dict[str, Any]] = {"stuck": {}, "stick_slip": {}, "continuous": {}, "newmark": {"model": "newmark"}}
+
+#: A stick-slip slide closer to yield than this is stepped by finer steps of its own.
+_CLEAR_OF_YIELD = 1.01
+
+
+def design_grid(thetas: int, frictions: int, amplitudes: int) -> dict[str, Any]:
+    """θ 0-20°, μs 0.2-0.9 and A 0.05-1.4 g at 1 Hz."""
+    return {
+        "theta": np.linspace(0.0, 20.0, thetas),
+        "mu_s": np.linspace(0.2, 0.9, frictions),
+        "amplitude": np.linspace(0.05, 1.4, amplitudes) * G,
+        "frequency": 1.0,
+    }
+
+
+def regime_cells(regime: str, count: int) -> dict[str, Any]:
+    """About `count` cells of the design grid that lie in one regime, neighbours kept together, zipped along `cell`.
+
+    Of the sliding ones, those are taken whose every pulse comes to rest: the others repeat
+    a solver's work cycle by cycle, and say nothing of the work itself.
+    """
+    options = REGIMES[regime]
+    side = max(4, round((count / 2) ** (1 / 3)))
+    while True:
+        grid = design_grid(side, side, 8 * side)
+        found = slipsweep.sweep(**grid, **options, variables=["sliding_mode", "validity", "yield_acceleration"])
+        mode = SlidingMode.STICK_SLIP if regime == "newmark" else SlidingMode[regime.upper()]
+        inside = (found.sliding_mode == mode) & ((found.validity & Validity.NOT_RECOUPLED) == 0)
+        if regime in ("stick_slip", "newmark"):
+            inside &= found.amplitude > _CLEAR_OF_YIELD * found.yield_acceleration
+        places = np.flatnonzero(inside.transpose("theta", "mu_s", "amplitude").values)
+        if places.size >= count:
+            break
+        side = side * 5 // 4 + 1
+    places = places[: places.size // count * count : places.size // count]
+    axes = np.unravel_index(places, (side, side, 8 * side))
+    cells = {
+        name: xr.DataArray(grid[name][axis], dims="cell")
+        for name, axis in zip(("theta", "mu_s", "amplitude"), axes, strict=True)
+    }
+    return {**cells, "frequency": 1.0, **options}

@@ -1,0 +1,94 @@
+"""The machine, the clock, and the Markdown that results are written in."""
+
+import argparse
+import gc
+import os
+import platform
+import statistics
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from slipsweep import __version__
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results"
+DOCS = ROOT / "docs"
+
+
+def processor() -> str:
+    """Name of the processor and the number of cores this process may use."""
+    name = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        name = next((line.split(":")[1].strip() for line in info.open() if line.startswith("model name")), name)
+    return f"{name}, {cores()} cores"
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def versions(packages: Iterable[str]) -> str:
+    """Versions of those of `packages` that are installed, and Python's."""
+    found = [f"Python {platform.python_version()}"]
+    for package in packages:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            continue
+    return ", ".join(found)
+
+
+def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray")) -> str:
+    """The sentence that stands over every table."""
+    return f"Measured on {processor()}; {platform.system()}, {versions(packages)}, slipsweep {__version__}."
+
+
+def alternate(
+    functions: Mapping[str, Callable[[], object]],
+    repeats: int,
+    typical: Callable[[Sequence[float]], float] = statistics.median,
+) -> dict[str, float]:
+    """Median (or other `typical`) seconds of each function, called in turn `repeats` times after an unmeasured call.
+
+    Taking turns puts a slow spell of a shared machine on all of them alike.
+    """
+    for function in functions.values():
+        function()
+    taken: dict[str, list[float]] = {name: [] for name in functions}
+    for _ in range(repeats):
+        for name, function in functions.items():
+            gc.collect()
+            start = time.perf_counter()
+            result = function()
+            taken[name].append(time.perf_counter() - start)
+            del result  # outside the clock, before the next allocation
+    return {name: typical(times) for name, times in taken.items()}
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; all columns but the first are set to the right."""
+    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """`value` to a few digits, as people write it."""
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:#.{digits}g}".rstrip(".") if value else "0"
+    return f"{value:.{max(digits - 2, 0)}e}"
+
+
+def arguments(description: str | None, folder: Path = RESULTS) -> argparse.Namespace:
+    """The command line that all measurements share."""
+    parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
+    parser.add_argument("--tiny", action="store_true", help="a few cells only, to see that it runs")
+    parser.add_argument(
+        "--folder", type=Path, default=folder, help="where tables and figures go (default: %(default)s)"
+    )
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    return given

@@ -1,0 +1,203 @@
+"""The figures quoted in the README: times, each with its error beside it.
+
+``python -m benchmarks.report`` writes report.md.  Everything that is compared is measured
+in turn, in one run; times are medians.  A time per cell and core is the wall clock times
+the cores over the cells.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import slipsweep
+from benchmarks import model, sample
+from benchmarks.grids import REGIMES, design_grid, regime_cells
+from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
+
+STEPS = 1024
+RULES = ("rectangle", "trapezoid", "simpson")
+_ONLY: dict[str, Any] = {"variables": ["permanent_displacement"]}
+
+
+def displacement(**options: Any) -> xr.DataArray:
+    """`slipsweep.sweep` of nothing but the permanent displacement."""
+    return slipsweep.sweep(**options, **_ONLY).permanent_displacement
+
+
+def size_of(grid: Mapping[str, Any]) -> int:
+    """Number of cells of a grid, crossed or zipped."""
+    zipped = [values.size for values in grid.values() if isinstance(values, xr.DataArray)]
+    crossed = [values.size for values in grid.values() if isinstance(values, np.ndarray)]
+    return int(np.prod(zipped[:1] + crossed))
+
+
+def percentiles(errors: np.ndarray) -> tuple[float, float]:
+    """Median and worst of the errors that have a value."""
+    finite = errors[np.isfinite(errors)]
+    return (float(np.median(finite)), float(finite.max())) if finite.size else (0.0, 0.0)
+
+
+def cycle_solver(tiny: bool) -> str:
+    """Cells of a 3-D grid, and of each regime alone."""
+    grids = {"design chart": design_grid(*((4, 4, 8) if tiny else (60, 50, 200)))}
+    grids |= {regime: regime_cells(regime, 64 if tiny else 200_000) for regime in REGIMES}
+
+    def run(grid: dict[str, Any]) -> Callable[[], object]:
+        return lambda: displacement(**grid, solver="cycle")
+
+    times = alternate({name: run(grid) for name, grid in grids.items()}, 2 if tiny else 9)
+    groups = sample.read()
+    rows = []
+    for name, grid in grids.items():
+        regimes = [name] if name in groups else ["stuck", "stick_slip", "continuous"]
+        errors = [
+            group.errors(displacement_of(group, solver="cycle")) for regime in regimes for group in groups[regime]
+        ]
+        middle, worst = percentiles(np.concatenate(errors))
+        seconds, cells = times[name], size_of(grid)
+        row = [name.replace("_", "–"), f"{cells:,}", number(seconds * cores() / cells * 1e9)]
+        rows.append([*row, number(middle, 2), number(worst, 2)])
+    grid = grids["design chart"]
+    found = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
+    shares = ", ".join(f"{np.mean(found == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode)
+    return (
+        "## The cycle solver\n\n"
+        + table(["cells", "number", "ns a cell and core", "median error", "worst error"], rows)
+        + f"\nTen cycles, displacement only. Of the design chart {shares.replace('_', '–')}. Errors are relative, "
+        f"against 30 digits, over {sample.SIZE} random cells a regime (benchmarks/data/sample.csv).\n"
+    )
+
+
+def displacement_of(group: sample.Group, **options: Any) -> np.ndarray:
+    """Displacements of a group of the sample."""
+    return np.asarray(slipsweep.sweep(**group.sweep_arguments(), **options).permanent_displacement)
+
+
+def four_dimensions(tiny: bool) -> str:
+    """A 4-D sweep against filling as many bytes."""
+    grid = design_grid(*((4, 4, 8) if tiny else (100, 100, 200)))
+    grid["frequency"] = np.geomspace(0.1, 20.0, 5 if tiny else 100)
+    cells = size_of(grid)
+    times = alternate(
+        {"slipsweep.sweep": lambda: displacement(**grid), "np.full": lambda: np.full(cells, 1.0)}, 1 if tiny else 5
+    )
+    memory = ""
+    if Path("/proc/self/clear_refs").exists():
+        whole, result = peak_memory(tiny)
+        memory = (
+            f" Sweeping {result / 1e6:,.0f} MB of result raises the memory of a process that has its kernels by "
+            f"{whole / result:.2f} times that, at its peak."
+        )
+    rows = [[name, number(seconds, 3), number(8 * cells / seconds / 1e9, 3)] for name, seconds in times.items()]
+    ratio = times["slipsweep.sweep"] / times["np.full"]
+    return (
+        f"## A 4-D sweep of {cells:,} cells\n\n"
+        + table(["", "s", "GB/s written"], rows)
+        + f"\n{ratio:.2f} times the time that `np.full` takes for the same {8 * cells / 1e9:.2g} GB.{memory}\n"
+    )
+
+
+def peak_memory(tiny: bool) -> tuple[float, float]:
+    """Bytes that a sweep adds, at its peak, to a process that has swept before, and the bytes of its result."""
+    code = (
+        "import re, numpy as np, slipsweep, pathlib;"
+        "held = lambda name: int(re.search(name + r':\\s+(\\d+)', pathlib.Path('/proc/self/status').read_text())[1]);"
+        "run = lambda n: slipsweep.sweep(np.linspace(0, 20, 50), np.linspace(.2, .9, 50), np.linspace(.5, 13, n),"
+        " np.geomspace(.1, 20, 100), variables=['permanent_displacement']);"
+        "run(2); before = held('VmRSS'); pathlib.Path('/proc/self/clear_refs').write_text('5');"
+        f"found = run({4 if tiny else 200});"
+        "print((held('VmHWM') - before) * 1024, found.nbytes)"
+    )
+    printed = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    peak, result = map(float, printed.split())
+    return peak, result
+
+
+def step_solver(tiny: bool) -> str:
+    """Nanoseconds a step, cell and core, where a step is one that the cell's own slide takes."""
+    rows = []
+    for regime in ("stick_slip", "continuous", "newmark"):
+        cells = regime_cells(regime, 32 if tiny else 20_000)
+        exact = displacement(**cells, solver="cycle").values
+
+        def run(rule: str, cells: dict[str, Any] = cells) -> Callable[[], object]:
+            return lambda: displacement(**cells, solver="step", rule=rule, steps_per_cycle=STEPS)
+
+        times = alternate({rule: run(rule) for rule in (RULES[:1] if tiny else RULES)}, 2 if tiny else 7)
+        steps = steps_taken(cells, regime)
+        for rule, seconds in times.items():
+            found = displacement(**cells, solver="step", rule=rule, steps_per_cycle=STEPS).values
+            errors = np.abs(found / exact - 1)
+            row = [regime.replace("_", "–"), rule, f"{steps.mean():.0f}"]
+            row += [number(seconds * cores() / steps.sum() * 1e9), number(seconds * cores() / steps.size * 1e6)]
+            rows.append([*row, number(float(np.median(errors)), 2), number(float(np.percentile(errors, 95)), 2)])
+    header = ["regime", "rule", "steps a cell", "ns a step and core", "µs a cell and core", "median error", "95 %"]
+    return (
+        f"## The step solver, {STEPS} steps a cycle\n\n"
+        + table(header, rows)
+        + "\nTen cycles. Steps are those of the cell's own slide: from onset to stop or, under Eq. 12, to t5, of one "
+        "pulse where the block comes to rest (the pulses repeat), of two cycles where it slides on. Steps that a lane "
+        "idles while its neighbours slide are not counted, but their time is. Errors are relative to the cycle "
+        "solver.\n"
+    )
+
+
+def steps_taken(cells: Mapping[str, Any], regime: str) -> np.ndarray:
+    """Steps between onset and stop of every cell."""
+    arrays = {name: np.asarray(cells[name], float) for name in ("theta", "mu_s", "amplitude")}
+    arrays["frequency"] = np.ones_like(arrays["amplitude"])
+    plan = model.plan(arrays, "newmark" if regime == "newmark" else "mendez", regime == "continuous")
+    slid = model.slide_length(plan) + (2 * np.pi if regime == "continuous" else 0.0)
+    return np.asarray(slid / (2 * np.pi) * STEPS)
+
+
+def start_up(tiny: bool) -> str:
+    """Whole processes, with an empty cache of kernels and with a full one."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "out.nc"
+        command = [sys.executable, "-m", "slipsweep", "run", "sweeps/paper.toml", "-o", str(output), "--overwrite"]
+        fresh = iter(range(1000))
+
+        def process(cache: str | None, *words: str) -> Callable[[], object]:
+            def run() -> None:
+                name = cache or f"cold{next(fresh)}"
+                environment = {**os.environ, "NUMBA_CACHE_DIR": str(Path(folder) / name)}
+                subprocess.run(words or command, check=True, capture_output=True, env=environment, cwd=ROOT)
+
+            return run
+
+        warm = {
+            "`slipsweep run sweeps/paper.toml`, warm": process("warm"),
+            "`slipsweep --help`": process("warm", sys.executable, "-m", "slipsweep", "--help"),
+            "`python -c 'import numba, xarray'`": process("warm", sys.executable, "-c", "import numba, xarray"),
+        }
+        if tiny:
+            warm = {name: run for name, run in warm.items() if "help" in name}
+        cold = {} if tiny else {"`slipsweep run sweeps/paper.toml`, first ever": process(None)}
+        times = alternate(cold, 2) | alternate(warm, 1 if tiny else 7)
+    rows = [[name, number(seconds)] for name, seconds in times.items()]
+    return "## Start-up, whole process\n\n" + table(["", "s"], rows)
+
+
+def main() -> None:
+    """Measure everything, write report.md."""
+    given = arguments(__doc__)
+    tiny = given.tiny
+    parts = [
+        "# What slipsweep takes\n\n" + measured_on(("numpy", "numba", "llvmlite", "xarray", "netCDF4")),
+        "Written by `python -m benchmarks.report`.\n",
+    ]
+    parts += [section(tiny) for section in (cycle_solver, four_dimensions, step_solver, start_up)]
+    (given.folder / "report.md").write_text("\n".join(parts))
+
+
+if __name__ == "__main__":
+    main()
