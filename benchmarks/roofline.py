@@ -22,7 +22,7 @@ from slipsweep import Validity
 EXP, LOG, VERSINE, ARCSINE = 20, 20, 13, 23
 #: Eqs. 2, 4 and 6 at a given friction, and the sums of a quadrature.
 NODE = 10
-NODES = 16
+NODES = 12
 #: Eqs. 7-11 and λ; half of it where nothing beyond the Coulomb yield value is wanted.
 SETUP = 25 + LOG
 #: Two integrals of the hold, in closed form, and one Newton step towards the stop.

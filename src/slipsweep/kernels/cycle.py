@@ -3,10 +3,11 @@
 Between two events the block's acceleration is either held (closed forms) or follows
 Eq. 4 (Gauss-Legendre quadrature of a smooth function), so that no step is taken and the
 answer carries rounding errors only.  The phases of the motion stand below in their order:
-`rise` (t1 to the peak), `fall` (the hold, to t5), `attenuate` (Eq. 12, or integration), and
-`stick_slip`, which strings pulses together; then `continuous`, which needs two integrals
-over a quarter cycle.  Notation: ψ is the phase from the pulse's peak, x the plane's
-acceleration, b the block's, V and W velocity and displacement (see `block`).
+`onset` (t1), `rise` (to the peak), `fall` (the hold, to t5), `recouple` or Eq. 12, and
+`follow_pulse`, which goes through them; `train` strings pulses together; `continuous` needs
+integrals over a quarter cycle.  Then the common case once more, in SIMD lanes.  Notation:
+ψ is the phase from the pulse's peak, x the plane's acceleration, b the block's, V and W
+velocity and displacement (see `block`).
 
 Events need not be located to the last digit: at an onset the rate of V is zero, at a stop
 V itself, so an error δ in an event's phase moves W by δ² or less.
@@ -491,7 +492,8 @@ _SHORT_SINE = math.sin(0.6)
 #: Newton iterations of the lanes, and the relative size of the last that counts as converged
 #: (the error left is its square, and enters the result squared again).
 _LANE_ITERATIONS = 5
-_ONSET_ITERATIONS = 9
+#: For lanes that stick first, few, whose curves start flat.
+_STICKS_ITERATIONS = 9
 _LANE_TOLERANCE = 1e-5
 
 
@@ -537,7 +539,7 @@ def lane_onset(count: int, way: int, g: float, lanes: np.ndarray) -> None:
     if way != _STICKS:
         return
     # D = 0, from the left, where a concave D converges, slowly where it starts flat
-    for _ in range(_ONSET_ITERATIONS):
+    for _ in range(_STICKS_ITERATIONS):
         for j in range(count):
             x = lanes[_LEVEL + j]
             asked, slope = lane_response_and_slope(lanes, j, x, g)
@@ -557,7 +559,7 @@ def lane_rise(count: int, way: int, g: float, lanes: np.ndarray) -> None:
         for j in range(count):
             lanes[_HELD + j] = max(lane_response(lanes, j, lanes[AMPLITUDE + j], g), lanes[_LEVEL + j])
         # the switch from the hold to Eq. 4: E = b, from the right, where a convex E converges
-        for _ in range(_LANE_ITERATIONS):
+        for _ in range(_STICKS_ITERATIONS if way == _STICKS else _LANE_ITERATIONS):
             for j in range(count):
                 x = lanes[_X + j]
                 asked, slope = lane_response_and_slope(lanes, j, x, g)

@@ -60,8 +60,14 @@ def gather(
         run = min(count - done, grid.shape[last] - index[last])
         for row in range(7):
             values, at, stride = inputs[row], position[row], grid.strides[row, last]
-            for j in range(run):
-                cells[row * TILE + done + j] = values[at + j * stride]
+            to = row * TILE + done
+            if stride == 0:
+                cells[to : to + run] = values[at]
+            elif stride == 1:
+                cells[to : to + run] = values[at : at + run]
+            else:
+                for j in range(run):
+                    cells[to + j] = values[at + j * stride]
         for row in range(2):
             at, stride = position[7 + row], grid.strides[7 + row, last]
             for j in range(run):
@@ -92,23 +98,25 @@ def scatter(
 ) -> None:
     """Spread the solved cells over their frequencies: u = W/ω², v = V/ω (the scaling law)."""
     step, stride = grid.frequency_stride, grid.result_stride
-    for j in range(count):
-        at_period, at = offsets[0, j], offsets[1, j]
-        if results.displacement.size:
-            w = motion[0, j]
+    if results.displacement.size:
+        for j in range(count):
+            at_period, at, w = offsets[0, j], offsets[1, j], motion[0, j]
             for k in range(grid.frequencies):
                 period = periods[at_period + k * step]
                 results.displacement[at + k * stride] = w * (period * period)
-        if results.velocity.size:
-            v = motion[1, j]
+    if results.velocity.size:
+        for j in range(count):
+            at_period, at, v = offsets[0, j], offsets[1, j], motion[1, j]
             for k in range(grid.frequencies):
                 results.velocity[at + k * stride] = v * periods[at_period + k * step]
-        if results.mode.size:
+    if results.mode.size:
+        for j in range(count):
             for k in range(grid.frequencies):
-                results.mode[at + k * stride] = codes[0, j]
-        if results.validity.size:
+                results.mode[offsets[1, j] + k * stride] = codes[0, j]
+    if results.validity.size:
+        for j in range(count):
             for k in range(grid.frequencies):
-                results.validity[at + k * stride] = codes[1, j]
+                results.validity[offsets[1, j] + k * stride] = codes[1, j]
 
 
 def _cycle_grid(

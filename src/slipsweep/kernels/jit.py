@@ -1,7 +1,8 @@
 """How the kernels' inner functions are compiled.
 
 They are called from jitted code only: leaving out the wrappers that Python and C would call
-takes a quarter off the time of the first compilation.
+takes a fifth off the time of the first compilation (16.3 s to 13.5 s).  Called from Python
+they crash: the way in from there is `grid`, or a jitted function of one's own.
 """
 
 import functools
