@@ -6,7 +6,6 @@ not apply.  Whatever a library compiles, it compiles on the first call, which is
 apart.
 """
 
-import contextlib
 import functools
 import math
 from collections.abc import Callable
@@ -225,7 +224,7 @@ def pynewmarkdisp(group: Group, method: str, samples: int) -> Solve | None:
         return None
     import matplotlib as mpl
 
-    with mpl.rc_context(), contextlib.suppress(ImportError):
+    with mpl.rc_context():
         from pynewmarkdisp.newmark import direct_newmark  # sets fonts and a window toolkit
     records, dt, onset = _records(group, samples)
     times = [step * np.arange(record.size) for record, step in zip(records, dt, strict=True)]
