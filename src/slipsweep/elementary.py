@@ -1,6 +1,6 @@
 """exp, log and versines in plain arithmetic, so that a loop over them becomes SIMD.
 
-numba from PyPI has no vector mathematics library (SVML left in 0.62): a `math.exp` in a
+numba as pip installs it has no vector mathematics library (SVML left in 0.62): a `math.exp` in a
 loop is a call of 4.3 ns an element and keeps the whole loop scalar.  `exp` below was seen
 at 0.65 ns an element (AVX-512, in cache), within 1.5 ulp of the true value.
 """
