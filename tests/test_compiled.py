@@ -238,21 +238,6 @@ def test_first_use_by_several_threads(cache: Path) -> None:
     assert len(compilations) == 1
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-def test_a_fork_during_a_compilation_can_compile(tmp_path: Path) -> None:
-    program = PROGRAM.replace('simplefilter("error")', 'filterwarnings("ignore", ".*fork")')
-    program = program.split("with events")[0] + (
-        "import os, threading, time\n"
-        "thread = threading.Thread(target=Kernel(twice), args=(np.arange(100.0),))\n"
-        "thread.start(); time.sleep(0.05)\n"
-        "child = os.fork()\n"
-        "value = Kernel(lambda x: 3.0 * x)(2.0)\n"
-        "if not child: os._exit(int(value))\n"
-        "thread.join(); print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), value)\n"
-    )
-    assert finish(start(program, tmp_path)) == "6 6.0\n"
-
-
 def test_without_jit(tmp_path: Path) -> None:
     program = "from slipsweep.compiled import Kernel; print(Kernel(lambda x: x + 'b')('a'))"
     assert finish(start(program, tmp_path, NUMBA_DISABLE_JIT="1")) == "ab\n"

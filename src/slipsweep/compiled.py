@@ -52,7 +52,9 @@ _PATIENCE = 120.0
 #: Held over the first use of any kernel in this process.
 _first_use = threading.RLock()
 if hasattr(os, "register_at_fork"):
-    # no fork in the middle of a compilation: the child would inherit locks that no thread of it can release
+    # no fork in the middle of a first use: the child would inherit locks that no thread of it can release.
+    # LLVM's own lock, taken also when another thread's compilation is cleared away, is out of reach here:
+    # a process that forks beside threads that compile can still hang, as with numba itself
     os.register_at_fork(
         before=_first_use.acquire, after_in_parent=_first_use.release, after_in_child=_first_use.release
     )
