@@ -1,0 +1,31 @@
+"""The paper's equations against each other."""
+
+import math
+
+import pytest
+
+from slipsweep import equations as eq
+
+MU_S, TAN_THETA, G = 0.38, math.tan(math.radians(5.0)), 9.81
+
+
+@pytest.mark.parametrize("ground", [0.7, 2.0, 3.5])
+@pytest.mark.parametrize("friction", [0.12, 0.2, 0.3])
+def test_eq1_gives_back_the_friction_of_eq4(ground: float, friction: float) -> None:
+    block = eq.block_acceleration(ground, friction, MU_S, TAN_THETA, G)
+    # Eq. 1 holds the magnitudes: Eq. 4 has to ask for an acceleration along the plane's
+    if block > 0.0:
+        assert eq.mobilised_friction(ground, block, MU_S, TAN_THETA, G) == pytest.approx(friction, rel=1e-13)
+    else:
+        assert friction < MU_S - TAN_THETA - (ground - G * TAN_THETA) / (G + ground * TAN_THETA)
+
+
+def test_eq6_without_an_excess_is_eq5() -> None:
+    law = eq.original_friction_coefficient(2.0, MU_S, 2.7, G)
+    assert law == eq.friction_coefficient(2.0, MU_S, 0.0, 2.7, G) == pytest.approx(MU_S * math.exp(-2.7 * 2.0 / G))
+
+
+def test_eq12_brakes_evenly_and_not_backwards() -> None:
+    kd = eq.attenuation_coefficient(1.5, G)
+    assert eq.attenuated_velocity(0.3, kd, 0.1, G) == pytest.approx(0.3 - 1.5 * 0.1, rel=1e-14)
+    assert eq.attenuated_velocity(0.3, kd, 0.5, G) == 0.0
