@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.compiled import Kernel
-from slipsweep.kernels import cycle, step
+from slipsweep.kernels import sine, step
 from slipsweep.kernels.block import TILE, Options, block_of, cell_of
 from slipsweep.kernels.jit import scalar
 
@@ -128,7 +128,7 @@ def _cycle_grid(
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         gather(grid, begin, count, inputs, cells, offsets)
-        cycle.solve_cells(cells, count, options, table, motion, codes)
+        sine.solve_cells(cells, count, options, table, motion, codes)
         scatter(grid, count, offsets, periods, motion, codes, results)
 
 

@@ -1,0 +1,82 @@
+"""The command line: one file a command, put together and run here.
+
+Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 128 + n: stopped by signal n
+(130 for Ctrl-C).  What a user can mend is told in one line, never a traceback.
+What a command needs is imported inside it, so that `slipsweep --help` is there at once.
+"""
+
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+import typer
+
+from slipsweep.cli import info, run, simulate
+from slipsweep.errors import InputError, RunError
+
+app = typer.Typer(
+    help="Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+)
+app.command(epilog=run.EXAMPLE)(run.run)
+app.command(epilog=info.EXAMPLE)(info.info)
+app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
+
+# typer names only one of its usage errors; the class above it covers unknown options and missing arguments
+_UsageError: Any = typer.BadParameter.__mro__[1]
+
+
+class Interrupted(BaseException):
+    """Ctrl-C or SIGTERM; no `except Exception` stops it."""
+
+    def __init__(self, signum: int) -> None:
+        self.signum = signum
+
+
+@contextmanager
+def _signals() -> Iterator[None]:
+    """Make Ctrl-C and SIGTERM raise `Interrupted`, once: cleaning up is not interrupted again."""
+    # a signal that the caller ignores (nohup, a shell's background job) stays ignored
+    watched = [s for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) is not signal.SIG_IGN]
+
+    def interrupt(signum: int, frame: FrameType | None) -> None:
+        for number in watched:
+            signal.signal(number, signal.SIG_IGN)
+        raise Interrupted(signum)
+
+    before = {number: signal.signal(number, interrupt) for number in watched}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        with _signals():
+            # without standalone mode errors come back here instead of being boxed in several lines
+            status: Any = app(arguments or ["--help"], prog_name="slipsweep", standalone_mode=False)
+    except _UsageError as error:
+        return _fail(error.format_message(), 2)
+    except InputError as error:
+        return _fail(str(error), 2)
+    except MemoryError:
+        return _fail("out of memory", 1)
+    except (RunError, OSError) as error:
+        return _fail(str(error), 1)
+    except Interrupted as error:
+        print("slipsweep: interrupted; nothing written", file=sys.stderr)
+        return 128 + error.signum
+    return status if isinstance(status, int) else 0
+
+
+def _fail(message: str, status: int) -> int:
+    print(f"slipsweep: error: {' '.join(message.split())}", file=sys.stderr)
+    return status

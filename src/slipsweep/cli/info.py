@@ -1,0 +1,30 @@
+"""`slipsweep info`: what a result holds."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from slipsweep.cli.common import echo_tally
+
+EXAMPLE = "Example: slipsweep info design_chart.nc"
+
+
+def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:
+    """Tell what is in a result, how it was made, and the shares of its modes and flags."""
+    from slipsweep import store
+    from slipsweep.resources import size_text
+
+    contents = store.read_contents(file)
+    typer.echo(f"{contents.path}  {size_text(contents.nbytes)}")
+    for title, entries in (("coordinates", contents.coordinates), ("variables", contents.variables)):
+        typer.echo(f"{title}:")
+        for name, text in entries.items():
+            typer.echo(f"  {name:<24}{text}")
+    echo_tally(contents.tally)
+    for name, text in contents.attributes.items():
+        if "\n" in text:
+            typer.echo(f"{name}:")
+            typer.echo("".join(f"  {line}\n" for line in text.splitlines()), nl=False)
+        else:
+            typer.echo(f"{name}: {text}")

@@ -1,0 +1,52 @@
+"""`slipsweep run`: a sweep computed and written."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from slipsweep.cli.common import Overwrite, echo_tally, progress_bar, typed_command
+from slipsweep.errors import InputError
+
+EXAMPLE = "Example: slipsweep run sweeps/design_chart.toml -o design_chart.nc"
+
+
+def run(
+    sweep: Annotated[
+        Path,
+        typer.Argument(metavar="SWEEP.toml|OUT.nc", help="A sweep file, or an earlier result to make again."),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="OUT.nc",
+            help="File to write (default: output.path, else the sweep's name with .nc).",
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+    solver: Annotated[
+        Literal["auto", "step", "cycle"] | None, typer.Option(help="Solver, over the sweep file's solver.method.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+) -> None:
+    """Compute a sweep and write it to a netCDF file."""
+    from slipsweep import spec, store
+    from slipsweep.resources import size_text
+
+    checked = spec.load(sweep)
+    if solver is not None:
+        checked = checked.with_solver(solver)
+    path = output or Path(checked.output.path or f"{sweep.stem}.nc")
+    if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
+        raise InputError(f"{path}: is the sweep file itself; give another name with -o")
+    with progress_bar(checked.cells, quiet) as progress:
+        report = store.run(checked, path, command=typed_command(), overwrite=overwrite, progress=progress)
+    if quiet:
+        return
+    rate = report.tally.cells / max(report.seconds, 1e-9)
+    grid = " x ".join(f"{length} {dim}" for dim, length in report.shape.items())
+    typer.echo(f"{report.tally.cells} cells ({grid}) in {report.seconds:.2f} s, {rate:.3g} cells/s")
+    echo_tally(report.tally)
+    typer.echo(f"{report.path}  {size_text(report.nbytes)}")

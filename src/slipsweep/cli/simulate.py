@@ -1,0 +1,109 @@
+"""`slipsweep simulate`: one time history."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from slipsweep.cli.common import Overwrite, typed_command
+from slipsweep.errors import InputError
+from slipsweep.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
+
+if TYPE_CHECKING:
+    from slipsweep.tables import Table
+
+EXAMPLE = "Example: slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o history.png"
+
+
+def simulate(
+    theta: Annotated[float, typer.Option(help="Plane inclination, degrees.")],
+    mu_s: Annotated[float, typer.Option(help="Static friction coefficient.")],
+    amplitude: Annotated[float, typer.Option(help="Peak ground acceleration, m/s².")],
+    frequency: Annotated[float, typer.Option(help="Excitation frequency, Hz.")],
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .csv, .png, .svg or .pdf; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    cycles: Annotated[int, typer.Option(help="Cycles of shaking.")] = 10,
+    yield_acceleration: Annotated[
+        float | None, typer.Option(help="Yield acceleration, m/s² (default: Coulomb's).")
+    ] = None,
+    decay_rate: Annotated[float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).")] = None,
+    delta_mu: Annotated[float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).")] = None,
+    minimum_friction: Annotated[float | None, typer.Option(help="Minimum friction μmin (default: Eq. 9).")] = None,
+    model: Annotated[Literal["mendez", "newmark"], typer.Option(help="Model of the interface.")] = "mendez",
+    rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
+    recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
+    g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
+    points: Annotated[int, typer.Option(min=4, help="Points in time per cycle.")] = 512,
+) -> None:
+    """Compute the time history of one case, as files and a figure."""
+    writers: dict[str, Callable[[Table, Path, bool], None]] = {
+        ".nc": _write_netcdf,
+        ".csv": _write_csv,
+        **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
+    }
+    outputs = output or []
+    for path in outputs:
+        if path.suffix not in writers:
+            raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
+
+    from slipsweep import store
+    from slipsweep.history import history_table
+
+    for path in outputs:
+        store.check_output(path, overwrite)
+    table = history_table(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        frequency=frequency,
+        cycles=cycles,
+        yield_acceleration=yield_acceleration,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        g=g,
+        points_per_cycle=points,
+    )
+    for path in outputs:
+        writers[path.suffix](table, path, overwrite)
+    typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
+    typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
+    typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
+    for flag in Validity(table["validity"].item()):
+        typer.echo(f"flag                    {(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
+    for path in outputs:
+        typer.echo(path)
+
+
+def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
+    from slipsweep import store
+
+    store.write_table(
+        table, path, title="Time history of a sliding block", command=typed_command(), overwrite=overwrite
+    )
+
+
+def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
+    from slipsweep import store
+
+    columns = {name: table[name] for name in ("time", *HISTORY)}
+    with store.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(f"{name} ({array.attrs['units']})" for name, array in columns.items())
+        writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
+
+
+def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
+    from slipsweep import figures, store
+
+    figure = figures.history(table)
+    with store.complete_or_absent(path, overwrite) as temporary:
+        figure.savefig(temporary, format=path.suffix[1:], dpi=150)
