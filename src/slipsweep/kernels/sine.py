@@ -49,7 +49,10 @@ _HALF_PI = 0.5 * math.pi
 _X, _LEVEL, _START, _V, _W, _HELD, _RATE, _MOMENT, _PSI, _LEFT, _PEAK, _CONVERGED, _CODE = range(
     LANE_ROWS * TILE, (LANE_ROWS + 13) * TILE, TILE
 )
-_LANES_SIZE = (LANE_ROWS + 13) * TILE
+#: What a first pulse leaves to the pulses after it: V carried on, W up to then, W if it were the
+#: last, t1 and the largest V; and, of a pulse entered in motion, V as it is slowest.
+_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _SLOWEST = range((LANE_ROWS + 13) * TILE, (LANE_ROWS + 19) * TILE, TILE)
+_LANES_SIZE = (LANE_ROWS + 19) * TILE
 
 #: Rows of a tile's blocks beside the lanes': the codes, and the way a cell goes.
 _MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
@@ -205,7 +208,8 @@ def lane_attenuation(count: int, way: int, cycles: int, lanes: np.ndarray) -> No
     """Eq. 12, and all cycles: W in _W, the largest V in _PEAK.
 
     Where a block still slides at the next Üg = Üy, Eq. 4 and the hold act on it as in the
-    pulse before, so that each cycle adds the same velocity v: an arithmetic series.
+    pulse before, so that each cycle adds the same velocity v: an arithmetic series.  But what
+    sticks at Üg = Üy when at rest does not when it slides: `lane_carried` goes on with it.
     """
     for j in range(count):
         held, left, moved = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j]
@@ -214,12 +218,96 @@ def lane_attenuation(count: int, way: int, cycles: int, lanes: np.ndarray) -> No
         braked = 0.5 * (left - carried) * (left + carried) / held
         later = cycles - 1.0
         last = moved + later * carried * (_HALF_PI - lanes[BEGAN + j]) + 0.5 * (left + later * carried) ** 2 / held
+        lanes[_CARRIED + j], lanes[_MOVED + j] = carried, moved + braked
+        lanes[_LAST + j] = moved + 0.5 * left * left / held
+        lanes[_HIGHEST + j], lanes[_ONSET + j] = lanes[_PEAK + j], lanes[_START + j]
         lanes[_W + j] = later * (moved + braked + math.pi * carried * (later - 1.0)) + last
         lanes[_PEAK + j] += later * carried
         still = (carried > 0.0) & (cycles > 1)
         lanes[_CODE + j] = NOT_RECOUPLED if still else 0
-        # what sticks at Üg = Üy when at rest does not when it slides: its pulses differ
-        lanes[_CONVERGED + j] = 0.0 if still & (way == _STICKS) else lanes[_CONVERGED + j]
+        # -1: right so far, but not over
+        lanes[_CONVERGED + j] *= -1.0 if still & (way == _STICKS) else 1.0
+
+
+@scalar
+def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
+    """Bring the lanes that stick at Üg = Üy and do not recouple to the front; the number of them."""
+    used = 0
+    for lane in range(count):
+        if lanes[_CONVERGED + lane] < 0.0:
+            where[used] = where[lane]
+            for row in range(0, _LANES_SIZE, TILE):
+                lanes[row + used] = lanes[row + lane]
+            used += 1
+    for lane in range(used, whole_lanes(used)):
+        for row in range(0, _LANES_SIZE, TILE):
+            lanes[row + lane] = lanes[row]
+    return used
+
+
+@scalar
+def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
+    """All cycles of lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
+
+    Then they hold E(Üy) ≥ Üg from Üy on, and one of three things happens.  They stop before t1 of
+    the first pulse, and go on like it; they slide through and stop before the third pulse, which
+    is the first again; or they never stop, and each cycle adds the same velocity.
+    """
+    g, cycles = options.g, options.cycles
+    later = cycles - 1.0
+    # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
+    for j in range(count):
+        lanes[_LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], g)
+        lanes[_START + j] = lanes[_PSI + j] = lanes[BEGAN + j]
+    for _ in range(_LANE_ITERATIONS):
+        for j in range(count):
+            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_PSI + j]
+            velocity = lanes[_CARRIED + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
+            step = velocity / (amplitude - held - amplitude * versine(psi))
+            lanes[_PSI + j] = min(max(psi - step, lanes[BEGAN + j]), lanes[_ONSET + j])
+            settled = abs(step) <= _LANE_TOLERANCE * abs(lanes[_PSI + j] - lanes[BEGAN + j])
+            lanes[_X + j] = 1.0 if settled & (lanes[_PSI + j] < lanes[_ONSET + j]) else 0.0
+    for j in range(count):
+        began, psi = lanes[BEGAN + j], lanes[_PSI + j]
+        again = (
+            lanes[_CARRIED + j] * (psi - began) + held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], began, psi)[1]
+        )
+        stops = lanes[_X + j] > 0.0
+        lanes[_CODE + j] = later * (lanes[_MOVED + j] + again) + lanes[_LAST + j] if stops else math.nan
+        lanes[_CONVERGED + j] = 1.0
+    # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
+    lane_rise(count, _FOLLOWS, g, lanes)
+    for j in range(count):
+        amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
+        slowest = -inverse_versine((amplitude - held) / amplitude)
+        lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
+        # held until past its slowest, or else Eq. 4 itself slows it
+        through = (held < amplitude) & (lanes[_X + j] >= held) & (lanes[_SLOWEST + j] > 0.0)
+        lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if through else 0.0
+        lanes[_W + j] += -carried * began
+        lanes[_V + j] += carried
+    lane_fall(count, lanes)
+    for j in range(count):
+        held, left, moved, began = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j], lanes[BEGAN + j]
+        after = max(left - held * (1.5 * math.pi + began), 0.0)
+        braked = 0.5 * (left - after) * (left + after) / held
+        gain = after - lanes[_CARRIED + j]
+        most = later - 1.0  # pulses after the second
+        series = lanes[_MOVED + j] + most * (moved + braked + math.pi * gain * (most - 1.0))
+        series += moved + most * gain * (_HALF_PI - began) + 0.5 * (left + most * gain) ** 2 / held
+        # after == 0: pairs of pulses, and of an odd number the last is a first one
+        pairs = math.floor(0.5 * cycles)
+        paired = pairs * (lanes[_MOVED + j] + moved + braked) + (lanes[_LAST + j] if cycles > 2.0 * pairs else 0.0)
+        lasts = min(lanes[_SLOWEST + j], after) + most * min(gain, 0.0) > 0.0
+        slides = lanes[_CONVERGED + j] > 0.0
+        stopped = lanes[_CODE + j]
+        through = paired if after == 0.0 else series
+        lanes[_W + j] = through if slides else stopped
+        slides &= (after == 0.0) | lasts
+        lanes[_CONVERGED + j] = 1.0 if slides | (stopped == stopped) else 0.0
+        highest = lanes[_PEAK + j] + (most * max(gain, 0.0) if after > 0.0 else 0.0)
+        lanes[_PEAK + j] = max(lanes[_HIGHEST + j], highest if slides else 0.0)
+        lanes[_CODE + j] = NOT_RECOUPLED
 
 
 @scalar
@@ -328,6 +416,21 @@ def fill_lanes(blocks: np.ndarray, count: int, way: int, lanes: np.ndarray, wher
 
 
 @scalar
+def collect(
+    used: int, way: int, lanes: np.ndarray, where: np.ndarray, blocks: np.ndarray, motion: np.ndarray, codes: np.ndarray
+) -> None:
+    """Results of the lanes that have converged; the other cells are to go the long way."""
+    for lane in range(used):
+        j = where[lane]
+        if lanes[_CONVERGED + lane] > 0.0:
+            motion[0, j], motion[1, j] = lanes[_W + lane], lanes[_PEAK + lane]
+            codes[1, j] |= int(lanes[_CODE + lane]) | (EQ4_BELOW_YIELD if way == _YIELD_GOVERNS else 0)
+            blocks[_WAY + j] = way
+        else:
+            blocks[_WAY + j] = _OTHER
+
+
+@scalar
 def solve_cells(
     cells: np.ndarray, count: int, options: Options, table: np.ndarray, motion: np.ndarray, codes: np.ndarray
 ) -> None:
@@ -345,13 +448,12 @@ def solve_cells(
         if used == 0:
             continue
         solve_lanes(whole_lanes(used), way, options, lanes)
-        for lane in range(used):
-            j = where[lane]
-            if lanes[_CONVERGED + lane] > 0.0:
-                motion[0, j], motion[1, j] = lanes[_W + lane], lanes[_PEAK + lane]
-                codes[1, j] |= int(lanes[_CODE + lane]) | (EQ4_BELOW_YIELD if way == _YIELD_GOVERNS else 0)
-            else:
-                blocks[_WAY + j] = _OTHER
+        collect(used, way, lanes, where, blocks, motion, codes)
+        if way == _STICKS:
+            used = fill_carried(used, lanes, where)
+            if used > 0:
+                lane_carried(whole_lanes(used), options, lanes)
+                collect(used, way, lanes, where, blocks, motion, codes)
     for j in range(count):
         if blocks[_WAY + j] == _OTHER and codes[0, j] > STUCK:
             answer = solve(block_at(cells, j, options), options, table)
