@@ -20,7 +20,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from slipsweep.style import ORANGE, PURPLE, SKY_BLUE, axis_label, caption, unit, value_text
+from slipsweep.style import ORANGE, PURPLE, SKY_BLUE, VERMILION, axis_label, caption, unit, value_text
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import RESULTS, SlidingMode, Validity
 
@@ -48,7 +48,7 @@ HATCHES = {
     Validity.FLEXIBLE_BLOCK: "++",
 }
 
-_LINES = {
+_LINES: dict[str, tuple[str, dict[str, Any]]] = {
     "yield_acceleration": ("yield", {"color": "black", "linestyle": "-", "linewidth": 1.6}),
     "limiting_acceleration": ("mode limit (Eq. 7)", {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.6}),
 }
@@ -59,10 +59,13 @@ _LEAST, _MOST = 1e-3, 10.0
 #: Displacements that differ by less are the same but for rounding.
 _EQUAL = 1e-9
 
+#: What a contour's label takes: about that fraction of the axes to each side.
+_LABEL_ROOM = 0.05
+
 _UPSLOPE = "0.6"
 _NOT_SHOWN = "gaps: upslope\n(negative)"
 
-_RATIO_LEVELS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+_RATIO_LEVELS = (0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
 
 
 # --------------------------------------------------------------------------- the five charts
@@ -100,11 +103,14 @@ def contours(table: Table, lines: Boundaries, name: str, x: str, y: str) -> Figu
         )
         areas.set_rasterized(False)
         # the result jumps at the mode limit: the lines of either side end there
+        to_axes = axes.transData + axes.transAxes.inverted()
+        shown = [threshold_line(line, table, x, y) for line in lines.values()]
+        taken = [to_axes.transform(np.column_stack(line)) for line in shown if line is not None]
         for side in _sides(table, lines, x, y):
             masked = np.ma.array(logs, mask=~side | np.isnan(logs))
             drawn = axes.contour(xs, ys, masked, places, colors="white", linewidths=0.9, linestyles="solid")
             drawn.set_gid(f"contours of {name}")
-            _label_contours(axes, drawn, name, [threshold_line(line, table, x, y) for line in lines.values()])
+            _label_contours(axes, drawn, name, taken)
         bar = figure.colorbar(areas, ax=axes, ticks=places, pad=0.02)
         bar.ax.set_yticklabels([_value_label(name, level) for level in levels])
         bar.ax.minorticks_off()
@@ -151,6 +157,7 @@ def newmark_ratio(table: Table, baseline: Variable, lines: Boundaries, x: str, y
         grey = ListedColormap(["0.8"])
         axes.pcolormesh(_edges(xs), _edges(ys), np.ma.masked_equal(equal, False), cmap=grey, rasterized=True)
         entries.append(Patch(facecolor="0.8", label="equal to Newmark's"))
+    crossing: list[Any] = []
     if there.any():
         inside = [level for level in _RATIO_LEVELS if ratio[there].min() / 2.5 < level < ratio[there].max() * 2.5]
         levels = inside if len(inside) > 1 else list(_RATIO_LEVELS)
@@ -165,12 +172,13 @@ def newmark_ratio(table: Table, baseline: Variable, lines: Boundaries, x: str, y
         for side in _sides(table, lines, x, y):
             masked = np.ma.array(logs, mask=~side | ~there)
             if masked.count() and min(masked.shape) > 1 and masked.min() < 0 < masked.max():
-                axes.contour(xs, ys, masked, [0.0], colors="white", linewidths=2.0)
+                axes.contour(xs, ys, masked, [0.0], colors=VERMILION, linewidths=1.6)
+                crossing = [Line2D([], [], color=VERMILION, linewidth=1.6, label="as much as Newmark's")]
         bar = figure.colorbar(areas, ax=axes, ticks=places, pad=0.02, extend="both")
         bar.ax.set_yticklabels([f"{level:g}" for level in levels])
         bar.ax.minorticks_off()
         bar.set_label("permanent displacement over that of Newmark's block")
-    _finish_map(figure, axes, table, lines, x, y, entries)
+    _finish_map(figure, axes, table, lines, x, y, [*entries, *crossing])
     return figure
 
 
@@ -425,7 +433,7 @@ def _colours(number: int) -> list[Any]:
 
 
 def _plot() -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(7.2, 5.0), layout="constrained")
+    figure = Figure(figsize=(7.0, 4.8), layout="constrained")
     axes = figure.subplots()
     axes.grid(color="0.9", which="major")
     axes.set_axisbelow(True)
@@ -433,7 +441,7 @@ def _plot() -> tuple[Figure, Axes]:
 
 
 def _map(table: Table, x: str, y: str) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(7.2, 5.6), layout="constrained")
+    figure = Figure(figsize=(7.0, 5.3), layout="constrained")
     axes = figure.subplots()
     for side, name in (("x", x), ("y", y)):
         _set_scale(axes, side, table[name].values)
@@ -456,10 +464,12 @@ def _axis_text(axes: Axes, side: str, name: str) -> None:
     getattr(axes, f"set_{side}label")(axis_label(name))
 
 
-def _label_contours(axes: Axes, drawn: Any, name: str, lines: Sequence[tuple[Floats, Floats] | None]) -> None:
-    """Label each contour where it is farthest from edges, lines and other labels, if there is room."""
+def _label_contours(axes: Axes, drawn: Any, name: str, taken: list[Floats]) -> None:
+    """Label each contour where it is farthest from edges and from `taken`, if there is room.
+
+    `taken` holds points of lines and labels as fractions of the axes; the new labels are added.
+    """
     to_axes = axes.transData + axes.transAxes.inverted()
-    taken = [to_axes.transform(np.column_stack(line)) for line in lines if line is not None]
     positions = []
     for segments in drawn.allsegs:
         points = np.concatenate([to_axes.transform(segment) for segment in segments or [np.empty((0, 2))]])
@@ -475,7 +485,7 @@ def _label_contours(axes: Axes, drawn: Any, name: str, lines: Sequence[tuple[Flo
                     apart = (points[:, None] - part[None]) / (1.4, 0.7)
                     room = np.minimum(room, np.hypot(apart[..., 0], apart[..., 1]).min(axis=1))
         best = int(np.argmax(room))
-        if room[best] > 0.035:
+        if room[best] > _LABEL_ROOM:
             taken.append(points[best : best + 1])
             positions.append(tuple(to_axes.inverted().transform(points[best])))
     if positions:
@@ -543,7 +553,7 @@ def _hatch(axes: Axes, table: Table, x: str, y: str) -> list[Patch]:
     """Hatch the cells of each flag; return the entries of the legend."""
     if "validity" not in table:
         return []
-    validity = np.asarray(_grid(table["validity"], table, y, x))
+    validity: NDArray[Any] = _grid(table["validity"], table, y, x)
     columns, rows = (_edges(table[axis].values) for axis in (x, y))
     entries = []
     with mpl.rc_context({"hatch.linewidth": 0.6}):
@@ -567,8 +577,8 @@ def _outline(cells: NDArray[np.bool_], columns: Floats, rows: Floats) -> Path:
         if row < cells.shape[0]:
             change = np.flatnonzero(np.diff(np.concatenate([[0], cells[row].astype(np.int8), [0]])))
             runs = set(zip(change[::2].tolist(), change[1::2].tolist(), strict=True))
-        for run in [run for run in open_runs if run not in runs]:
-            rectangles.append((*run, open_runs.pop(run), row))
+        ended = [run for run in open_runs if run not in runs]
+        rectangles += [(*run, open_runs.pop(run), row) for run in ended]
         for run in runs:
             open_runs.setdefault(run, row)
     paths = []

@@ -216,10 +216,8 @@ class Result:
             return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, parts), attrs)
 
         coords = {name: variable(name) for name in self.coordinates}
-        if self.labels and "case" not in keep:
-            attrs = {**self.attrs, "case": self.labels[where["case"]]}
-        else:
-            attrs = self.attrs
+        chosen = {"case": self.labels[where["case"]]} if self.labels and "case" not in keep else {}
+        attrs = {**self.attrs, **chosen}
         return Table(coords, {name: variable(name) for name in names}, attrs)
 
     def thinned(self, dim: str) -> slice:

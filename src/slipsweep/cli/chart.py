@@ -40,7 +40,7 @@ def chart(
             "--kind",
             "-k",
             metavar="KIND",
-            help="contours, modes, families, dimensionless or newmark; may be repeated (default: all the file can show).",
+            help="contours, modes, families, dimensionless or newmark; may be repeated (default: all that fit).",
         ),
     ] = None,
     at: Annotated[
@@ -136,16 +136,16 @@ def _axes(result: "Result", wish: _Wish, variable: str, x: tuple[str, ...], y: t
     free = [d for d in dims if d != "case" and result.axes[d].size > 1 and d not in named and d not in wish.at]
     chosen = []
     for asked, preferred in ((wish.y, y), (wish.x, x)):
-        name = asked or next((p for p in (*preferred, *free) if p in free), None)
-        if name is None:
+        taken = asked or next((p for p in (*preferred, *free) if p in free), None)
+        if taken is None:
             wide = [d for d, values in result.axes.items() if values.size > 1]
             raise InputError(
                 f"{result.path}: a chart needs two axes of two values or more that --at does not cut; "
                 f"{variable} has {', '.join(wide) or 'none'}"
             )
-        if name in free:
-            free.remove(name)
-        chosen.append(name)
+        if taken in free:
+            free.remove(taken)
+        chosen.append(taken)
     return chosen[1], chosen[0]
 
 
