@@ -42,7 +42,7 @@ HATCHES = {
     Validity.UPLIFT: "||||",
     Validity.LIMIT_UNDEFINED: "oo",
     Validity.FRICTION_NOT_DECAYING: "----",
-    Validity.EQ4_BELOW_YIELD: "..",
+    Validity.EQ4_BELOW_YIELD: ".",
     Validity.KD_NOT_POSITIVE: "xxx",
     Validity.NOT_RECOUPLED: "\\\\\\",
     Validity.FLEXIBLE_BLOCK: "++",
@@ -60,7 +60,7 @@ _LEAST, _MOST = 1e-3, 10.0
 _EQUAL = 1e-9
 
 #: What a contour's label takes: about that fraction of the axes to each side.
-_LABEL_ROOM = 0.05
+_LABEL_ROOM = 0.06
 
 _UPSLOPE = "0.6"
 _NOT_SHOWN = "gaps: upslope\n(negative)"
@@ -476,13 +476,12 @@ def _label_contours(axes: Axes, drawn: Any, name: str, taken: list[Floats]) -> N
         points = points[np.isfinite(points).all(axis=1)]
         if not len(points):
             continue
-        room = 0.7 * np.minimum(points, 1 - points).min(axis=1)
+        room = np.minimum(points, 1 - points).min(axis=1)
         for line in taken:
             near = line[np.isfinite(line).all(axis=1)]
-            # labels are wider than high
             for part in np.array_split(near, max(1, len(near) // 200)):
                 if len(part):
-                    apart = (points[:, None] - part[None]) / (1.4, 0.7)
+                    apart = points[:, None] - part[None]
                     room = np.minimum(room, np.hypot(apart[..., 0], apart[..., 1]).min(axis=1))
         best = int(np.argmax(room))
         if room[best] > _LABEL_ROOM:
@@ -491,7 +490,7 @@ def _label_contours(axes: Axes, drawn: Any, name: str, taken: list[Floats]) -> N
     if positions:
         labels = axes.clabel(drawn, manual=positions, fmt=lambda place: _value_label(name, 10**place), fontsize=8)
         for label in labels:
-            label.set_bbox({"facecolor": "black", "alpha": 0.45, "edgecolor": "none", "boxstyle": "round,pad=0.15"})
+            label.set_bbox({"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "boxstyle": "round,pad=0.15"})
 
 
 def _second_scale(axes: Axes, table: Table, side: str) -> None:
