@@ -386,7 +386,7 @@ def test_cases_alone_are_no_chart(folder: Path, tmp_path: Path, capsys: pytest.C
     rows = CASES.replace("theta", "amplitude = 4\nfrequency = 1\ntheta")
     path = made(folder, "rows", rows)
     assert main(["chart", str(path), "--kind", "contours", "-o", str(tmp_path / "a.png")]) == 2
-    assert "needs two axes" in capsys.readouterr().err
+    assert "no axis of two values or more (its dimensions: case, 2)" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -105,7 +105,12 @@ def contours(table: Table, lines: Boundaries, name: str, x: str, y: str) -> Figu
         # the result jumps at the mode limit: the lines of either side end there
         to_axes = axes.transData + axes.transAxes.inverted()
         shown = [threshold_line(line, table, x, y) for line in lines.values()]
-        taken = [to_axes.transform(np.column_stack(line)) for line in shown if line is not None]
+        # a few dozen points of a line say well enough where there is room
+        taken = [
+            to_axes.transform(np.column_stack(line)[:: math.ceil(line[0].size / 60)])
+            for line in shown
+            if line is not None
+        ]
         for side in _sides(table, lines, x, y):
             masked = np.ma.array(logs, mask=~side | np.isnan(logs))
             drawn = axes.contour(xs, ys, masked, places, colors="white", linewidths=0.9, linestyles="solid")

@@ -87,6 +87,11 @@ def chart(
         for paths in wanted.values():
             for path in paths:
                 store.check_output(path, overwrite)
+        if not any(values.size > 1 for dim, values in result.axes.items() if dim != "case"):
+            raise InputError(
+                f"{file}: no chart can be drawn: it has no axis of two values or more (its dimensions: "
+                f"{', '.join(f'{dim}, {values.size}' for dim, values in result.axes.items()) or 'none'})"
+            )
         result.nearest(wish.at)
         for name in wanted:
             try:
