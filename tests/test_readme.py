@@ -18,7 +18,7 @@ from slipsweep import spec
 from slipsweep.variables import VALIDITY_TEXT, VALUELESS, Validity
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = ("README.md", "docs/files.md", "docs/model.md", "docs/sweep-files.md")
+DOCUMENTS = ("README.md", "docs/charts.md", "docs/files.md", "docs/model.md", "docs/sweep-files.md")
 
 
 class Block(NamedTuple):
