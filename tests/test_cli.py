@@ -275,7 +275,7 @@ def test_simulate_writes_every_kind(tmp_path: Path) -> None:
     assert names(tmp_path) == set(outputs)
     with xr.open_dataset(tmp_path / "a.nc") as dataset:
         displacement = dataset["relative_displacement"]
-        assert displacement.dims == ("time",)
+        assert displacement.dims == dataset["time"].dims == ("instant",)
         with (tmp_path / "a.csv").open(newline="") as file:
             header, *rows = csv.reader(file)
         column = header.index("relative_displacement (m)")

@@ -18,15 +18,25 @@ from slipsweep import spec
 from slipsweep.variables import VALIDITY_TEXT, VALUELESS, Validity
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = ("README.md", "docs/charts.md", "docs/files.md", "docs/model.md", "docs/sweep-files.md")
+DOCUMENTS = (
+    "README.md",
+    "docs/README.md",
+    "docs/charts.md",
+    "docs/files.md",
+    "docs/model.md",
+    "docs/quickstart.md",
+    "docs/sweep-files.md",
+    "docs/tutorial.md",
+)
 
 
 class Block(NamedTuple):
-    """A fenced block: its language, the line it begins in, its text."""
+    """A fenced block: its language, the line it begins in, its text, and the file that the reader saves it as."""
 
     language: str
     line: int
     text: str
+    file: str
 
 
 def read(document: str) -> str:
@@ -36,8 +46,8 @@ def read(document: str) -> str:
 def blocks(document: str) -> list[Block]:
     text = read(document)
     return [
-        Block(match[1], text.count("\n", 0, match.start()) + 1, match[2])
-        for match in re.finditer(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        Block(match[2], text.count("\n", 0, match.start(2)) + 1, match[3], match[1] or "")
+        for match in re.finditer(r"(?:^<!-- file: (\S+) -->\n)?^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     ]
 
 
@@ -98,6 +108,8 @@ def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
             assert printed == (after.text if after and after.language == "text" else ""), where
         elif block.language == "toml":
             spec.parse(block.text, where)
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
 
 
 def test_the_two_commands_of_the_readme() -> None:
@@ -145,8 +157,16 @@ def five_cycles(experiment: dict[str, Any], frequency: float, **friction: Any) -
     return f"{result.permanent_displacement.item() * 1000:.0f}", f"{result.peak_relative_velocity.item():.3f}"
 
 
-def test_comparison_with_the_paper() -> None:
-    table = rows(section("README.md", "## Against the paper"))[1:]
+COMPARISONS = [document for document in DOCUMENTS if "\n## Against the paper\n" in read(document)]
+
+
+def test_the_tutorial_compares_with_the_paper() -> None:
+    assert "docs/tutorial.md" in COMPARISONS
+
+
+@pytest.mark.parametrize("document", COMPARISONS)
+def test_comparison_with_the_paper(document: str) -> None:
+    table = rows(section(document, "## Against the paper"))[1:]
     stated = {re.sub(r"\W+", " ", row[0]).strip(): (row[2].strip("*"), row[4].strip("*")) for row in table}
     assert len(stated) == len(table) == 10
 
@@ -172,9 +192,10 @@ def test_comparison_with_the_paper() -> None:
         assert values == expected, quantity
 
 
-def test_numbers_of_the_paper_sweep() -> None:
+@pytest.mark.parametrize("document", COMPARISONS)
+def test_numbers_of_the_paper_sweep(document: str) -> None:
     """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction above static of Table 2."""
-    text = " ".join(section("README.md", "## Against the paper").split())
+    text = " ".join(section(document, "## Against the paper").split())
     for experiment, frequency, decay_rate, delta_mu in ((STICK_SLIP, 1.8, 2.70, 0.09), (CONTINUOUS, 3.5, 2.30, 0.11)):
         displacement, velocity = five_cycles(experiment, frequency, decay_rate=decay_rate, delta_mu=delta_mu)
         assert f"{displacement} mm and {velocity} m/s" in text

@@ -1,8 +1,8 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
 `sweep` solves a grid, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one
-time history.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
-`SlidingMode` name the codes of the results.
+time history, `flags` takes a result's `validity` apart.  The model is that of Mendez, Romo
+and Botero (2012); `Validity` and `SlidingMode` name the codes of the results.
 """
 
 import importlib
@@ -14,6 +14,7 @@ from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
     from slipsweep.datasets import friction_parameters, simulate, sweep
+    from slipsweep.decoding import flags
 
 __all__ = [
     "InputError",
@@ -21,6 +22,7 @@ __all__ = [
     "SlidingMode",
     "Validity",
     "__version__",
+    "flags",
     "friction_parameters",
     "simulate",
     "sweep",
@@ -28,13 +30,18 @@ __all__ = [
 
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
 #: No submodule may have one of these names: importing it would put the module in the function's place.
-_LAZY = ("friction_parameters", "simulate", "sweep")
+_LAZY = {
+    "flags": "slipsweep.decoding",
+    "friction_parameters": "slipsweep.datasets",
+    "simulate": "slipsweep.datasets",
+    "sweep": "slipsweep.datasets",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module("slipsweep.datasets"), name)
+    value = getattr(importlib.import_module(_LAZY[name]), name)
     globals()[name] = value
     return value
 

@@ -6,7 +6,6 @@ know of another, turn axes into arrays and convert their units.  Every refusal i
 `InputError` of one line, ``FILE: key = VALUE: what is allowed``.
 """
 
-import difflib
 import json
 import math
 import re
@@ -22,6 +21,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from slipsweep.errors import InputError
 from slipsweep.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
+from slipsweep.suggest import did_you_mean
 from slipsweep.tables import Variable
 from slipsweep.variables import DEFAULT_RESULTS, DIMENSION_ORDER, PARAMETERS, RESULT_DTYPES, RESULTS
 
@@ -427,7 +427,7 @@ def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> No
     for number, name in enumerate(variables, 1):
         where = f"output.variables[entry {number}] = {_show(name)}"
         if name not in RESULTS:
-            raise InputError(f"{where}: unknown variable; {_suggest(name, tuple(RESULTS))}")
+            raise InputError(f"{where}: unknown variable; {did_you_mean(name, tuple(RESULTS))}")
         if name in parameters:
             raise InputError(f"{where}: it is an input of this sweep, hence a coordinate of the result already")
         if name in variables[: number - 1]:
@@ -501,7 +501,7 @@ def _words(error: ValidationError) -> str:
         else:
             key += f"[{'row' if key == 'cases' else 'entry'} {part + 1}]"
     if kind == "extra_forbidden":
-        return f"{key}: unknown key; {_suggest(str(location[-1]), _keys_beside(location))}"
+        return f"{key}: unknown key; {did_you_mean(str(location[-1]), _keys_beside(location))}"
     message = {"model_type": "must be a table", "list_type": "must be a list"}.get(kind, message)
     message = re.sub("^(Input|String|List) should", "must", message.removeprefix("Value error, "))
     message = message.removesuffix(" after validation, not 0")
@@ -519,11 +519,6 @@ def _keys_beside(location: tuple[int | str, ...]) -> tuple[str, ...]:
                 annotation = get_args(annotation)[0]
             table = annotation
     return tuple(table.model_fields)
-
-
-def _suggest(word: str, known: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(word, known, n=1)
-    return f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
 
 
 def _show(value: object) -> str:

@@ -5,6 +5,8 @@ Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 128 + n:
 What a command needs is imported inside it, so that `slipsweep --help` is there at once.
 """
 
+import os
+import re
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -14,7 +16,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import chart, info, run, simulate
+from slipsweep.cli import chart, export, info, run, simulate
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -24,6 +26,7 @@ app = typer.Typer(
 )
 app.command(epilog=run.EXAMPLE)(run.run)
 app.command(epilog=info.EXAMPLE)(info.info)
+app.command(epilog=export.EXAMPLE)(export.export)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 app.command(epilog=chart.EXAMPLE)(chart.chart)
 
@@ -62,10 +65,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         with _signals():
+            _plain_help(not sys.stdout.isatty() or bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb")
             # without standalone mode errors come back here instead of being boxed in several lines
             status: Any = app(arguments or ["--help"], prog_name="slipsweep", standalone_mode=False)
     except _UsageError as error:
-        return _fail(error.format_message(), 2)
+        return _fail(_words(error), 2)
     except InputError as error:
         return _fail(str(error), 2)
     except MemoryError:
@@ -76,6 +80,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("slipsweep: interrupted; nothing written", file=sys.stderr)
         return 128 + error.signum
     return status if isinstance(status, int) else 0
+
+
+def _plain_help(plain: bool) -> None:
+    """Have `--help` without boxes and colours where nobody sees them, and its examples unwrapped."""
+    app.rich_markup_mode = None if plain else "rich"
+    for command in app.registered_commands:
+        lines = (command.epilog or "").replace("\b", "").split()
+        examples = re.split(r" (?=slipsweep )", " ".join(lines))
+        # a paragraph after a backspace is left as it is; rich makes one line of what has no blank line in it
+        command.epilog = "\b\n" + "\n  ".join(examples) if plain else "\n\n".join(examples)
+
+
+def _words(error: Any) -> str:
+    """Put a usage error of typer, or of pydantic behind it, in our words."""
+    near = getattr(error, "possibilities", None)
+    if near:
+        return f"{error.message}; did you mean {near[0]}?"
+    message = error.format_message().replace("Value error, ", "")
+    if hasattr(error.__cause__, "errors"):
+        given: Any = error.__cause__.errors()
+        message = message.replace("Input should", f"{given[0]['input']!r} should").partition(", unable to parse")[0]
+    return message
 
 
 def _fail(message: str, status: int) -> int:

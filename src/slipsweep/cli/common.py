@@ -14,6 +14,12 @@ if TYPE_CHECKING:
     from slipsweep.store import Tally
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
+
+
+def examples(*lines: str) -> str:
+    """Put commands under a command's `--help`, a line each."""
+    return "\n\n".join(("Examples:", *lines))
 
 
 def echo_tally(tally: "Tally") -> None:
@@ -33,7 +39,7 @@ def echo_tally(tally: "Tally") -> None:
 
 
 @contextmanager
-def progress_bar(cells: int, quiet: bool) -> Iterator[Callable[[int], None] | None]:
+def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Callable[[int], None] | None]:
     """Yield what to call with a number of cells done: a progress bar, if there is a terminal to see it."""
     if quiet or not sys.stderr.isatty():
         yield None
@@ -43,7 +49,7 @@ def progress_bar(cells: int, quiet: bool) -> Iterator[Callable[[int], None] | No
 
     class Speed(ProgressColumn):
         def render(self, task: Task) -> str:
-            return f"{task.completed / task.elapsed:.3g} cells/s" if task.completed and task.elapsed else ""
+            return f"{task.completed / task.elapsed:.3g} {unit}/s" if task.completed and task.elapsed else ""
 
     columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

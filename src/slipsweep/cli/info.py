@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import echo_tally
+from slipsweep.cli.common import echo_tally, examples
 
-EXAMPLE = "Example: slipsweep info design_chart.nc"
+EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc")
 
 
 def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:

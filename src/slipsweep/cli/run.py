@@ -5,10 +5,14 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, echo_tally, progress_bar, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, echo_tally, examples, progress_bar, typed_command
 from slipsweep.errors import InputError
 
-EXAMPLE = "Example: slipsweep run sweeps/design_chart.toml -o design_chart.nc"
+EXAMPLE = examples(
+    "slipsweep run sweeps/design_chart.toml",
+    "slipsweep run sweeps/paper.toml -o paper.nc --overwrite",
+    "slipsweep run design_chart.nc -o again.nc --quiet",
+)
 
 
 def run(
@@ -29,7 +33,7 @@ def run(
     solver: Annotated[
         Literal["auto", "step", "cycle"] | None, typer.Option(help="Solver, over the sweep file's solver.method.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
     from slipsweep import spec, store

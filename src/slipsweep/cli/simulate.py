@@ -7,21 +7,28 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
 from slipsweep.errors import InputError
 from slipsweep.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
 
 if TYPE_CHECKING:
     from slipsweep.tables import Table
 
-EXAMPLE = "Example: slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o history.png"
+EXAMPLE = examples(
+    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8",
+    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o history.png -o history.csv",
+    "slipsweep simulate --theta 10 --mu-s 0.5 --displacement-amplitude 0.05 --frequency 2 --model newmark",
+)
 
 
 def simulate(
     theta: Annotated[float, typer.Option(help="Plane inclination, degrees.")],
     mu_s: Annotated[float, typer.Option(help="Static friction coefficient.")],
-    amplitude: Annotated[float, typer.Option(help="Peak ground acceleration, m/s².")],
     frequency: Annotated[float, typer.Option(help="Excitation frequency, Hz.")],
+    amplitude: Annotated[float | None, typer.Option(help="Peak ground acceleration, m/s².")] = None,
+    displacement_amplitude: Annotated[
+        float | None, typer.Option(help="Peak ground displacement, m, instead of the acceleration.")
+    ] = None,
     output: Annotated[
         list[Path] | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .csv, .png, .svg or .pdf; may be repeated."),
@@ -34,11 +41,15 @@ def simulate(
     decay_rate: Annotated[float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).")] = None,
     delta_mu: Annotated[float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).")] = None,
     minimum_friction: Annotated[float | None, typer.Option(help="Minimum friction μmin (default: Eq. 9).")] = None,
+    structure_frequency: Annotated[
+        float | None, typer.Option(help="Natural frequency of the structure, Hz, for the flexible_block flag.")
+    ] = None,
     model: Annotated[Literal["mendez", "newmark"], typer.Option(help="Model of the interface.")] = "mendez",
     rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
     recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
     g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
     points: Annotated[int, typer.Option(min=4, help="Points in time per cycle.")] = 512,
+    quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
     writers: dict[str, Callable[[Table, Path, bool], None]] = {
@@ -60,12 +71,14 @@ def simulate(
         theta=theta,
         mu_s=mu_s,
         amplitude=amplitude,
+        displacement_amplitude=displacement_amplitude,
         frequency=frequency,
         cycles=cycles,
         yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
         model=model,
         rise=rise,
         recoupling=recoupling,
@@ -74,6 +87,8 @@ def simulate(
     )
     for path in outputs:
         writers[path.suffix](table, path, overwrite)
+    if quiet:
+        return
     typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
@@ -87,7 +102,11 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
     from slipsweep import store
 
     store.write_table(
-        table, path, title="Time history of a sliding block", command=typed_command(), overwrite=overwrite
+        store.without_time_axis(table),
+        path,
+        title="Time history of a sliding block",
+        command=typed_command(),
+        overwrite=overwrite,
     )
 
 
