@@ -1,7 +1,7 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
-`sweep` solves a grid, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one
-time history.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
+`sweep` solves a grid, `limit_amplitude` is its inverse, `friction_parameters` gives the paper's
+Eqs. 7-11, `simulate` one time history.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
 `SlidingMode` name the codes of the results.
 """
 
@@ -13,7 +13,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.datasets import friction_parameters, simulate, sweep
+    from slipsweep.datasets import friction_parameters, limit_amplitude, simulate, sweep
 
 __all__ = [
     "InputError",
@@ -22,13 +22,14 @@ __all__ = [
     "Validity",
     "__version__",
     "friction_parameters",
+    "limit_amplitude",
     "simulate",
     "sweep",
 ]
 
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
 #: No submodule may have one of these names: importing it would put the module in the function's place.
-_LAZY = ("friction_parameters", "simulate", "sweep")
+_LAZY = ("friction_parameters", "limit_amplitude", "simulate", "sweep")
 
 
 def __getattr__(name: str) -> Any:

@@ -152,9 +152,9 @@ def solve(
             results[name][slab] = values
         if progress is not None:
             progress(math.prod(cells))
-    order = np.argsort([*moving, *scaling])
+    order = [[*moving, *scaling].index(axis) for axis in range(len(shape))]
     sizes = [shape[axis] for axis in (*moving, *scaling)]
-    return {name: np.ascontiguousarray(values.reshape(sizes).transpose(order)) for name, values in results.items()}
+    return {name: values.reshape(sizes).transpose(order).copy() for name, values in results.items()}
 
 
 def _two_dimensional(values: Floats, shape: tuple[int, ...], groups: tuple[list[int], list[int]]) -> Floats:
@@ -254,9 +254,7 @@ def _scan(
     return np.sort(np.concatenate([amplitudes, extra, beyond], axis=1), axis=1)
 
 
-def _zipped(
-    arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp] | None
-) -> dict[str, Floats]:
+def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp] | None) -> dict[str, Floats]:
     """Cells picked from two-dimensional inputs, one after the other; without columns the first."""
     picked = {}
     for name, values in arrays.items():

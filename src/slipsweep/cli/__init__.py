@@ -14,7 +14,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import info, run, simulate
+from slipsweep.cli import info, limit, run, simulate
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -24,6 +24,7 @@ app = typer.Typer(
 )
 app.command(epilog=run.EXAMPLE)(run.run)
 app.command(epilog=info.EXAMPLE)(info.info)
+app.command(epilog=limit.EXAMPLE)(limit.limit)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments
