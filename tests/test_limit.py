@@ -105,7 +105,7 @@ def test_target_in_the_jump_of_the_mode_limit() -> None:
 
 def test_gap_in_validity() -> None:
     """With mu_s > 1 the calibrated decay rate is not positive below the mode limit, from xi = mu_s^-1/2 on."""
-    given = {"theta": 10, "mu_s": 1.2, "frequency": 1.0, "yield_acceleration": 4.0}
+    given: dict[str, Any] = {"theta": 10, "mu_s": 1.2, "frequency": 1.0, "yield_acceleration": 4.0}
     limit = slipsweep.friction_parameters(10, 1.2, 1.0, yield_acceleration=4.0).limiting_acceleration.item()
     edge = limit / math.sqrt(1.2)
     amplitudes = np.linspace(4.0, edge * (1 - 1e-12), 20_001)
@@ -142,7 +142,7 @@ def test_statuses_without_a_limit() -> None:
 
 def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cells that share a dimension, scanned in slabs of a few, give the bits of single calls."""
-    case = {
+    case: dict[str, Any] = {
         "displacement": [0.01, 0.2, 0.05],
         "theta": [2.0, 6.0, 9.0],
         "mu_s": [0.3, 0.5, 0.4],
