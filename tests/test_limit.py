@@ -149,10 +149,12 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
         "frequency": [1.0, 2.0, 0.7],
     }
     monkeypatch.setattr("slipsweep.limits._SCANNED", 1024)
-    together = slipsweep.limit_amplitude(**{name: xr.DataArray(row, dims="case") for name, row in case.items()})
+    zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
+    together = slipsweep.limit_amplitude(**zipped)
     assert together.limit_amplitude.dims == ("case",)
     for number in range(3):
-        alone = slipsweep.limit_amplitude(**{name: row[number] for name, row in case.items()})
+        single: dict[str, Any] = {name: row[number] for name, row in case.items()}
+        alone = slipsweep.limit_amplitude(**single)
         for name in alone.data_vars:
             np.testing.assert_array_equal(together[name][number], alone[name])
 
