@@ -121,7 +121,12 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
     """Brute force: the first of 200 000 amplitudes of `sweep` that reaches the target lies just above the limit."""
     amplitudes = np.linspace(0.3, 20, 200_001)
     step = amplitudes[1] - amplitudes[0]
-    for theta, mu_s, options in ((5, 0.3, {}), (12, 0.5, {"recoupling": "integrate"}), (2, 0.4, {"rise": "literal"})):
+    cases: list[tuple[float, float, dict[str, Any]]] = [
+        (5, 0.3, {}),
+        (12, 0.5, {"recoupling": "integrate"}),
+        (2, 0.4, {"rise": "literal"}),
+    ]
+    for theta, mu_s, options in cases:
         moved = slipsweep.sweep(theta, mu_s, amplitudes, 1.5, **options).permanent_displacement.values
         targets = np.geomspace(1e-4, np.nanmax(moved), 60)[:-1]
         limits = slipsweep.limit_amplitude(targets, theta, mu_s, 1.5, **options).limit_amplitude.values
