@@ -34,7 +34,7 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
-    inputs = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
+    inputs: dict[str, Any] = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
     displacement = [1e-3, 0.05, 0.8]
     limits = slipsweep.limit_amplitude(displacement, **inputs, **options)
     assert limits.limit_amplitude.dims == ("theta", "mu_s", "frequency", "displacement")
