@@ -26,7 +26,9 @@ OPTIONS: list[dict[str, Any]] = [
 
 
 def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
-    given = {name: xr.DataArray(values, dims=name) if np.ndim(values) else values for name, values in inputs.items()}
+    given: dict[str, Any] = {
+        name: xr.DataArray(values, dims=name) if np.ndim(values) else values for name, values in inputs.items()
+    }
     return slipsweep.sweep(
         amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
     ).permanent_displacement
