@@ -30,7 +30,7 @@ AXES: dict[str, Any] = {
     "frequency": [0.5, 1.0, 2.0, 4.0, 8.0],
 }
 
-PUBLIC = ("friction_parameters", "simulate", "sweep")
+PUBLIC = ("friction_parameters", "limit_amplitude", "simulate", "sweep")
 
 
 @pytest.fixture

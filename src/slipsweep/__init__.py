@@ -1,8 +1,8 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
-`sweep` solves a grid, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one
-time history, `flags` takes a result's `validity` apart.  The model is that of Mendez, Romo
-and Botero (2012); `Validity` and `SlidingMode` name the codes of the results.
+`sweep` solves a grid, `limit_amplitude` is its inverse, `friction_parameters` gives the paper's
+Eqs. 7-11, `simulate` one time history, `flags` takes a result's `validity` apart.  The model is
+that of Mendez, Romo and Botero (2012); `Validity` and `SlidingMode` name the codes of the results.
 """
 
 import importlib
@@ -13,7 +13,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.datasets import friction_parameters, simulate, sweep
+    from slipsweep.datasets import friction_parameters, limit_amplitude, simulate, sweep
     from slipsweep.decoding import flags
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "__version__",
     "flags",
     "friction_parameters",
+    "limit_amplitude",
     "simulate",
     "sweep",
 ]
@@ -33,6 +34,7 @@ __all__ = [
 _LAZY = {
     "flags": "slipsweep.decoding",
     "friction_parameters": "slipsweep.datasets",
+    "limit_amplitude": "slipsweep.datasets",
     "simulate": "slipsweep.datasets",
     "sweep": "slipsweep.datasets",
 }

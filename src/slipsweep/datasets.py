@@ -14,6 +14,7 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.history import history_table
+from slipsweep.limits import AMPLITUDE_STEPS, limit_table
 from slipsweep.parameters import STEPS_PER_CYCLE
 from slipsweep.plans import Plan, Task, plan_friction_parameters, plan_sweep
 from slipsweep.tables import Table, Variable
@@ -249,6 +250,98 @@ def simulate(
         g=g,
     )
     return _dataset(table, {})
+
+
+def limit_amplitude(
+    displacement: Values,
+    theta: Values,
+    mu_s: Values,
+    frequency: Values,
+    *,
+    cycles: int = 10,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    structure_frequency: Values | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    g: float = 9.81,
+    maximum_amplitude: float | None = None,
+    amplitude_steps: int = AMPLITUDE_STEPS,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Smallest amplitude at which the permanent displacement reaches a tolerable one.
+
+    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at
+    least `displacement` at the amplitude returned, and less (or no value) at the
+    double-precision number before it.
+
+    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has
+    gaps where the model gives no value (`validity`), so that a displacement may be reached at
+    several amplitudes, or passed in a jump.  The smallest is returned: the first step of a scan
+    with ``u >= displacement`` holds it.  The scan runs from the yield acceleration to
+    `maximum_amplitude` in `amplitude_steps` equal ratios and has both sides of every change of
+    mode seen between two of its points; a peak of u within one sliding mode narrower than a
+    step can be missed.
+
+    Parameters
+    ----------
+    displacement : float, array or DataArray
+        Tolerable permanent displacement, m, > 0.
+    theta, mu_s, frequency : float, array or DataArray
+        These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".
+    maximum_amplitude : float, optional
+        Where the search ends, m/s²; by default 5 g.
+    amplitude_steps : int
+        Steps of the scan, 2 or more.
+    progress : callable, optional
+        Called with the number of cells just finished.
+
+    Returns
+    -------
+    Dataset
+        Dimensions theta, mu_s, frequency, then others, displacement last:
+
+        - `limit_amplitude`, m/s²; NaN where there is none.
+        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of
+          itself between neighbouring numbers, with and without a change of sliding mode),
+          3 after_gap (no value just below), 4 not_reached, 5 invalid (no value anywhere).
+        - `permanent_displacement`, m, and `sliding_mode` at the limit; more than
+          `displacement` where it is passed in a jump or after a gap.
+        - `validity` at the limit or, where there is none, at `maximum_amplitude`.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; or a displacement or a maximum amplitude that is not positive.
+    """
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+        "structure_frequency": structure_frequency,
+        "displacement": displacement,
+    }
+    table = limit_table(
+        **_plain(given),
+        cycles=cycles,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        waveform=waveform,
+        g=g,
+        maximum_amplitude=maximum_amplitude,
+        amplitude_steps=amplitude_steps,
+        progress=progress,
+    )
+    return _dataset(table, _brought(given, table.coords))
 
 
 def _plain(given: Mapping[str, Any]) -> dict[str, Any]:

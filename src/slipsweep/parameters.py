@@ -39,6 +39,8 @@ BOUNDS: dict[str, Bound] = {
     "amplitude": _NOT_NEGATIVE,
     "displacement_amplitude": _NOT_NEGATIVE,
     "frequency": _POSITIVE,
+    "displacement": _POSITIVE,
+    "maximum_amplitude": _POSITIVE,
     "yield_acceleration": Bound(-math.inf, False, math.inf, "a finite number"),
     "decay_rate": _NOT_NEGATIVE,
     "delta_mu": _NOT_NEGATIVE,

@@ -486,6 +486,36 @@ def _unit_factor(name: str, units: str | None, g: float) -> float:
         raise refusal from None
 
 
+def quantity(key: str, text: str, parameter: str, g: float) -> float:
+    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit.
+
+    Parameters
+    ----------
+    key : str
+        What to call it in errors.
+    text : str
+        A number and, unless it is in the parameter's own unit, a unit as in `Axis.units`.
+    parameter : str
+        A parameter (`slipsweep.variables.PARAMETERS`) of the same unit.
+    g : float
+        What "g" as a unit of acceleration stands for, m/s².
+
+    Raises
+    ------
+    InputError
+        It is not a number, or its unit does not convert.
+    """
+    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
+    own = PARAMETERS[parameter]["units"]
+    refusal = InputError(f"{key} = {_show(text)}: must be a number, with a unit that converts to {own} if in another")
+    if found is None:
+        raise refusal
+    try:
+        return float(found[1]) * _unit_factor(parameter, found[2] or None, g)
+    except InputError:
+        raise refusal from None
+
+
 # --------------------------------------------------------------------- errors into words
 
 

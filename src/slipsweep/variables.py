@@ -38,6 +38,31 @@ class Validity(IntFlag):
     FLEXIBLE_BLOCK = 128
 
 
+class LimitStatus(IntEnum):
+    """How a limit amplitude was found, or why there is none."""
+
+    REACHED = 0
+    AT_MODE_JUMP = 1
+    AT_JUMP = 2
+    AFTER_GAP = 3
+    NOT_REACHED = 4
+    INVALID = 5
+
+
+#: One line a status, for people (`slipsweep limit`).
+LIMIT_STATUS_TEXT: dict[LimitStatus, str] = {
+    LimitStatus.REACHED: "the displacement is reached in continuous growth",
+    LimitStatus.AT_MODE_JUMP: "it is passed in the jump where the sliding mode changes",
+    LimitStatus.AT_JUMP: "it is passed in a jump within one sliding mode",
+    LimitStatus.AFTER_GAP: "just below the limit the model gives no value",
+    LimitStatus.NOT_REACHED: "not reached up to the maximum amplitude, or before the values end (no limit)",
+    LimitStatus.INVALID: "the model gives no value at any amplitude (no limit)",
+}
+
+#: End of the search for a limit amplitude when none is given, in g.
+MAXIMUM_AMPLITUDE_IN_G = 5.0
+
+
 #: Flags under which a cell has no value (NaN, and sliding mode missing).
 VALUELESS = (
     Validity.STATICALLY_UNSTABLE
@@ -118,8 +143,30 @@ RESULTS: dict[str, dict[str, Any]] = {
     "decay_rate": {"units": "1", "long_name": "friction decay with loading rate (Eq. 6 at the peak)"},
 }
 
+#: The target of `limit_amplitude`.
+TOLERABLE_DISPLACEMENT: dict[str, Any] = {"units": "m", "long_name": "tolerable permanent displacement"}
+
+#: Results of `limit_amplitude`; sliding mode and validity go with them.
+LIMIT_RESULTS: dict[str, dict[str, Any]] = {
+    "limit_amplitude": {
+        "units": "m s-2",
+        "long_name": "smallest peak ground acceleration that reaches the tolerable displacement",
+        "ancillary_variables": "limit_status",
+    },
+    "limit_status": {
+        "long_name": "how the limit amplitude was found",
+        "flag_values": [int(status) for status in LimitStatus],
+        "flag_meanings": " ".join(status.name.lower() for status in LimitStatus),
+    },
+    "permanent_displacement": {
+        "units": "m",
+        "long_name": "permanent displacement, downslope, at the limit amplitude",
+        "ancillary_variables": "validity",
+    },
+}
+
 #: dtype of each result; everything else is float64.
-RESULT_DTYPES: dict[str, str] = {"sliding_mode": "int8", "validity": "int16"}
+RESULT_DTYPES: dict[str, str] = {"sliding_mode": "int8", "validity": "int16", "limit_status": "int8"}
 
 #: What `sweep` returns when nothing is asked for by name.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")

@@ -16,7 +16,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import chart, export, info, run, simulate
+from slipsweep.cli import chart, export, info, limit, run, simulate
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -27,6 +27,7 @@ app = typer.Typer(
 app.command(epilog=run.EXAMPLE)(run.run)
 app.command(epilog=info.EXAMPLE)(info.info)
 app.command(epilog=export.EXAMPLE)(export.export)
+app.command(epilog=limit.EXAMPLE)(limit.limit)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 app.command(epilog=chart.EXAMPLE)(chart.chart)
 
