@@ -1,7 +1,7 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
-`sweep` solves a grid, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one
-time history.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
+`sweep` solves a grid, `sweep_record` one under a recorded motion, `friction_parameters` gives the
+paper's Eqs. 7-11, `simulate` one time history.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
 `SlidingMode` name the codes of the results.
 """
 
@@ -13,28 +13,35 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.datasets import friction_parameters, simulate, sweep
+    from slipsweep.datasets import friction_parameters, simulate, sweep, sweep_record
+    from slipsweep.records import Record, read_record
 
 __all__ = [
     "InputError",
+    "Record",
     "RunError",
     "SlidingMode",
     "Validity",
     "__version__",
     "friction_parameters",
+    "read_record",
     "simulate",
     "sweep",
+    "sweep_record",
 ]
 
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
 #: No submodule may have one of these names: importing it would put the module in the function's place.
-_LAZY = ("friction_parameters", "simulate", "sweep")
+_LAZY = {
+    **dict.fromkeys(("friction_parameters", "simulate", "sweep", "sweep_record"), "slipsweep.datasets"),
+    **dict.fromkeys(("Record", "read_record"), "slipsweep.records"),
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module("slipsweep.datasets"), name)
+    value = getattr(importlib.import_module(_LAZY[name]), name)
     globals()[name] = value
     return value
 
