@@ -236,9 +236,7 @@ def _single(name: str, value: Any) -> float:
     return float(values)
 
 
-def checked(
-    parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]] = PARAMETERS
-) -> dict[str, Variable]:
+def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]] = PARAMETERS) -> dict[str, Variable]:
     """Every parameter as a float64 array with named dimensions, within its bounds, described as in `known`."""
     checked = {}
     for name, given in parameters.items():
@@ -261,12 +259,12 @@ def checked(
 def _amplitude(displacement_amplitude: Variable, frequency: Variable) -> Variable:
     """A = (2πf)² d."""
     sizes = grid_sizes({"displacement_amplitude": displacement_amplitude, "frequency": frequency})
-    aligned = aligned({"d": displacement_amplitude, "f": frequency}, sizes)
-    omega = 2.0 * math.pi * aligned["f"]
+    both = aligned({"d": displacement_amplitude, "f": frequency}, sizes)
+    omega = 2.0 * math.pi * both["f"]
     with np.errstate(over="ignore"):
-        values = omega * omega * aligned["d"]
+        values = omega * omega * both["d"]
     if not BOUNDS["amplitude"].holds(values).all():
-        worst = aligned["d"].max()
+        worst = both["d"].max()
         raise InputError(
             f"displacement_amplitude = {number_text(float(worst))}: (2 pi frequency)^2 of it is no finite number"
         )

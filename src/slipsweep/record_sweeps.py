@@ -14,7 +14,6 @@ import numpy as np
 from slipsweep import engine, threads
 from slipsweep.errors import InputError
 from slipsweep.kernels.record import RECORD_KERNEL, History
-from slipsweep.parameters import check_values
 from slipsweep.plans import aligned, check_memory, check_options, checked, grid_sizes, record_attributes
 from slipsweep.records import Record
 from slipsweep.tables import Table, Variable
@@ -71,28 +70,26 @@ def record_table(
 
     inputs = aligned(solved, sizes)
     inputs["amplitude"] = inputs.pop("scale")
-    cells = math.prod(sizes.values())
-    parts = []
-    for side in np.atleast_1d(polarity.values):
+    rows = engine.cell_inputs(inputs, len(sizes))
+    grid = engine.layout(tuple(sizes.values()), None, [*rows, np.ones((1,) * len(sizes))])
+    flat, options = tuple(map(engine.flat, rows)), problem.options(True)
+
+    def solve(side: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The record with a polarity: displacements and velocities, counts, flags."""
+        history = history_of(record, side)
+        cells = math.prod(sizes.values())
         motion, counts = np.empty((2, cells)), np.empty((len(RECORD_COUNTS), cells), np.int32)
         validity = np.empty(cells, np.int16)
-        rows = engine.cell_inputs(inputs, len(sizes))
-        grid = engine.layout(tuple(sizes.values()), None, [*rows, np.ones((1,) * len(sizes))])
-        flat, options, history = tuple(map(engine.flat, rows)), problem.options(True), history_of(record, side)
 
-        def work(
-            first: int,
-            last: int,
-            target: tuple[Any, ...] = (grid, flat, options, history, motion, counts, validity),
-        ) -> None:
-            grid, flat, options, history, motion, counts, validity = target
+        def work(first: int, last: int) -> None:
             RECORD_KERNEL(grid, first, last, flat, options, history, motion, counts, validity)
             if progress is not None:
                 progress(last - first)
 
         threads.spread(cells, work, _WORK_PER_CELL)
-        parts.append((motion, counts, validity))
+        return motion, counts, validity
 
+    parts = [solve(float(side)) for side in np.atleast_1d(polarity.values)]
     factor = coords["time_scale"]
     stretched = {
         "permanent_displacement": (np.stack([p[0][0] for p in parts], -1), 2),

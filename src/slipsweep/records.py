@@ -87,7 +87,7 @@ class Record:
         if not (math.isfinite(interval) and interval > 0.0):
             raise InputError(f"interval = {interval!r}: must be a finite number > 0")
         values = np.array(acceleration, np.float64)
-        return cls(np.arange(values.size) * interval, values, name)
+        return cls(_even(values.size, interval), values, name)
 
     def corrected(self, baseline: str) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
@@ -258,7 +258,11 @@ def _sampled(path: Path, values: Floats, points: int, interval: float) -> Floats
         raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
     if not (math.isfinite(interval) and interval > 0.0):
         raise InputError(f"{path}: sampling interval {interval}: must be > 0")
-    return np.arange(points) * interval
+    return _even(points, interval)
+
+
+def _even(points: int, interval: float) -> Floats:
+    return np.arange(points, dtype=np.float64) * interval
 
 
 def _shown(line: str) -> str:

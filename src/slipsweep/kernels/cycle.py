@@ -140,7 +140,7 @@ def onset(block: Block, x: float, top: float) -> float:
 
 @scalar
 def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> tuple[float, bool, bool]:
-    """The next leg of a slide on the rise from x to `top`: its end, and whether b follows Eq. 4 on it, and from its end.
+    """The next leg of a slide on the rise from x to `top`: its end, whether b follows Eq. 4 on it, and from there on.
 
     A leg ends where that changes, where E or D turns, and where D changes its sign.
     """

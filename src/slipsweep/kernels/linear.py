@@ -64,9 +64,7 @@ def follow_integrals(block: Block, x: float, slope: float, duration: float, side
     if not decays:
         early, late = late, early
     first = kept * (n + 0.5 * n_change) + g * tan_theta - largest * (n * whole + n_change * late)
-    second = (
-        0.5 * (kept * n + g * tan_theta) + kept * n_change / 6.0 - largest * (n * early + n_change * both)
-    )
+    second = 0.5 * (kept * n + g * tan_theta) + kept * n_change / 6.0 - largest * (n * early + n_change * both)
     return side * first * duration, side * second * duration * duration
 
 

@@ -246,7 +246,9 @@ def stick_slip_pulse(
 
 
 @scalar
-def follow_leg(block: Block, state: np.ndarray, x: float, end: float, slope: float, duration: float, side: float) -> None:
+def follow_leg(
+    block: Block, state: np.ndarray, x: float, end: float, slope: float, duration: float, side: float
+) -> None:
     """Eq. 4 along a part of a piece on one side of Üg = 0, the velocity of either sign."""
     if slope != 0.0:
         # V peaks where its rate D changes sign; E and D are monotone between breaks, from zero outwards
@@ -363,6 +365,7 @@ def mendez(cell: Cell, options: Options, history: History) -> Response:
         if following < waves:
             next_i, next_x, next_left = begin_of(history, scale, following, threshold)
         end = history.times[pieces] if following == waves else history.times[next_i + 1] - next_left
+        # not the block's own mode, which is missing where the harmonic motion of that peak would uplift
         if eq.sliding_mode(block.amplitude, threshold, block.limiting_acceleration) == CONTINUOUS:
             continuous += 1
             if state[VELOCITY] == 0.0:
@@ -456,14 +459,13 @@ def newmark(cell: Cell, options: Options, history: History) -> Response:
             while slides and i < pieces:
                 rate, after = values[i] - threshold, values[i + 1] - threshold
                 step = times[i + 1] - times[i]
-                taken = step
                 if rate < 0.0 or after < 0.0:
                     slope = (after - rate) / step
                     if rate > 0.0:
                         peak = max(peak, velocity - 0.5 * rate * rate / slope)
                     stop = held_stop(velocity, rate, slope)
                     if stop <= step:
-                        taken, slides = stop, False
+                        slides = False
                         displacement += (velocity + (0.5 * rate + slope * stop / 6.0) * stop) * stop
                         velocity = 0.0
                 if slides:
@@ -476,7 +478,6 @@ def newmark(cell: Cell, options: Options, history: History) -> Response:
                 peak = max(peak, velocity)
                 velocity = 0.0
                 i = pieces + 1
-    # a half wave during which the block slides on is a pulse all the same
     if slips:
         validity |= EQ4_BELOW_YIELD  # its yield value always governs
     return Response(scale * displacement, scale * peak, slips, pulses, 0, validity)
