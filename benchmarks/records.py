@@ -43,11 +43,11 @@ def pyslammer_displacement(motion: Any, parts: int) -> float:
 
 
 def pynewmark_displacement(motion: Any, g: float) -> float:
-    """pyNewmarkDisp's direct_newmark, m."""
+    """pyNewmarkDisp's direct_newmark, m: accelerations in g, of which it makes 9.81 m/s²."""
     from pynewmarkdisp.newmark import direct_newmark
 
     times = np.arange(motion.accel.size) * motion.dt
-    return float(direct_newmark(times, motion.accel, KY, g)["perm_disp"])
+    return float(direct_newmark(times, motion.accel, KY, 1.0)["perm_disp"]) * g / 9.81
 
 
 def agreement(found: dict[str, Any], g: float) -> str:
