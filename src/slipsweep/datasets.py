@@ -288,8 +288,8 @@ def sweep_record(
     time_scale : float or array
         Factor on its time, > 0: 2 makes it last twice as long.
     polarity : {1, -1}, list of these, or "both"
-        Sign of the record: 1 as recorded, positive acceleration of the plane upslope-driving the
-        block downslope as in the model; -1 reversed.
+        Factor on the record: 1 takes its positive accelerations for those that move the block
+        downslope, -1 its negative ones.
     yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         What replaces its estimate; by default each pulse has those of its own peak.
     model, rise, recoupling, g

@@ -122,7 +122,7 @@ RESULTS: dict[str, dict[str, Any]] = {
 RECORD_PARAMETERS: dict[str, dict[str, Any]] = {
     "scale": {"units": "1", "long_name": "scale factor of the recorded acceleration"},
     "time_scale": {"units": "1", "long_name": "factor on the time of the record"},
-    "polarity": {"units": "1", "long_name": "sign of the recorded acceleration, 1: downslope positive as recorded"},
+    "polarity": {"units": "1", "long_name": "sign that the recorded acceleration is taken with"},
 }
 
 #: Results of a record, beside the displacement, the velocity and the validity: -1 where there is no value.
