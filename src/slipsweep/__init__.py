@@ -1,8 +1,9 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
-`sweep` solves a grid, `limit_amplitude` is its inverse, `friction_parameters` gives the paper's
-Eqs. 7-11, `simulate` one time history, `flags` takes a result's `validity` apart.  The model is
-that of Mendez, Romo and Botero (2012); `Validity` and `SlidingMode` name the codes of the results.
+`sweep` solves a grid, `limit_amplitude` is its inverse, `sweep_record` solves one under a recorded
+motion, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history, `flags` takes
+a result's `validity` apart.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
+`SlidingMode` name the codes of the results.
 """
 
 import importlib
@@ -13,11 +14,13 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.datasets import friction_parameters, limit_amplitude, simulate, sweep
+    from slipsweep.datasets import friction_parameters, limit_amplitude, simulate, sweep, sweep_record
     from slipsweep.decoding import flags
+    from slipsweep.records import Record, read_record
 
 __all__ = [
     "InputError",
+    "Record",
     "RunError",
     "SlidingMode",
     "Validity",
@@ -25,18 +28,23 @@ __all__ = [
     "flags",
     "friction_parameters",
     "limit_amplitude",
+    "read_record",
     "simulate",
     "sweep",
+    "sweep_record",
 ]
 
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
 #: No submodule may have one of these names: importing it would put the module in the function's place.
 _LAZY = {
+    "Record": "slipsweep.records",
     "flags": "slipsweep.decoding",
     "friction_parameters": "slipsweep.datasets",
     "limit_amplitude": "slipsweep.datasets",
+    "read_record": "slipsweep.records",
     "simulate": "slipsweep.datasets",
     "sweep": "slipsweep.datasets",
+    "sweep_record": "slipsweep.datasets",
 }
 
 

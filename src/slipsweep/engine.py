@@ -128,12 +128,12 @@ def solve(
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
     results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
-    grid = _layout(shape, scaled, [*inputs, frequency])
+    grid = layout(shape, scaled, [*inputs, frequency])
     targets = Results(
         *(results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS)
     )
-    periods = _flat(1.0 / (2.0 * math.pi * frequency))
-    flat = tuple(_flat(values) for values in inputs)
+    periods = flat(1.0 / (2.0 * math.pi * frequency))
+    rows = tuple(flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in wanted)
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
@@ -144,7 +144,7 @@ def solve(
         kernel, table = CYCLE_KERNEL, np.empty(0)
 
     def work(first: int, last: int) -> None:
-        kernel(grid, first, last, flat, periods, options, table, targets)
+        kernel(grid, first, last, rows, periods, options, table, targets)
         if progress is not None:
             progress((last - first) * grid.frequencies)
 
@@ -173,12 +173,12 @@ def friction_parameters(
     def solve_slab(slab: tuple[slice, ...]) -> None:
         inputs = cell_inputs(cut(arrays, slab), len(shape))
         sizes = tuple(part.stop - part.start for part in slab)
-        grid = _layout(sizes, None, [*inputs, np.ones((1,) * len(shape))])
+        grid = layout(sizes, None, [*inputs, np.ones((1,) * len(shape))])
         cells = math.prod(sizes)
         parameters = np.empty((len(FRICTION_PARAMETERS), cells))
         codes = {name: np.empty(cells, RESULT_DTYPES[name]) for name in ("sliding_mode", "validity")}
-        flat = tuple(_flat(values) for values in inputs)
-        parameter_grid(grid, 0, cells, flat, options, parameters, codes["sliding_mode"], codes["validity"])
+        rows = tuple(flat(values) for values in inputs)
+        parameter_grid(grid, 0, cells, rows, options, parameters, codes["sliding_mode"], codes["validity"])
         found = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
         for name in wanted:
             results[name][slab] = found[name].reshape(sizes)
@@ -229,12 +229,12 @@ def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
         )
 
 
-def _flat(values: Array) -> Array:
+def flat(values: Array) -> Array:
     """One row of float64 as the kernels are compiled for; a copy only where there is no other way."""
     return np.require(values, np.float64, ["C", "ALIGNED", "WRITEABLE"]).reshape(-1)
 
 
-def _layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:
+def layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:
     """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart."""
     dimensions = [axis for axis in range(len(shape)) if axis != scaled]
     rows = [_strides(values.shape) for values in arrays] + [_strides(shape)]

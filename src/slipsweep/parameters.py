@@ -46,6 +46,8 @@ BOUNDS: dict[str, Bound] = {
     "delta_mu": _NOT_NEGATIVE,
     "minimum_friction": _POSITIVE,
     "structure_frequency": _POSITIVE,
+    "scale": _POSITIVE,
+    "time_scale": _POSITIVE,
     "g": _POSITIVE,
 }
 

@@ -122,7 +122,8 @@ class Plan:
         InputError
             The results do not fit in memory.
         """
-        _check_memory(self.tasks)
+        sizes = max((task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()))
+        check_memory(sizes, sum(task.nbytes for task in self.tasks))
         # all tasks cover the same cells: one of them counts
         return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None))
 
@@ -157,16 +158,16 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
         raise InputError("frequency: must be given")
     problem = check_options(**{name: value for name, value in given.items() if name not in PARAMETERS})
     wanted = check_variables(variables)
-    coords = _checked(parameters)
+    coords = checked(parameters)
     if "displacement_amplitude" in coords:
         coords["amplitude"] = _amplitude(coords["displacement_amplitude"], coords["frequency"])
     inputs = {name: variable for name, variable in coords.items() if name != "displacement_amplitude"}
-    sizes = _sizes(inputs)
+    sizes = grid_sizes(inputs)
 
     tasks = []
     motion = tuple(name for name in MOTION_RESULTS if name in wanted)
     if motion:
-        tasks.append(Task(engine.solve, problem, motion, sizes, _aligned(inputs, sizes)))
+        tasks.append(Task(engine.solve, problem, motion, sizes, aligned(inputs, sizes)))
     # one that was given is a coordinate already
     friction = tuple(name for name in FRICTION_PARAMETERS if name in wanted and name not in inputs)
     if friction:
@@ -183,7 +184,7 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
 def plan_friction_parameters(*, g: float, **given: Any) -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
     problem = check_options(g=g)
-    coords = _checked({name: values for name, values in given.items() if values is not None})
+    coords = checked({name: values for name, values in given.items() if values is not None})
     names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, "g": problem.g}
@@ -235,12 +236,12 @@ def _single(name: str, value: Any) -> float:
     return float(values)
 
 
-def _checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
-    """Every parameter as a float64 array with named dimensions, within its bounds."""
+def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]] = PARAMETERS) -> dict[str, Variable]:
+    """Every parameter as a float64 array with named dimensions, within its bounds, described as in `known`."""
     checked = {}
     for name, given in parameters.items():
         if isinstance(given, Variable):
-            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
+            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **known[name]})
         else:
             values = check_values(name, given)
             if values.ndim > 1:
@@ -248,7 +249,7 @@ def _checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
                     f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
                     "that names its dimensions"
                 )
-            variable = Variable((name,) if values.ndim else (), values, PARAMETERS[name])
+            variable = Variable((name,) if values.ndim else (), values, known[name])
         if variable.values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = variable
@@ -257,20 +258,20 @@ def _checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
 
 def _amplitude(displacement_amplitude: Variable, frequency: Variable) -> Variable:
     """A = (2πf)² d."""
-    sizes = _sizes({"displacement_amplitude": displacement_amplitude, "frequency": frequency})
-    aligned = _aligned({"d": displacement_amplitude, "f": frequency}, sizes)
-    omega = 2.0 * math.pi * aligned["f"]
+    sizes = grid_sizes({"displacement_amplitude": displacement_amplitude, "frequency": frequency})
+    both = aligned({"d": displacement_amplitude, "f": frequency}, sizes)
+    omega = 2.0 * math.pi * both["f"]
     with np.errstate(over="ignore"):
-        values = omega * omega * aligned["d"]
+        values = omega * omega * both["d"]
     if not BOUNDS["amplitude"].holds(values).all():
-        worst = aligned["d"].max()
+        worst = both["d"].max()
         raise InputError(
             f"displacement_amplitude = {number_text(float(worst))}: (2 pi frequency)^2 of it is no finite number"
         )
     return Variable(tuple(sizes), values, PARAMETERS["amplitude"])
 
 
-def _sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
+def grid_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
     """Dimensions of the grid in the order of the results, and their lengths."""
     sizes: dict[str, int] = {}
     for name, variable in variables.items():
@@ -281,7 +282,7 @@ def _sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
     return {dim: sizes[dim] for dim in ordered}
 
 
-def _aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arrays:
+def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arrays:
     """Plain arrays with all dimensions, of length 1 where they do not vary."""
     aligned = {}
     for name, variable in variables.items():
@@ -293,16 +294,14 @@ def _aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arr
 def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, Variable]) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
     own = {name: variable for name, variable in variables.items() if name in _FRICTION_INPUTS}
-    sizes = _sizes(own)
-    return Task(engine.friction_parameters, problem, names, sizes, _aligned(own, sizes))
+    sizes = grid_sizes(own)
+    return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
 
 
-def _check_memory(tasks: Sequence[Task]) -> None:
+def check_memory(sizes: Mapping[str, int], needed: int) -> None:
     """Refuse what memory cannot hold, before any of it is taken."""
-    needed = sum(task.nbytes for task in tasks)
     free = available_memory()
     if free is not None and needed > free:
-        sizes = max((task.sizes for task in tasks), key=lambda sizes: math.prod(sizes.values()))
         grid = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
         raise InputError(
             f"grid of {grid}: {math.prod(sizes.values()):.4g} cells take {size_text(needed)}, but {size_text(free)} "
@@ -329,3 +328,16 @@ def _attributes(title: str, problem: Problem) -> dict[str, Any]:
     if attributes["solver"] == "step":
         attributes |= {"rule": problem.rule, "steps_per_cycle": problem.steps_per_cycle}
     return attributes
+
+
+def record_attributes(problem: Problem, name: str, read: Mapping[str, str]) -> dict[str, Any]:
+    """What the results of a recorded motion say of themselves; `read` is how the record was read."""
+    attributes = {
+        "title": "Response of a rigid block to a recorded motion",
+        **_SOURCE,
+        "g": problem.g,
+        "model": problem.model,
+        "record": name,
+        **read,
+    }
+    return attributes | ({} if problem.model == "newmark" else {"rise": problem.rise, "recoupling": problem.recoupling})

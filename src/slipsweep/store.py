@@ -26,13 +26,16 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table, Variable
-from slipsweep.variables import SlidingMode, Validity
+from slipsweep.variables import RECORD_COUNTS, SlidingMode, Validity
 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
 BLOCK_CELLS = 4_000_000
 
 #: Cells in a chunk of a flag variable: read in well under a millisecond.
 CHUNK_CELLS = 2**18
+
+#: Results that are whole numbers, -1 where there is no value.
+_WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
 #: Dimensions that blocks and chunks cut last.  Charts are drawn over these two, and a whole
 #: frequency axis costs `sweep` hardly more than one frequency.
@@ -351,7 +354,7 @@ def _define(
         options: dict[str, Any] = {"contiguous": True}
         if kind.kind != "f" and dims:
             options = {"chunksizes": [chunks[dim] for dim in dims], "zlib": True, "complevel": 1, "shuffle": True}
-        fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name == "sliding_mode" else None
+        fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name in _WITH_MISSING else None
         variable = file.createVariable(name, kind, dims, fill_value=fill, **options)
         attributes = dict(result.attrs)
         if attributes.get("ancillary_variables") not in table:

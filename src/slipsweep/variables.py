@@ -165,6 +165,20 @@ LIMIT_RESULTS: dict[str, dict[str, Any]] = {
     },
 }
 
+#: Inputs that a recorded motion has beside the block's own.
+RECORD_PARAMETERS: dict[str, dict[str, Any]] = {
+    "scale": {"units": "1", "long_name": "scale factor of the recorded acceleration"},
+    "time_scale": {"units": "1", "long_name": "factor on the time of the record"},
+    "polarity": {"units": "1", "long_name": "sign that the recorded acceleration is taken with"},
+}
+
+#: Results of a record, beside the displacement, the velocity and the validity: -1 where there is no value.
+RECORD_COUNTS: dict[str, dict[str, Any]] = {
+    "number_of_slips": {"units": "1", "long_name": "number of slips that begin at rest"},
+    "stick_slip_pulses": {"units": "1", "long_name": "number of pulses in stick-slip mode"},
+    "continuous_pulses": {"units": "1", "long_name": "number of pulses in continuous mode"},
+}
+
 #: dtype of each result; everything else is float64.
 RESULT_DTYPES: dict[str, str] = {"sliding_mode": "int8", "validity": "int16", "limit_status": "int8"}
 

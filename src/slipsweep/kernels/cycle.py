@@ -121,21 +121,45 @@ def next_break(block: Block, x: float, end: float) -> float:
 
 
 @scalar
-def onset(block: Block, x: float) -> float:
-    """t1: where on the rise, from x on, the block at rest starts to slide (A if it does not)."""
+def onset(block: Block, x: float, top: float) -> float:
+    """t1: where on the rise from x to `top` the block at rest starts to slide (`top` if it does not)."""
     if block.rise == NEWMARK:
         return x
     for _ in range(_MOST_LEGS):
-        if x >= block.amplitude:
+        if x >= top:
             break
-        end = next_break(block, x, block.amplitude)
+        end = next_break(block, x, top)
         inner = x + _SLIVER * (end - x)
         if slip(block, inner) > 0.0:
             return x
         if slip(block, end) > 0.0:
             return slip_root(block, 0.0, inner, end)
         x = end
-    return block.amplitude
+    return top
+
+
+@scalar
+def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> tuple[float, bool, bool]:
+    """The next leg of a slide on the rise from x to `top`: its end, whether b follows Eq. 4 on it, and from there on.
+
+    A leg ends where that changes, where E or D turns, and where D changes its sign.
+    """
+    end, crosses = top, False
+    if block.rise != NEWMARK:
+        end = next_break(block, x, top)
+        inner = x + _SLIVER * (end - x)
+        asked, slope = response_and_slope(block, inner)
+        if block.rise != LITERAL:
+            follows = slope > 0.0 and (follows or asked >= b)
+        if not follows and slope > 0.0 and response(block, end) > b:
+            end = response_root(block, b, inner, end)
+            crosses = True
+        if follows and slip(block, inner) * slip(block, end) < 0.0:
+            end = slip_root(block, 0.0, inner, end)
+    if not follows and x < b < end:
+        end = b
+        crosses = False
+    return end, follows, follows or crosses
 
 
 @scalar
@@ -197,7 +221,7 @@ def rise(block: Block, velocity: float, legs: np.ndarray) -> tuple[float, float,
     for _ in range(_MOST_LEGS):
         if velocity <= 0.0:
             velocity = least = 0.0
-            began = onset(block, x)
+            began = onset(block, x, amplitude)
             record(legs, STICK, psi, phase(block, began), 0.0, 0.0, displacement)
             if began > x:
                 psi = phase(block, began)
@@ -206,22 +230,7 @@ def rise(block: Block, velocity: float, legs: np.ndarray) -> tuple[float, float,
                 break
             b = min(starting_acceleration(block, x), x)  # equal at an onset, but for rounding
             follows = literal
-        end = amplitude
-        crosses = False
-        if block.rise != NEWMARK:
-            end = next_break(block, x, amplitude)
-            inner = x + _SLIVER * (end - x)
-            asked, slope = response_and_slope(block, inner)
-            if not literal:
-                follows = slope > 0.0 and (follows or asked >= b)
-            if not follows and slope > 0.0 and response(block, end) > b:
-                end = response_root(block, b, inner, end)
-                crosses = True
-            if follows and slip(block, inner) * slip(block, end) < 0.0:
-                end = slip_root(block, 0.0, inner, end)
-        if not follows and x < b < end:
-            end = b
-            crosses = False
+        end, follows, follows_on = rising_leg(block, x, amplitude, b, follows)
         psi_end = phase(block, end)
         if follows:
             gained, moved = slip_integrals(block, psi, psi_end, 1.0)
@@ -247,7 +256,7 @@ def rise(block: Block, velocity: float, legs: np.ndarray) -> tuple[float, float,
         x, psi = end, psi_end
         if follows:
             b = response(block, x)
-        follows = follows or crosses
+        follows = follows_on
         if x >= amplitude:
             break
     return b, velocity, displacement, peak, least

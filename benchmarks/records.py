@@ -1,0 +1,137 @@
+"""Newmark's block on the ground motions that pySLAMMER ships: agreement, and the time of a million analyses.
+
+Agreement: every motion at ky = 0.1 g, against pySLAMMER's RigidAnalysis on the motion as it is and
+on the same straight lines sampled 4 and 16 times as finely, and against pyNewmarkDisp.  Time: a
+million (ky, motion, scale) analyses by slipsweep; pySLAMMER on a share of them, for each analysis.
+Writes records.md.
+"""
+
+import argparse
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.machine import arguments, measured_on, number, table
+from slipsweep import Record, sweep_record
+
+KY = 0.1
+
+#: Refinements of the agreement table, and the longest record that is refined 16 times.
+PARTS = (1, 4, 16)
+
+
+def motions() -> dict[str, Any]:
+    """pySLAMMER's sample ground motions by name."""
+    from pyslammer import sample_ground_motions
+
+    return dict(sorted(sample_ground_motions().items()))
+
+
+def refined(values: np.ndarray, parts: int) -> np.ndarray:
+    """The straight lines between samples, sampled `parts` times as finely."""
+    return np.interp(np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values)
+
+
+def pyslammer_displacement(motion: Any, parts: int) -> float:
+    """RigidAnalysis on a refined motion, m."""
+    from pyslammer import GroundMotion, RigidAnalysis
+
+    return float(RigidAnalysis(KY, GroundMotion(refined(motion.accel, parts), motion.dt / parts)).max_sliding_disp)
+
+
+def pynewmark_displacement(motion: Any, g: float) -> float:
+    """pyNewmarkDisp's direct_newmark, m: accelerations in g, of which it makes 9.81 m/s²."""
+    from pynewmarkdisp.newmark import direct_newmark
+
+    times = np.arange(motion.accel.size) * motion.dt
+    return float(direct_newmark(times, motion.accel, KY, 1.0)["perm_disp"]) * g / 9.81
+
+
+def agreement(found: dict[str, Any], g: float) -> str:
+    """A row a motion: the exact answer, and by how much the others differ."""
+    rows = []
+    for name, motion in found.items():
+        exact = float(
+            sweep_record(
+                Record.sampled(motion.accel * g, motion.dt), 0.0, 0.3, yield_acceleration=KY * g, model="newmark"
+            ).permanent_displacement
+        )
+        peers = [pyslammer_displacement(motion, parts) for parts in PARTS]
+        peers.append(pynewmark_displacement(motion, g))
+        differences = [f"{peer / exact - 1:+.1e}" if exact else number(peer) for peer in peers]
+        rows.append([name, f"{motion.dt:.4g}", motion.accel.size, f"{exact:.6f}", *differences])
+    header = ["motion", "Δt, s", "samples", "slipsweep, m", *(f"pySLAMMER, Δt/{n}" for n in PARTS), "pyNewmarkDisp"]
+    return table([text.replace("/1", "") if text.endswith("/1") else text for text in header], rows)
+
+
+def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
+    """Seconds for `analyses` by slipsweep, and for each of `share` by pySLAMMER."""
+    from pyslammer import RigidAnalysis
+
+    count = max(round((analyses / len(found)) ** 0.5), 1)
+    onsets, scales = np.geomspace(0.02, 0.4, count), np.geomspace(0.3, 3.0, count)
+    records = [Record.sampled(motion.accel * g, motion.dt) for motion in found.values()]
+
+    def ours() -> int:
+        done = 0
+        for record in records:
+            result = sweep_record(record, 0.0, 0.3, yield_acceleration=onsets * g, scale=scales, model="newmark")
+            done += result.permanent_displacement.size
+        return done
+
+    sweep_record(records[0], 0.0, 0.3, model="newmark")  # compiled before the clock starts
+    start = time.perf_counter()
+    done = ours()
+    taken = time.perf_counter() - start
+
+    rng = np.random.default_rng(1)
+    start = time.perf_counter()
+    for index in range(share):
+        # every motion in turn, so that the share has the samples of the whole
+        motion = list(found.values())[index % len(found)]
+        RigidAnalysis(rng.choice(onsets), motion, scale_factor=rng.choice(scales))
+    theirs = (time.perf_counter() - start) / share
+    each = taken / done
+    return table(
+        ["", "analyses", "seconds", "seconds an analysis"],
+        [
+            ["slipsweep", done, number(taken), number(each)],
+            ["pySLAMMER's loop", share, number(theirs * share), number(theirs)],
+            ["ratio", "", "", number(theirs / each)],
+        ],
+    )
+
+
+def main(given: argparse.Namespace) -> Path:
+    """Measure, and write the page."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the peers' own
+        from pyslammer.constants import G_EARTH
+
+        found = motions()
+        if given.tiny:
+            found = dict(list(found.items())[-2:-1])
+        agree = agreement(found, G_EARTH)
+        times = timing(found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found))
+    page = given.folder / "records.md"
+    page.write_text(
+        "# Newmark's block on recorded motions\n\n"
+        f"{measured_on(('numpy', 'numba', 'pyslammer', 'pynewmarkdisp'))} "
+        "Made by `python -m benchmarks.records`.\n\n"
+        f"## Agreement, ky = {KY} g\n\n"
+        "slipsweep is exact for the straight lines between samples. The others' columns are their relative\n"
+        "difference from it. pySLAMMER sees onset and stop at samples only: refined, it converges to the exact\n"
+        "answer. It does not run a block out that still slides as the record ends. pyNewmarkDisp integrates another\n"
+        "rule below yield, which no refinement removes.\n\n"
+        f"{agree}\n"
+        "## Time of (ky, motion, scale) analyses\n\n"
+        f"{times}"
+    )
+    return page
+
+
+if __name__ == "__main__":
+    print(main(arguments(__doc__)))

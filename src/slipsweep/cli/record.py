@@ -1,0 +1,145 @@
+"""`slipsweep record`: a recorded motion over a grid of blocks."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from slipsweep.cli.common import Overwrite, progress_bar, typed_command
+from slipsweep.errors import InputError
+from slipsweep.variables import VALIDITY_TEXT, Validity
+
+EXAMPLE = "Example: slipsweep record motion.AT2 --theta 5 --mu-s 0.3:0.6:4 --scale 0.5,1,2 -o motion.nc"
+
+#: More points than any axis of a record needs: a typing error, rather.
+_MOST_POINTS = 1_000_000
+
+
+def record(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV (time, acceleration), PEER AT2 or ESM text file.")],
+    theta: Annotated[str, typer.Option(metavar="VALUES", help="Plane inclinations, degrees: 5 or 0,5,10 or 0:20:41.")],
+    mu_s: Annotated[str, typer.Option(metavar="VALUES", help="Static friction coefficients.")],
+    scale: Annotated[str, typer.Option(metavar="VALUES", help="Factors on the acceleration.")] = "1",
+    time_scale: Annotated[str, typer.Option(metavar="VALUES", help="Factors on the time.")] = "1",
+    polarity: Annotated[Literal["1", "-1", "both"], typer.Option(help="Sign of the record, or both.")] = "1",
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="OUT.nc", help="File to write.")] = None,
+    overwrite: Overwrite = False,
+    units: Annotated[
+        Literal["m/s2", "g", "cm/s2", "gal"] | None,
+        typer.Option(help="Unit of the file's accelerations, where it does not name it."),
+    ] = None,
+    baseline: Annotated[
+        Literal["none", "mean", "linear"], typer.Option(help="What is taken off the accelerations.")
+    ] = "none",
+    file_format: Annotated[
+        Literal["auto", "csv", "at2", "esm"], typer.Option("--format", help="Format of the file.")
+    ] = "auto",
+    yield_acceleration: Annotated[
+        str | None, typer.Option(metavar="VALUES", help="Yield accelerations, m/s² (default: Coulomb's).")
+    ] = None,
+    decay_rate: Annotated[
+        str | None, typer.Option(metavar="VALUES", help="Friction decay λ (default: Eq. 6 at each pulse's peak).")
+    ] = None,
+    delta_mu: Annotated[
+        str | None, typer.Option(metavar="VALUES", help="Friction above static Δμ (default: Eqs. 10, 11).")
+    ] = None,
+    minimum_friction: Annotated[
+        str | None, typer.Option(metavar="VALUES", help="Minimum friction μmin (default: Eq. 9).")
+    ] = None,
+    model: Annotated[Literal["mendez", "newmark"], typer.Option(help="Model of the interface.")] = "mendez",
+    rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
+    recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
+    g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+) -> None:
+    """Compute the response to a recorded motion, over a grid of blocks and scales."""
+    texts = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "scale": scale,
+        "time_scale": time_scale,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+    }
+    given = {name: numbers(name, text) for name, text in texts.items() if text is not None}
+
+    from slipsweep import store
+    from slipsweep.records import read_record
+    from slipsweep.resources import size_text
+
+    motion = read_record(file, units=units, baseline=baseline, file_format=file_format)
+    if output is not None:
+        store.check_output(output, overwrite)
+
+    import numpy as np
+
+    from slipsweep.record_sweeps import record_table
+
+    sizes = [len(values) for name, values in given.items() if isinstance(values, list) and name != "time_scale"]
+    cells = math.prod(sizes) * (2 if polarity == "both" else 1)
+    with progress_bar(cells, quiet) as progress:
+        table = record_table(
+            motion,
+            **given,
+            polarity=polarity if polarity == "both" else int(polarity),
+            model=model,
+            rise=rise,
+            recoupling=recoupling,
+            g=g,
+            progress=progress,
+        )
+    if output is not None:
+        store.write_table(table, output, title=table.attrs["title"], command=typed_command(), overwrite=overwrite)
+    if quiet:
+        return
+    peak = float(np.abs(motion.acceleration).max())
+    typer.echo(
+        f"{file}: {motion.times.size} samples over {motion.times[-1] - motion.times[0]:.6g} s, "
+        f"largest acceleration {peak:.6g} m/s2"
+    )
+    displacement, validity = table["permanent_displacement"].values, table["validity"].values
+    count = displacement.size
+    if count == 1:
+        typer.echo(f"permanent displacement  {displacement.item():.6g} m")
+        typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
+    else:
+        grid = " x ".join(f"{size} {dim}" for dim, size in table.sizes.items())
+        typer.echo(f"{count} cells ({grid})")
+        if np.isfinite(displacement).any():
+            low, high = np.nanmin(displacement), np.nanmax(displacement)
+            typer.echo(f"permanent displacement  {low:.6g} to {high:.6g} m")
+            typer.echo(f"peak relative velocity  up to {np.nanmax(table['peak_relative_velocity'].values):.6g} m/s")
+    for name in ("number_of_slips", "stick_slip_pulses", "continuous_pulses"):
+        values = table[name].values
+        if (values >= 0).any():
+            low, high = values[values >= 0].min(), values.max()
+            typer.echo(f"{name.replace('_', ' '):<24}{low}" + (f" to {high}" if high > low else ""))
+    for flag in Validity:
+        share = np.count_nonzero(validity & int(flag)) / count
+        if share:
+            typer.echo(f"flag {(flag.name or '').lower():<24}{share:7.2%}  {VALIDITY_TEXT[flag]}")
+    if output is not None:
+        typer.echo(f"{output}  {size_text(output.stat().st_size)}")
+
+
+def numbers(name: str, text: str) -> float | list[float]:
+    """The values of an option: one number, a list ``a,b,c``, or ``start:stop:num``, evenly spaced."""
+    option = f"--{name.replace('_', '-')}"
+    try:
+        if ":" in text:
+            start, stop, num = text.split(":")
+            count = int(num)
+            if not 2 <= count <= _MOST_POINTS:
+                raise ValueError
+            low, high = float(start), float(stop)
+            return [low + (high - low) * i / (count - 1) for i in range(count)]
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(
+            f"{option} {text}: must be a number, numbers with commas between, or start:stop:num "
+            f"(num a whole number from 2 to {_MOST_POINTS})"
+        ) from None
+    return values if "," in text else values[0]
