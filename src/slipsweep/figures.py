@@ -7,11 +7,9 @@ Figures are made without pyplot, hence without a window system or state between 
 import numpy as np
 from matplotlib.figure import Figure
 
+from slipsweep.style import BLUE, VERMILION, caption
 from slipsweep.tables import Table
-from slipsweep.variables import HISTORY, PARAMETERS
-
-# Okabe and Ito's colours: told apart with any kind of colour vision, and in grey
-_BLUE, _VERMILION = "#0072B2", "#D55E00"
+from slipsweep.variables import HISTORY
 
 
 def history(table: Table) -> Figure:
@@ -33,19 +31,19 @@ def history(table: Table) -> Figure:
     values = {name: table[name].values for name in ("time", *HISTORY)}
     time = values["time"]
 
-    accelerations.plot(time, values["ground_acceleration"], color=_BLUE, label="plane")
-    accelerations.plot(time, values["block_acceleration"], color=_VERMILION, linestyle="--", label="block")
+    accelerations.plot(time, values["ground_acceleration"], color=BLUE, label="plane")
+    accelerations.plot(time, values["block_acceleration"], color=VERMILION, linestyle="--", label="block")
     accelerations.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
     accelerations.set_ylabel("acceleration\n(m/s²)")
 
-    friction.plot(time, values["friction_coefficient"], color=_VERMILION)
+    friction.plot(time, values["friction_coefficient"], color=VERMILION)
     friction.set_ylabel("friction\ncoefficient")
 
-    velocity.plot(time, values["relative_velocity"], color=_VERMILION)
+    velocity.plot(time, values["relative_velocity"], color=VERMILION)
     velocity.set_ylabel("relative\nvelocity (m/s)")
 
     metres = float(np.abs(values["relative_displacement"]).max()) >= 1.0
-    displacement.plot(time, values["relative_displacement"] * (1 if metres else 1000), color=_VERMILION)
+    displacement.plot(time, values["relative_displacement"] * (1 if metres else 1000), color=VERMILION)
     displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
     displacement.set_xlabel("time (s)")
 
@@ -54,33 +52,5 @@ def history(table: Table) -> Figure:
         axes.margins(x=0)
         axes.grid(color="0.9")
     figure.align_ylabels()
-    figure.supxlabel(_caption(table), fontsize="small")
+    figure.supxlabel(caption(table), fontsize="small")
     return figure
-
-
-#: Symbols of the paper, for captions.
-_SYMBOLS = {
-    "theta": "θ",
-    "mu_s": "μs",
-    "amplitude": "A",
-    "displacement_amplitude": "d",
-    "frequency": "f",
-    "yield_acceleration": "Üy",
-    "decay_rate": "λ",
-    "delta_mu": "Δμ",
-    "minimum_friction": "μmin",
-    "structure_frequency": "fs",
-}
-
-
-def _caption(table: Table) -> str:
-    units = {"degree": "°", "m s-2": " m/s²", "1": ""}
-    parts = []
-    for name, symbol in _SYMBOLS.items():
-        if name in table.coords:
-            unit = PARAMETERS[name]["units"]
-            parts.append(f"{symbol} = {table[name].item():.4g}{units.get(unit, f' {unit}')}")
-    attributes = table.attrs
-    options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
-    shaking = f"{attributes['cycles']} cycles of a {attributes['waveform']}"
-    return f"{', '.join(parts)}\nmodel: {', '.join(options)}; {shaking}"

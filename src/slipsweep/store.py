@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, RunError
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
-from slipsweep.tables import Table
+from slipsweep.tables import Table, Variable
 from slipsweep.variables import SlidingMode, Validity
 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
@@ -273,6 +273,23 @@ def write_table(table: Table, path: Path, *, title: str, command: str, overwrite
         _fill(file, table, {})
 
 
+def without_time_axis(table: Table) -> Table:
+    """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
+
+    A dimension `time` is a time axis of the CF conventions (4.4), whose values are dates.  Seconds
+    since the shaking began are none, and given a made-up date they would be read back as dates.
+    """
+    dims = {"time": "instant"}
+    coords, data_vars = (
+        {
+            name: Variable(tuple(dims.get(dim, dim) for dim in array.dims), array.values, array.attrs)
+            for name, array in arrays.items()
+        }
+        for arrays in (table.coords, table.data_vars)
+    )
+    return Table(coords, data_vars, table.attrs)
+
+
 def _check_size(spec: SweepSpec, path: Path, block_cells: int) -> None:
     """Refuse a grid whose file cannot fit on the disk, or whose blocks cannot fit in memory."""
     free = shutil.disk_usage(path.parent).free
@@ -405,6 +422,35 @@ class Contents:
     tally: Tally
 
 
+@contextmanager
+def open_result(path: Path) -> Iterator[netCDF4.Dataset]:
+    """Open a file of slipsweep to read from.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is not netCDF, or was not written by slipsweep.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    try:
+        file = netCDF4.Dataset(path)
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
+    with file:
+        if not str(getattr(file, "source", "")).startswith("slipsweep "):
+            raise InputError(f"{path}: not written by slipsweep")
+        yield file
+
+
+def coordinate_names(file: netCDF4.Dataset) -> set[str]:
+    """Names of a file's coordinate variables, auxiliary and scalar ones among them."""
+    named = (
+        variable.coordinates.split() for variable in file.variables.values() if "coordinates" in variable.ncattrs()
+    )
+    return {*file.dimensions, *itertools.chain.from_iterable(named)}
+
+
 def read_contents(path: Path) -> Contents:
     """Describe a file of slipsweep; memory stays small whatever its size.
 
@@ -413,30 +459,19 @@ def read_contents(path: Path) -> Contents:
     InputError
         It cannot be read, is not netCDF, or was not written by slipsweep.
     """
-    try:
-        nbytes = path.stat().st_size
-        with netCDF4.Dataset(path) as file:
-            attributes = {name: str(file.getncattr(name)) for name in file.ncattrs()}
-            if not attributes.get("source", "").startswith("slipsweep "):
-                raise InputError(f"{path}: not written by slipsweep")
-            named = (
-                variable.coordinates.split()
-                for variable in file.variables.values()
-                if "coordinates" in variable.ncattrs()
-            )
-            coordinates = {*file.dimensions, *itertools.chain.from_iterable(named)}
+    with open_result(path) as file:
+        try:
+            coordinates = coordinate_names(file)
             return Contents(
                 path,
-                nbytes,
-                attributes,
+                path.stat().st_size,
+                {name: str(file.getncattr(name)) for name in file.ncattrs()},
                 {name: _values_text(file[name]) for name in file.variables if name in coordinates},
                 {name: _variable_text(file[name]) for name in file.variables if name not in coordinates},
                 _count(file),
             )
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
 
 
 def _count(file: netCDF4.Dataset) -> Tally:

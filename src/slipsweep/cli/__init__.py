@@ -14,7 +14,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import info, run, simulate
+from slipsweep.cli import explore, info, run, simulate
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -25,6 +25,7 @@ app = typer.Typer(
 app.command(epilog=run.EXAMPLE)(run.run)
 app.command(epilog=info.EXAMPLE)(info.info)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
+app.command(epilog=explore.EXAMPLE)(explore.explore)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments
 _UsageError: Any = typer.BadParameter.__mro__[1]
