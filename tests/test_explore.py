@@ -266,7 +266,7 @@ def test_further_dimensions_and_ground_displacement(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (SWEEP.replace("num = 23", "num = 1").replace("stop = 12", "stop = 1"), "no map to draw"),
+        (SWEEP.replace("start = 1\nstop = 12\nnum = 23", "values = [3]"), "no map to draw"),
         (SWEEP + 'variables = ["sliding_mode"]', "holds no permanent_displacement"),
         (
             "[[cases]]\ntheta = 5\nmu_s = 0.4\namplitude = 4\nfrequency = 2\n[[cases]]\ntheta = 5\nmu_s = 0.5\n"
