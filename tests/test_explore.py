@@ -470,7 +470,7 @@ def test_history_is_of_the_cell_that_was_chosen(opened: Any, result: Path) -> No
     point(opened, 0.4, 0.25, click=True)
     wait_for(opened, "document.getElementById('readout-title').textContent !== ''")
     index = json.loads(opened.execute_script("return document.getElementById('readout').dataset.index"))
-    axes = [[0, 5, 20], [0.3, 0.5], np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)]
+    axes: list[Any] = [[0, 5, 20], [0.3, 0.5], np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)]
     theta, mu_s, amplitude, frequency = (float(axis[at]) for axis, at in zip(axes, index, strict=True))
     assert (theta, mu_s) == (5, 0.3)
     note = opened.execute_script("return document.getElementById('history-note').textContent")

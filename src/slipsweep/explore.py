@@ -256,12 +256,11 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     for at in np.ndindex(*left.values()):
         cell = {dim: int(keep[dim][i]) for dim, i in zip(keep, at, strict=True)}
         case = {name: variable.values[tuple(cell[dim] for dim in variable.dims)] for name, variable in inputs.items()}
+        given: dict[str, Any] = {name: float(value) for name, value in case.items()}
+        given |= {"frequency": 1.0 / (2.0 * math.pi), "cycles": cycles, **options}
         history = history_table(
-            **{name: float(value) for name, value in case.items()},
-            frequency=1.0 / (2.0 * math.pi),
             times=phase,
-            cycles=cycles,
-            **options,
+            **given,
         )
         columns = np.array([history[name].values for name in _HISTORY])
         if np.isfinite(columns).all():
@@ -457,7 +456,6 @@ def _decades(excerpt: Excerpt) -> tuple[int, int]:
 def _figures(excerpt: Excerpt) -> dict[str, Any]:
     """The map and the three panels of a history, empty; `explore.js` fills them."""
     from bokeh.models import (
-        ColorBar,
         ColumnDataSource,
         CustomJS,
         FixedTicker,
@@ -465,13 +463,14 @@ def _figures(excerpt: Excerpt) -> dict[str, Any]:
         PrintfTickFormatter,
         Range1d,
     )
+    from bokeh.models.annotations import ColorBar
     from bokeh.palettes import viridis
     from bokeh.plotting import figure
 
     up, across = excerpt.map_dims
     low, high = _decades(excerpt)
     log = {dim: _log_spaced(_values(excerpt, dim)) for dim in excerpt.map_dims}
-    chart = figure(
+    chart: Any = figure(  # its properties take more than their annotations say
         name="map",
         frame_width=_MAP_SIZE[0],
         frame_height=_MAP_SIZE[1],
@@ -479,8 +478,8 @@ def _figures(excerpt: Excerpt) -> dict[str, Any]:
         y_axis_type="log" if log[up] else "linear",
         x_axis_label=axis_label(across),
         y_axis_label=axis_label(up),
-        x_range=Range1d(1, 2, name="x_range"),
-        y_range=Range1d(1, 2, name="y_range"),
+        x_range=Range1d(start=1, end=2, name="x_range"),
+        y_range=Range1d(start=1, end=2, name="y_range"),
         tools="pan,wheel_zoom,box_zoom,reset,save",
         active_scroll=None,
     )
@@ -490,7 +489,7 @@ def _figures(excerpt: Excerpt) -> dict[str, Any]:
     mapper = LogColorMapper(
         palette=viridis(3 * (high - low)), low=10.0**low, high=10.0**high, nan_color="rgba(0, 0, 0, 0)"
     )
-    place = {"x": "x", "y": "y", "dw": "dw", "dh": "dh"}
+    place: dict[str, Any] = {"x": "x", "y": "y", "dw": "dw", "dh": "dh"}
     corner: dict[str, Any] = {"x": [1.0], "y": [1.0], "dw": [1.0], "dh": [1.0]}
     colours = ColumnDataSource({"image": [np.zeros((1, 1), np.float32)], **corner}, name="colours")
     marks = ColumnDataSource({"image": [np.zeros((1, 1), np.uint32)], **corner}, name="marks")
@@ -520,7 +519,7 @@ def _figures(excerpt: Excerpt) -> dict[str, Any]:
         ("velocity", "rel. velocity (m/s)", 130),
         ("displacement", "rel. displacement (mm)", 155),
     ):
-        panel = figure(
+        panel: Any = figure(
             name=name,
             width=480,
             height=height,
