@@ -246,7 +246,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     keep = {dim: evenly(length, left[dim]) for dim, length in sizes.items()}
     if math.prod(left.values()) * each > most_bytes:
         return None
-    options = {
+    options: dict[str, Any] = {
         name: table.attrs[name] for name in ("model", "rise", "recoupling", "waveform", "g") if name in table.attrs
     }
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
@@ -257,7 +257,8 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
         cell = {dim: int(keep[dim][i]) for dim, i in zip(keep, at, strict=True)}
         case = {name: variable.values[tuple(cell[dim] for dim in variable.dims)] for name, variable in inputs.items()}
         given: dict[str, Any] = {name: float(value) for name, value in case.items()}
-        given |= {"frequency": 1.0 / (2.0 * math.pi), "cycles": cycles, **options}
+        given |= options
+        given |= {"frequency": 1.0 / (2.0 * math.pi), "cycles": cycles}
         history = history_table(
             times=phase,
             **given,
