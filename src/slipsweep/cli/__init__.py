@@ -16,7 +16,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import chart, export, info, limit, record, run, simulate
+from slipsweep.cli import chart, explore, export, info, limit, record, run, simulate
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -31,6 +31,7 @@ app.command(epilog=limit.EXAMPLE)(limit.limit)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 app.command(epilog=chart.EXAMPLE)(chart.chart)
 app.command(epilog=record.EXAMPLE)(record.record)
+app.command(epilog=explore.EXAMPLE)(explore.explore)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments
 _UsageError: Any = typer.BadParameter.__mro__[1]

@@ -1,0 +1,50 @@
+"""`slipsweep explore`: a result as a page for the browser."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from slipsweep.cli.common import Overwrite
+from slipsweep.errors import InputError
+
+EXAMPLE = "Example: slipsweep explore design_chart.nc -o design_chart.html"
+
+_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9}
+
+
+def explore(
+    file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep run wrote.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="PAGE.html", help="Page to write (default: the file's name, .html)."),
+    ] = None,
+    overwrite: Overwrite = False,
+    size: Annotated[
+        str, typer.Option(metavar="SIZE", help="The most that the page may take; larger results are thinned to it.")
+    ] = "25MB",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary.")] = False,
+) -> None:
+    """Write one page, for any browser, to explore a result in: no server, no network."""
+    from slipsweep import explore as pages
+    from slipsweep.resources import size_text
+
+    path = output or file.with_suffix(".html")
+    nbytes = parse_size(size)
+    excerpt = pages.write_page(file, path, size=nbytes, overwrite=overwrite)
+    if quiet:
+        return
+    shown = excerpt.table["permanent_displacement"].sizes
+    for dim, length in excerpt.lengths.items():
+        thinned = "" if shown[dim] == length else f"  thinned: {shown[dim]} of {length} (more with --size)"
+        typer.echo(f"{dim:<24}{shown[dim]} values{thinned}")
+    typer.echo(f"{path}  {size_text(path.stat().st_size)}")
+
+
+def parse_size(text: str) -> int:
+    """Return the bytes in a size such as ``25MB``; InputError for anything else."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(kB|MB|GB)", text.strip())
+    if not found:
+        raise InputError(f"--size = {text!r}: must be a number and kB, MB or GB, such as 25MB")
+    return int(float(found[1]) * _UNITS[found[2]])
