@@ -126,6 +126,8 @@ the events, is in [speed_vs_error.md](../benchmarks/results/speed_vs_error.md).
 Just above yield the displacement goes with (A − Üy)², so that a last digit of A, of μs or of θ moves
 it by twice that digit over A/Üy − 1. "One ulp" is how far the exact displacement moves, relatively, when each of the
 three is moved by its last digit, added up; no solver that is given doubles can promise less.
+Every other hard place, with the conditioning there and the errors of each solver in units of it, is in
+[hard-cases.md](hard-cases.md).
 
 {near_yield()}
 ## The model's own choices

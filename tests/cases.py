@@ -1,13 +1,18 @@
 """The reference cases of data/cases.csv, and how to ask `slipsweep.sweep` for many of them at once."""
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import pi, radians, tan
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
+
+import slipsweep
+
+DATA = Path(__file__).parent / "data"
 OPTIONAL_INPUTS = ("yield_acceleration", "decay_rate", "delta_mu")
 PARAMETERS = ("theta", "mu_s", "amplitude", "frequency")
 
@@ -32,6 +37,7 @@ class Case:
     sliding_mode: int
     recoupled: bool
     eq4_below_yield: bool
+    g: float = 9.81
 
     def __str__(self) -> str:
         return f"{self.case}-{self.category}-{self.model}"
@@ -39,8 +45,8 @@ class Case:
     @property
     def options(self) -> dict[str, Any]:
         """Everything but the four parameters."""
-        options = {"model": self.model, "rise": self.rise, "recoupling": self.recoupling, "cycles": self.cycles}
-        return {**options, **dict(self.given)}
+        options = {"model": self.model, "rise": self.rise, "recoupling": self.recoupling}
+        return {**options, "cycles": self.cycles, "g": self.g, **dict(self.given)}
 
     @property
     def displacement_scale(self) -> float:
@@ -55,25 +61,29 @@ class Case:
     @property
     def uplift(self) -> bool:
         """Whether A tan(theta) >= g, where the model gives no value (cases.csv has one such line)."""
-        return self.model == "mendez" and self.amplitude * tan(radians(self.theta)) >= 9.81
+        return self.model == "mendez" and self.amplitude * tan(radians(self.theta)) >= self.g
+
+
+def inputs_of(row: dict[str, str]) -> dict[str, Any]:
+    """The fields of a `Case` that a line of a table of cases gives, but for the results."""
+    return {
+        "case": int(row["case"]),
+        "category": row["category"],
+        "model": row["model"],
+        "rise": row["rise"],
+        "recoupling": row["recoupling"],
+        **{name: float(row[name]) for name in PARAMETERS},
+        "cycles": int(row["cycles"]),
+        "given": tuple((name, float(row[name])) for name in OPTIONAL_INPUTS if row[name]),
+    }
 
 
 def read_cases() -> list[Case]:
     """All cases of cases.csv."""
-    with (Path(__file__).parent / "data" / "cases.csv").open(newline="") as file:
+    with (DATA / "cases.csv").open(newline="") as file:
         return [
             Case(
-                case=int(row["case"]),
-                category=row["category"],
-                model=row["model"],
-                rise=row["rise"],
-                recoupling=row["recoupling"],
-                theta=float(row["theta"]),
-                mu_s=float(row["mu_s"]),
-                amplitude=float(row["amplitude"]),
-                frequency=float(row["frequency"]),
-                cycles=int(row["cycles"]),
-                given=tuple((name, float(row[name])) for name in OPTIONAL_INPUTS if row[name]),
+                **inputs_of(row),
                 permanent_displacement=row["permanent_displacement"],
                 peak_relative_velocity=row["peak_relative_velocity"],
                 sliding_mode=int(row["sliding_mode"]),
@@ -88,6 +98,37 @@ def groups(cases: Iterable[Case]) -> list[list[Case]]:
     """The cases in groups that one call of `sweep` can take: alike in options, cycles and inputs given."""
 
     def key(case: Case) -> tuple[object, ...]:
-        return (case.model, case.rise, case.recoupling, case.cycles, tuple(name for name, _ in case.given))
+        return (case.model, case.rise, case.recoupling, case.cycles, case.g, tuple(name for name, _ in case.given))
 
     return [list(group) for _, group in groupby(sorted(cases, key=key), key)]
+
+
+def solve(cases: Sequence[Case], **options: Any) -> dict[int, tuple[float, float, int, int]]:
+    """Displacement, peak velocity, mode and validity of each case, by its number; few calls of `sweep`."""
+    found = {}
+    for group in groups(cases):
+        columns: dict[str, Any] = {
+            name: xr.DataArray([getattr(case, name) for case in group], dims="case") for name in PARAMETERS
+        }
+        for name in OPTIONAL_INPUTS:
+            if name in dict(group[0].given):
+                columns[name] = xr.DataArray([dict(case.given)[name] for case in group], dims="case")
+        first = group[0]
+        result = slipsweep.sweep(
+            **columns,
+            cycles=first.cycles,
+            model=first.model,
+            rise=first.rise,
+            recoupling=first.recoupling,
+            g=first.g,
+            **options,
+        )
+        for i, case in enumerate(group):
+            cell = result.isel(case=i)
+            found[case.case] = (
+                float(cell.permanent_displacement),
+                float(cell.peak_relative_velocity),
+                int(cell.sliding_mode),
+                int(cell.validity),
+            )
+    return found

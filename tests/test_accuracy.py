@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 from itertools import groupby
 from math import ceil, isnan, log, pi
-from typing import Any
 
 import numpy as np
 import pytest
 import reference
 import strategies
-import xarray as xr
-from cases import OPTIONAL_INPUTS, PARAMETERS, Case, groups, read_cases
+from cases import Case, read_cases, solve
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
@@ -26,36 +24,6 @@ HARD = ("grazing", "near_failure", "sharp_decay", "restick", "literal", "given_f
 
 ORDERS = {"rectangle": 1, "trapezoid": 2, "simpson": 4}
 RULES = pytest.mark.parametrize("rule", ORDERS)
-
-
-def solve(cases: Sequence[Case], **options: Any) -> dict[int, tuple[float, float, int, int]]:
-    """Displacement, peak velocity, mode and validity of each case, by its number; few calls of `sweep`."""
-    found = {}
-    for group in groups(cases):
-        columns: dict[str, Any] = {
-            name: xr.DataArray([getattr(case, name) for case in group], dims="case") for name in PARAMETERS
-        }
-        for name in OPTIONAL_INPUTS:
-            if name in dict(group[0].given):
-                columns[name] = xr.DataArray([dict(case.given)[name] for case in group], dims="case")
-        first = group[0]
-        result = slipsweep.sweep(
-            **columns,
-            cycles=first.cycles,
-            model=first.model,
-            rise=first.rise,
-            recoupling=first.recoupling,
-            **options,
-        )
-        for i, case in enumerate(group):
-            cell = result.isel(case=i)
-            found[case.case] = (
-                float(cell.permanent_displacement),
-                float(cell.peak_relative_velocity),
-                int(cell.sliding_mode),
-                int(cell.validity),
-            )
-    return found
 
 
 def misses(

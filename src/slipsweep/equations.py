@@ -50,10 +50,13 @@ def mobilised_friction(
 
 @equation
 def block_acceleration(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
-    """Eq. 4: response of the sliding block to the plane's acceleration, m/s²."""
-    n = normal_acceleration(ground_acceleration, tan_theta, g)
-    magnitude = abs(ground_acceleration) - n * (mu_s - tan_theta - friction) - g * tan_theta
-    return math.copysign(1.0, ground_acceleration) * magnitude
+    """Eq. 4: response of the sliding block to the plane's acceleration, m/s².
+
+    n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
+    failure Üg is small against g tan θ, which would take its digits.
+    """
+    lag = g * (mu_s - friction) + ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
+    return math.copysign(1.0, ground_acceleration) * (abs(ground_acceleration) - lag)
 
 
 @equation

@@ -225,10 +225,11 @@ def rise(block: Block, velocity: float, legs: np.ndarray) -> tuple[float, float,
             record(legs, STICK, psi, phase(block, began), 0.0, 0.0, displacement)
             if began > x:
                 psi = phase(block, began)
-                x = began
+                x = b = began  # where Eq. 4 meets Üg; to evaluate it there would add the rounding of g μs
+            else:
+                b = min(starting_acceleration(block, x), x)
             if x >= amplitude:
                 break
-            b = min(starting_acceleration(block, x), x)  # equal at an onset, but for rounding
             follows = literal
         end, follows, follows_on = rising_leg(block, x, amplitude, b, follows)
         psi_end = phase(block, end)

@@ -164,9 +164,10 @@ def rise_step(block: Block, rule: int, start: float, end: float, state: np.ndarr
             if block.rise != NEWMARK and slip(block, x) <= 0.0:
                 if slip(block, x_end) <= 0.0:
                     break
-                x = slip_root(block, 0.0, x, x_end)
+                x = held = slip_root(block, 0.0, x, x_end)  # where Eq. 4 meets Üg
                 psi = phase(block, x)
-            held = starting_acceleration(block, x)
+            else:
+                held = starting_acceleration(block, x)
             by_eq4 = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
             state[HELD + j] = min(held, x)  # equal at an onset, but for rounding
             state[SLIDES + j] = 1.0

@@ -48,7 +48,7 @@ def attenuate(b: float, velocity: float, duration: float) -> tuple[float, float]
     The rate −b is constant: one step, however long, is exact.
     """
     if velocity <= b * duration:
-        return 0.0, 0.5 * velocity * velocity / b
+        return 0.0, 0.5 * velocity * (velocity / b)  # the square might overflow
     return velocity - b * duration, (velocity - 0.5 * b * duration) * duration
 
 
