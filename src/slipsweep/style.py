@@ -5,7 +5,7 @@ from slipsweep.variables import PARAMETERS, RESULTS
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
-SKY_BLUE, ORANGE, PURPLE, GREEN = "#56B4E9", "#E69F00", "#CC79A7", "#009E73"
+SKY_BLUE, ORANGE, PURPLE = "#56B4E9", "#E69F00", "#CC79A7"
 
 #: Symbols of the paper.
 SYMBOLS = {
