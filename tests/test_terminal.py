@@ -95,7 +95,7 @@ def test_errors_are_plain(tmp_path: Path) -> None:
         (("run", "a.toml", "--ouput", "a.nc"), "No such option: --ouput; did you mean --output?"),
         (("run", "a.toml", "--overwrit"), "No such option: --overwrit; did you mean --overwrite?"),
         (("simulate", "--yield-aceleration", "1"), "did you mean --yield-acceleration?"),
-        (("exprot", "a.nc"), "No such command 'exprot'. Did you mean 'export'?"),
+        (("exprot", "a.nc"), "No such command 'exprot'. Did you mean 'export', 'explore'?"),
         (("run", "a.toml", "--solver", "cycl"), "'cycl' is not one of 'auto', 'step', 'cycle'"),
         (("run", "a.toml"), 'axes.thet: unknown key; did you mean "theta"?'),
         (("simulate", "--theta", "steep"), "Invalid value for '--theta': 'steep' should be a valid number"),
