@@ -22,6 +22,7 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.blocks import Solved, block_lengths, chunk_lengths, grid_blocks, solve_here
 from slipsweep.errors import InputError, RunError
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
@@ -30,56 +31,6 @@ from slipsweep.variables import SlidingMode, Validity
 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
 BLOCK_CELLS = 4_000_000
-
-#: Cells in a chunk of a flag variable: read in well under a millisecond.
-CHUNK_CELLS = 2**18
-
-#: Dimensions that blocks and chunks cut last.  Charts are drawn over these two, and a whole
-#: frequency axis costs `sweep` hardly more than one frequency.
-_CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
-
-
-# ------------------------------------------------------------------------ blocks of a grid
-
-
-def _cut_order(shape: Mapping[str, int]) -> list[str]:
-    return [dim for dim in shape if dim not in _CUT_LAST] + [dim for dim in _CUT_LAST if dim in shape]
-
-
-def chunk_lengths(shape: Mapping[str, int], most: int = CHUNK_CELLS) -> dict[str, int]:
-    """Return the chunk of a grid: whole along frequency and amplitude as far as `most` and `CHUNK_CELLS` allow."""
-    most = min(most, CHUNK_CELLS)
-    lengths: dict[str, int] = {}
-    cells = 1
-    for dim in reversed(_cut_order(shape)):
-        pieces = math.ceil(shape[dim] / max(1, most // cells))
-        lengths[dim] = math.ceil(shape[dim] / pieces)
-        cells *= lengths[dim]
-    return lengths
-
-
-def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the block of a grid: at most `most` cells, in whole chunks."""
-    lengths = dict(shape)
-    chunks = chunk_lengths(shape, most)
-    for dim in _cut_order(shape):
-        others = math.prod(lengths.values()) // lengths[dim]
-        count = math.ceil(shape[dim] / chunks[dim])
-        pieces = math.ceil(count / max(1, most // (others * chunks[dim])))
-        # equal shares rather than full blocks and a remnant
-        lengths[dim] = min(shape[dim], chunks[dim] * math.ceil(count / pieces))
-    return lengths
-
-
-def blocks(shape: Mapping[str, int], most: int) -> Iterator[dict[str, slice]]:
-    """Cut a grid into blocks, in the order of the file."""
-    lengths = block_lengths(shape, most)
-    starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
-    for corner in itertools.product(*starts):
-        yield {
-            dim: slice(start, min(start + lengths[dim], shape[dim])) for dim, start in zip(shape, corner, strict=True)
-        }
-
 
 # ------------------------------------------------------------------- complete or not there
 
@@ -204,6 +155,7 @@ def run(
     overwrite: bool = False,
     block_cells: int = BLOCK_CELLS,
     progress: Callable[[int], None] | None = None,
+    solved: Solved = solve_here,
 ) -> Report:
     """Compute a sweep and write it as netCDF, complete or not at all.
 
@@ -220,6 +172,8 @@ def run(
         Cells solved and written at a time, hence in memory.
     progress : callable
         Called with a number of cells just solved, from any thread.
+    solved : callable
+        What solves the blocks, in any order (`blocks.Solved`).
 
     Returns
     -------
@@ -234,19 +188,22 @@ def run(
     """
     check_output(path, overwrite)
     _check_size(spec, path, block_cells)
-    from slipsweep.plans import plan_sweep  # imports numba: not for `info`, and not to be counted as computing time
-
     started = time.perf_counter()
     tally = Tally(spec.cells)
     with complete_or_absent(path, overwrite) as temporary:
         with _netcdf(temporary, path) as file:
-            for number, block in enumerate(blocks(spec.shape, block_cells)):
+            cut = dict(enumerate(grid_blocks(spec.shape, block_cells)))
+            found = solved(spec, cut, progress)
+            while True:
                 try:
-                    results = plan_sweep(**spec.arguments(block)).solve(progress)
+                    number, results = next(found)
+                except StopIteration:
+                    break
                 except MemoryError:
                     raise RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}") from None
+                block = cut[number]
                 with _writing(path):
-                    if number == 0:
+                    if tally.modes is None and tally.flags is None:
                         chunks = chunk_lengths(spec.shape, block_cells)
                         _define(file, spec.shape, chunks, results, spec.dtype)
                         _label_cases(file, spec.labels)
@@ -446,7 +403,7 @@ def _count(file: netCDF4.Dataset) -> Tally:
             variable = file[name]
             variable.set_auto_mask(False)
             tally.cells = variable.size
-            for block in blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
+            for block in grid_blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
                 tally.add({name: variable[tuple(block.values())]})
     return tally
 
