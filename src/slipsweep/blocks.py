@@ -5,8 +5,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TypeAlias
 
+import numpy as np
+
+from slipsweep.errors import InputError
+from slipsweep.resources import size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table
+from slipsweep.variables import RESULT_DTYPES
 
 #: A part of a grid: where it lies along each dimension.
 Block: TypeAlias = dict[str, slice]
@@ -18,10 +23,13 @@ Progress: TypeAlias = Callable[[int], None]
 #: A block's results are let go of before the next is asked for, but for one.
 Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
 
-#: Cells in a chunk of a flag variable: read in well under a millisecond.
-CHUNK_CELLS = 2**18
+#: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
+BLOCK_CELLS = 4_000_000
 
-#: Dimensions that blocks and chunks cut last.  Charts are drawn over these two, and a whole
+#: Resident memory of a run beside its blocks: interpreter, libraries and compiled kernels, as measured.
+_BASE_MEMORY = 200_000_000
+
+#: Dimensions that blocks cut last.  Charts are drawn over these two, and a whole
 #: frequency axis costs `sweep` hardly more than one frequency.
 _CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
 
@@ -30,29 +38,44 @@ def _cut_order(shape: Mapping[str, int]) -> list[str]:
     return [dim for dim in shape if dim not in _CUT_LAST] + [dim for dim in _CUT_LAST if dim in shape]
 
 
-def chunk_lengths(shape: Mapping[str, int], most: int = CHUNK_CELLS) -> dict[str, int]:
-    """Return the chunk of a grid: whole along frequency and amplitude as far as `most` and `CHUNK_CELLS` allow."""
-    most = min(most, CHUNK_CELLS)
+def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
+    """Return the block of a grid: at most `most` cells, whole along frequency and amplitude as far as they allow."""
     lengths: dict[str, int] = {}
     cells = 1
     for dim in reversed(_cut_order(shape)):
+        # equal shares rather than full blocks and a remnant
         pieces = math.ceil(shape[dim] / max(1, most // cells))
         lengths[dim] = math.ceil(shape[dim] / pieces)
         cells *= lengths[dim]
-    return lengths
+    return {dim: lengths[dim] for dim in shape}
 
 
-def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the block of a grid: at most `most` cells, in whole chunks."""
-    lengths = dict(shape)
-    chunks = chunk_lengths(shape, most)
-    for dim in _cut_order(shape):
-        others = math.prod(lengths.values()) // lengths[dim]
-        count = math.ceil(shape[dim] / chunks[dim])
-        pieces = math.ceil(count / max(1, most // (others * chunks[dim])))
-        # equal shares rather than full blocks and a remnant
-        lengths[dim] = min(shape[dim], chunks[dim] * math.ceil(count / pieces))
-    return lengths
+def block_memory(spec: SweepSpec, most: int) -> int:
+    """Return the memory that blocks of at most `most` cells take, in bytes.
+
+    Two are there at a time, one being solved and one being written, with 8 bytes a cell
+    for conversion and counting.
+    """
+    return math.prod(block_lengths(spec.shape, most).values()) * _cell_memory(spec)
+
+
+def cells_within(memory: int, spec: SweepSpec) -> int:
+    """Return how many cells a block may have for a run to stay within `memory` bytes.
+
+    Raises
+    ------
+    InputError
+        Not even a small block fits.
+    """
+    cells = (memory - _BASE_MEMORY) // _cell_memory(spec)
+    if cells < 1000:
+        least = _BASE_MEMORY + 1000 * _cell_memory(spec)
+        raise InputError(f"--memory = {size_text(memory)}: must be {size_text(math.ceil(least / 1e6) * 1e6)} at least")
+    return cells
+
+
+def _cell_memory(spec: SweepSpec) -> int:
+    return 2 * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
 
 
 def grid_blocks(shape: Mapping[str, int], most: int) -> Iterator[Block]:
