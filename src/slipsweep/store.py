@@ -229,7 +229,8 @@ def run(
     check_output(path, overwrite or resume, folder=split)
     identity = parts.identity(spec, split)
     with parts.opened(path) as work:
-        work.read()
+        if not overwrite:
+            work.read()
         if work.finished and not (resume or overwrite):
             raise InputError(
                 f"{path}: {work.path.name} holds {len(work.finished)} finished blocks of an interrupted run; "
