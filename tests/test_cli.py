@@ -193,7 +193,7 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path: Path) -> None:
     done = slipsweep(
         tmp_path, "run", "long.toml", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     )
-    assert_fails(done, 1, "long.nc: writing failed: ", "is the disk full?")
+    assert_fails(done, 1, "long.nc.parts/data.nc: writing failed: ", "is the disk full?")
     assert names(tmp_path) == {"long.toml"}
 
 
@@ -214,7 +214,7 @@ def test_an_interrupted_run_keeps_its_finished_blocks(tmp_path: Path, number: si
             process.kill()
     assert process.returncode == 128 + number
     assert output == ""
-    assert re.fullmatch(r"slipsweep: interrupted; \d+ of 500 blocks are kept; go on with --resume\n", errors)
+    assert re.fullmatch(r"slipsweep: interrupted; \d+ of 600 blocks are kept; go on with --resume\n", errors)
     assert names(tmp_path) == {"long.toml", "long.nc.parts"}
     assert_fails(slipsweep(tmp_path, "run", "long.toml"), 2, "finished blocks of an interrupted run", "--resume")
 

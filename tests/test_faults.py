@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import filelock
 import netCDF4
@@ -43,8 +44,8 @@ variables = ["permanent_displacement", "sliding_mode", "limiting_acceleration"]
 CELLS = 4000  # 60 blocks
 
 
-def run(path: Path, text: str = SWEEP, **options: object) -> store.Report:
-    return store.run(spec.parse(text, "a.toml"), path, command="x", **{"block_cells": CELLS, **options})  # type: ignore[arg-type]
+def run(path: Path, text: str = SWEEP, **options: Any) -> store.Report:
+    return store.run(spec.parse(text, "a.toml"), path, command="x", **{"block_cells": CELLS, **options})
 
 
 def values(path: Path) -> dict[str, bytes]:
@@ -65,7 +66,7 @@ class Stop(BaseException):
     pass
 
 
-def stopped(path: Path, after: int = 30, **options: object) -> Path:
+def stopped(path: Path, after: int = 30, **options: Any) -> Path:
     """Stop a run after some blocks; return its work folder."""
 
     def solved(*arguments: object) -> object:
@@ -80,7 +81,7 @@ def stopped(path: Path, after: int = 30, **options: object) -> Path:
     return path.with_name(f"{path.name}.parts")
 
 
-def solved_on_resume(path: Path, **options: object) -> list[int]:
+def solved_on_resume(path: Path, **options: Any) -> list[int]:
     """Go on with a run; return the numbers of the blocks that had to be solved."""
     numbers = []
 
@@ -173,6 +174,7 @@ def test_a_second_run_is_refused(tmp_path: Path, undisturbed: dict[str, bytes]) 
     path = tmp_path / "a.nc"
     stopped(path)
     with filelock.FileLock(tmp_path / "a.nc.parts" / "lock"):
+        options: dict[str, Any]
         for options in ({}, {"resume": True}, {"overwrite": True}):
             with pytest.raises(RunError, match="another run is writing it"):
                 run(path, **options)

@@ -239,7 +239,8 @@ def run(
         if resume and work.finished and work.manifest is not None:
             _check_same(work, identity, block_cells)
             block_cells, overwrite = work.manifest.block_cells, work.manifest.overwrite
-            if work.complete and path.exists() and not work.data(split).exists():
+            data = work.data(split)
+            if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
                 # killed between giving the output its name and clearing the folder away
                 work.done = True
                 return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
