@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -192,19 +193,19 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path: Path) -> None:
     done = slipsweep(
         tmp_path, "run", "long.toml", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     )
-    assert_fails(done, 1, "long.nc: writing failed: ", "is the disk full?")
+    assert_fails(done, 1, "long.nc.parts/data.nc: writing failed: ", "is the disk full?")
     assert names(tmp_path) == {"long.toml"}
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal.Signals) -> None:
+def test_an_interrupted_run_keeps_its_finished_blocks(tmp_path: Path, number: signal.Signals) -> None:
     (tmp_path / "long.toml").write_text(LONG)
     with subprocess.Popen(
         [*SLIPSWEEP, "run", "long.toml"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         try:
-            wait_until(lambda: any(name.endswith(".tmp") for name in names(tmp_path)))
+            wait_until(lambda: (tmp_path / "long.nc.parts" / "journal").exists())
             time.sleep(0.5)  # well into the run
             assert process.poll() is None
             process.send_signal(number)
@@ -212,8 +213,10 @@ def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal
         finally:
             process.kill()
     assert process.returncode == 128 + number
-    assert (output, errors) == ("", "slipsweep: interrupted; nothing written\n")
-    assert names(tmp_path) == {"long.toml"}
+    assert output == ""
+    assert re.fullmatch(r"slipsweep: interrupted; \d+ of 600 blocks are kept; go on with --resume\n", errors)
+    assert names(tmp_path) == {"long.toml", "long.nc.parts"}
+    assert_fails(slipsweep(tmp_path, "run", "long.toml"), 2, "finished blocks of an interrupted run", "--resume")
 
 
 def wait_until(condition: Callable[[], bool]) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep import store
+from slipsweep.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.errors import InputError
 from slipsweep.history import history_table
 from slipsweep.parameters import WAVEFORMS
@@ -156,7 +157,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             if name in names
         }
         results = {name: np.empty([*left.values()], kind) for name, kind in _SHOWN.items() if name in file.variables}
-        for block in store.blocks(lengths, store.BLOCK_CELLS):
+        for block in grid_blocks(lengths, BLOCK_CELLS):
             inside = {
                 dim: np.flatnonzero((keep[dim] >= part.start) & (keep[dim] < part.stop)) for dim, part in block.items()
             }

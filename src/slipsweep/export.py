@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep import store
+from slipsweep.blocks import grid_blocks
 from slipsweep.errors import InputError, RunError
 from slipsweep.suggest import did_you_mean
 
@@ -135,7 +136,7 @@ def export(
         with store.complete_or_absent(path, overwrite) as temporary:
             try:
                 with make(temporary, columns, attributes) as write:
-                    for block in store.blocks(shape, block_cells) if shape else [{}]:
+                    for block in grid_blocks(shape, block_cells) if shape else [{}]:
                         write(_table(columns, shape, block))
                         if progress is not None:
                             progress(math.prod(part.stop - part.start for part in block.values()))

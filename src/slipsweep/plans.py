@@ -127,6 +127,15 @@ class Plan:
         # all tasks cover the same cells: one of them counts
         return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None))
 
+    def empty(self) -> Table:
+        """The results with their dimensions and coordinates but no values: zeros that take no memory."""
+
+        def zeros(task: Task) -> dict[str, np.ndarray]:
+            shape = tuple(task.sizes.values())
+            return {name: np.broadcast_to(np.zeros((), RESULT_DTYPES.get(name, "f8")), shape) for name in task.names}
+
+        return self.table(zeros)
+
     def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> Table:
         """The results, with `evaluate` giving a task's arrays."""
         found = {

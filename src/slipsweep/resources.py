@@ -1,6 +1,9 @@
 """What the machine has left, and how to say sizes."""
 
+import re
 from pathlib import Path
+
+from slipsweep.errors import InputError
 
 
 def available_memory() -> int | None:
@@ -20,3 +23,18 @@ def size_text(size: float) -> str:
             return f"{size:.0f} {unit}" if unit == "bytes" else f"{size:.3g} {unit}"
         size /= 1000.0
     raise AssertionError
+
+
+def parse_size(name: str, text: str) -> int:
+    """Return the bytes that a text like "512MiB" or "1.5 GB" means.
+
+    Raises
+    ------
+    InputError
+        It is none; `name` is what the user knows it by.
+    """
+    match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kKMGT])(i?)B?\s*", text)
+    if match is None:
+        raise InputError(f"{name} = {text}: must be a number with a unit, like 512MiB or 2GB")
+    number, prefix, binary = match.groups()
+    return int(float(number) * (1024 if binary else 1000) ** ("kMGT".index("k" if prefix in "kK" else prefix) + 1))

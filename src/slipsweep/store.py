@@ -1,94 +1,61 @@
 """Results on disk: a sweep computed and written block by block, netCDF files made and read.
 
-A file appears under its name only when it is complete (`complete_or_absent`).  Floating-point
-results are stored contiguous and uncompressed, the two flag variables in chunks with zlib level 1:
-on a grid of 20 million cells that wrote 1.7 GB/s and saved 16 % of the bytes, where compressing
-everything wrote 0.1 GB/s and saved 58 %, and compressing nothing wrote 2.1 GB/s.
+A file appears under its name only when it is complete.  Results are stored contiguous and
+uncompressed: then each value has its place in the file before any is known, and once the empty
+file is on the disk a block is written without a change to anything but its own bytes.  A run that
+is killed leaves a file that can be read and gone on with (`slipsweep.parts`), and no value is
+written twice.  (On a grid of 20 million cells nothing compressed wrote 2.1 GB/s; zlib on the two
+flag variables 1.7 GB/s for 16 % of the bytes; zlib on everything 0.1 GB/s for 58 %.)
 """
 
 import itertools
 import math
 import os
+import re
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep import parts
+from slipsweep.blocks import (
+    BLOCK_CELLS,
+    Block,
+    Progress,
+    Solved,
+    block_lengths,
+    block_memory,
+    grid_blocks,
+    solve_here,
+)
 from slipsweep.errors import InputError, RunError
+from slipsweep.parts import sync
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import RECORD_COUNTS, SlidingMode, Validity
 
-#: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
-BLOCK_CELLS = 4_000_000
-
-#: Cells in a chunk of a flag variable: read in well under a millisecond.
-CHUNK_CELLS = 2**18
-
 #: Results that are whole numbers, -1 where there is no value.
 _WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
-#: Dimensions that blocks and chunks cut last.  Charts are drawn over these two, and a whole
-#: frequency axis costs `sweep` hardly more than one frequency.
-_CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
-
-
-# ------------------------------------------------------------------------ blocks of a grid
-
-
-def _cut_order(shape: Mapping[str, int]) -> list[str]:
-    return [dim for dim in shape if dim not in _CUT_LAST] + [dim for dim in _CUT_LAST if dim in shape]
-
-
-def chunk_lengths(shape: Mapping[str, int], most: int = CHUNK_CELLS) -> dict[str, int]:
-    """Return the chunk of a grid: whole along frequency and amplitude as far as `most` and `CHUNK_CELLS` allow."""
-    most = min(most, CHUNK_CELLS)
-    lengths: dict[str, int] = {}
-    cells = 1
-    for dim in reversed(_cut_order(shape)):
-        pieces = math.ceil(shape[dim] / max(1, most // cells))
-        lengths[dim] = math.ceil(shape[dim] / pieces)
-        cells *= lengths[dim]
-    return lengths
-
-
-def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the block of a grid: at most `most` cells, in whole chunks."""
-    lengths = dict(shape)
-    chunks = chunk_lengths(shape, most)
-    for dim in _cut_order(shape):
-        others = math.prod(lengths.values()) // lengths[dim]
-        count = math.ceil(shape[dim] / chunks[dim])
-        pieces = math.ceil(count / max(1, most // (others * chunks[dim])))
-        # equal shares rather than full blocks and a remnant
-        lengths[dim] = min(shape[dim], chunks[dim] * math.ceil(count / pieces))
-    return lengths
-
-
-def blocks(shape: Mapping[str, int], most: int) -> Iterator[dict[str, slice]]:
-    """Cut a grid into blocks, in the order of the file."""
-    lengths = block_lengths(shape, most)
-    starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
-    for corner in itertools.product(*starts):
-        yield {
-            dim: slice(start, min(start + lengths[dim], shape[dim])) for dim, start in zip(shape, corner, strict=True)
-        }
+#: Name of a block's file in a folder that `run` made.
+_BLOCK_FILE = re.compile(r"block-\d{6,}\.nc")
 
 
 # ------------------------------------------------------------------- complete or not there
 
 
-def check_output(path: Path, overwrite: bool) -> None:
-    """Refuse an output that cannot be written, or that exists and may not be replaced.
+def check_output(path: Path, overwrite: bool, folder: bool = False) -> None:
+    """Refuse an output (a file, or a `folder` of blocks) that cannot be written, or exists and may not be replaced.
 
     Raises
     ------
@@ -96,7 +63,9 @@ def check_output(path: Path, overwrite: bool) -> None:
     """
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist")
-    if path.is_dir() or (path.exists() and not path.is_file()):
+    if folder and path.exists() and not (path.is_dir() and all(map(_BLOCK_FILE.fullmatch, os.listdir(path)))):
+        raise InputError(f"{path}: exists and is not a folder of blocks")
+    if not folder and path.exists() and not path.is_file():
         raise InputError(f"{path}: exists and is not a file")
     if path.exists() and not overwrite:
         raise InputError(f"{path}: exists already; give --overwrite to replace it, or another name with -o")
@@ -119,24 +88,25 @@ def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
     try:
         yield temporary
         with _writing(path):
-            _sync(temporary, os.O_RDWR)
-            if overwrite:
-                temporary.replace(path)
-            else:
-                _rename_to_new(temporary, path)
-            if os.name == "posix":  # elsewhere a folder cannot be opened
-                _sync(path.parent, os.O_RDONLY)
+            _appear(temporary, path, overwrite)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _sync(path: Path, mode: int) -> None:
-    """Have a file or folder on the disk itself, so that a power cut does not take it back."""
-    descriptor = os.open(path, mode)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _appear(temporary: Path, path: Path, overwrite: bool) -> None:
+    """Give a finished file, or folder of files, its name."""
+    sync(temporary)
+    if temporary.is_dir():
+        if overwrite and path.is_dir():
+            shutil.rmtree(path)
+        elif path.exists():
+            raise RunError(f"{path}: was made by another process during the run; it is left alone")
+        temporary.replace(path)
+    elif overwrite:
+        temporary.replace(path)
+    else:
+        _rename_to_new(temporary, path)
+    sync(path.parent)
 
 
 def _rename_to_new(temporary: Path, path: Path) -> None:
@@ -187,6 +157,14 @@ class Tally:
             for flag in Validity(seen & 255):
                 self.flags[flag] += int(np.count_nonzero(results["validity"] & int(flag)))
 
+    def merge(self, other: "Tally") -> None:
+        """Add the counts of other cells."""
+        self.cells += other.cells
+        if other.modes is not None:
+            self.modes = {mode: (self.modes or {}).get(mode, 0) + count for mode, count in other.modes.items()}
+        if other.flags is not None:
+            self.flags = {flag: (self.flags or {}).get(flag, 0) + count for flag, count in other.flags.items()}
+
 
 @dataclass
 class Report:
@@ -205,24 +183,37 @@ def run(
     *,
     command: str,
     overwrite: bool = False,
-    block_cells: int = BLOCK_CELLS,
-    progress: Callable[[int], None] | None = None,
+    resume: bool = False,
+    split: bool = False,
+    block_cells: int | None = None,
+    progress: Progress | None = None,
+    solved: Solved = solve_here,
 ) -> Report:
     """Compute a sweep and write it as netCDF, complete or not at all.
+
+    Finished blocks of a run that failed or was killed are kept beside the output
+    (`slipsweep.parts`).
 
     Parameters
     ----------
     spec : SweepSpec
     path : Path
-        The file to write.
+        The file to write, or the folder (`split`).
     command : str
         The command as typed, for the file's `history`.
     overwrite : bool
-        Replace `path` if it exists.
-    block_cells : int
-        Cells solved and written at a time, hence in memory.
+        Replace `path` and the blocks of an interrupted run, if they exist.
+    resume : bool
+        Go on with the blocks of an interrupted run, if there are any.
+    split : bool
+        Write a folder with a netCDF file for each block.
+    block_cells : int, optional
+        Cells solved and written at a time; two such blocks are in memory.  By default
+        `BLOCK_CELLS`, or what an interrupted run had.
     progress : callable
         Called with a number of cells just solved, from any thread.
+    solved : callable
+        What solves the blocks, in any order (`blocks.Solved`).
 
     Returns
     -------
@@ -231,35 +222,279 @@ def run(
     Raises
     ------
     InputError
-        The output exists or cannot be written, or the grid is too large for disk or memory.
+        The output exists or cannot be written, the grid is too large for disk or memory, there
+        are blocks of an interrupted run but neither `resume` nor `overwrite` is given, or they
+        are of another sweep or version.
     RunError
-        Writing failed, or memory ran out.
+        Writing failed, memory ran out, or another run is writing `path`.  A note tells how many
+        blocks are kept.
     """
-    check_output(path, overwrite)
-    _check_size(spec, path, block_cells)
-    from slipsweep.plans import plan_sweep  # imports numba: not for `info`, and not to be counted as computing time
+    check_output(path, overwrite or resume, folder=split)
+    identity = parts.identity(spec, split)
+    with parts.opened(path) as work:
+        if not overwrite:
+            work.read()
+        if work.finished and not (resume or overwrite):
+            raise InputError(
+                f"{path}: {work.path.name} holds {len(work.finished)} finished blocks of an interrupted run; "
+                "go on with --resume, or start anew with --overwrite"
+            )
+        if resume and work.finished and work.manifest is not None:
+            _check_same(work, identity, block_cells)
+            block_cells, overwrite = work.manifest.block_cells, work.manifest.overwrite
+            data = work.data(split)
+            if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
+                # killed between giving the output its name and clearing the folder away
+                work.done = True
+                return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
+        else:
+            work.clear()
+        block_cells = block_cells or BLOCK_CELLS
+        # once more: a run that was writing it may have ended before this one got hold of the lock
+        check_output(path, overwrite, folder=split)
+        data = work.data(split)
+        _check_size(spec, path, block_cells, _nbytes(data))
 
-    started = time.perf_counter()
-    tally = Tally(spec.cells)
-    with complete_or_absent(path, overwrite) as temporary:
-        with _netcdf(temporary, path) as file:
-            for number, block in enumerate(blocks(spec.shape, block_cells)):
-                try:
-                    results = plan_sweep(**spec.arguments(block)).solve(progress)
-                except MemoryError:
-                    raise RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}") from None
-                with _writing(path):
-                    if number == 0:
-                        chunks = chunk_lengths(spec.shape, block_cells)
-                        _define(file, spec.shape, chunks, results, spec.dtype)
-                        _label_cases(file, spec.labels)
-                        _describe(file, {**results.attrs, "title": spec.output.title, **_provenance(command)})
-                        _describe(file, {"sweep": spec.text})
-                    _fill(file, results, block)
-                arrays = {name: results[name].values for name in ("sliding_mode", "validity") if name in results}
+        started = time.perf_counter()
+        tally = Tally(spec.cells)
+        cut = dict(enumerate(grid_blocks(spec.shape, block_cells)))
+        try:
+            with (_Files if split else _OneFile)(spec, data, command) as target:
+                manifest = work.manifest or parts.Manifest(identity, block_cells, overwrite)
+                _ready(work, target, cut, manifest, tally, progress)
+                missing = {number: block for number, block in cut.items() if number not in work.finished}
+                _write_blocks(work, target, cut, solved(spec, missing, progress), tally)
+            with _writing(path):
+                parts.sync(data)
+                work.close()
+                _appear(data, path, overwrite)
+        except MemoryError:
+            error = RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}")
+            raise _noted(error, work, len(cut)) from None
+        except BaseException as error:
+            _noted(error, work, len(cut))
+            raise
+        work.done = True
+    return Report(path, spec.shape, time.perf_counter() - started, _nbytes(path), tally)
+
+
+def _check_same(work: parts.Folder, identity: Mapping[str, Any], block_cells: int | None) -> None:
+    """Refuse to go on with blocks of another sweep, solver or version, or larger than allowed."""
+    assert work.manifest is not None
+    if difference := work.manifest.difference(identity):
+        raise InputError(f"{work.output}: cannot go on with the blocks in {work.path.name}: {difference}")
+    if block_cells is not None and block_cells < work.manifest.block_cells:
+        raise InputError(
+            f"--memory: too little for the blocks of {work.manifest.block_cells} cells that {work.path.name} "
+            "was begun with; give more, or start anew with --overwrite"
+        )
+
+
+def _noted(error: BaseException, work: parts.Folder, blocks: int) -> BaseException:
+    """Tell with an error how much of the run is kept."""
+    if work.finished:
+        error.add_note(f"{len(work.finished)} of {blocks} blocks are kept; go on with --resume")
+    return error
+
+
+def _ready(
+    work: parts.Folder,
+    target: "_OneFile | _Files",
+    cut: Mapping[int, Block],
+    manifest: parts.Manifest,
+    tally: Tally,
+    progress: Progress | None,
+) -> None:
+    """Take over the finished blocks that are as they were written, or begin with none."""
+    kept = {}
+    if work.finished and target.open(manifest.nbytes):
+        for number in sorted(work.finished.keys() & cut.keys()):
+            arrays = target.read(number, cut[number])
+            if arrays is not None and parts.checksum(arrays) == work.finished[number]:
+                kept[number] = work.finished[number]
                 tally.add(arrays)
-        nbytes = temporary.stat().st_size
-    return Report(path, spec.shape, time.perf_counter() - started, nbytes, tally)
+                if progress is not None:
+                    progress(math.prod(part.stop - part.start for part in cut[number].values()))
+    with _writing(work.output):
+        if kept:
+            work.keep(kept)
+        else:
+            work.clear()
+            manifest.nbytes = target.create()
+            work.begin(manifest)
+
+
+def _write_blocks(
+    work: parts.Folder,
+    target: "_OneFile | _Files",
+    cut: Mapping[int, Block],
+    found: Iterator[tuple[int, Table]],
+    tally: Tally,
+) -> None:
+    """Write blocks and put them on record, each while the next is being solved."""
+
+    def write(number: int, table: Table) -> None:
+        with _writing(work.output):
+            arrays = target.write(number, cut[number], table)
+            work.add(number, parts.checksum(arrays))
+        tally.add(arrays)
+
+    with ThreadPoolExecutor(1) as writer:  # leaving it waits: a block that is being written is finished
+        pending: Future[None] | None = None
+        for number, table in found:
+            if pending is not None:
+                pending.result()
+            pending = writer.submit(write, number, table)
+            del table
+        if pending is not None:
+            pending.result()
+
+
+class _OneFile:
+    """All blocks in one netCDF file, each in its place."""
+
+    def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
+        from slipsweep.plans import plan_sweep  # imports numba: not for `info`
+
+        self.spec, self.data, self.command = spec, data, command
+        self.table = plan_sweep(**spec.arguments()).empty()
+        self.file: netCDF4.Dataset | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self.file is not None:
+            with suppress(RuntimeError, OSError):  # every block has been flushed
+                self.file.close()
+
+    def create(self) -> int:
+        """Make the file, with all but the blocks in it; return its size."""
+        with _netcdf(self.data, self.data) as file:
+            _head(file, self.spec, self.table, self.spec.labels, self.command)
+            for name in self.table.data_vars:
+                # the first value that is written makes room for all
+                file[name][(-1,) * file[name].ndim or ...] = 0
+        parts.sync(self.data)
+        self.file = netCDF4.Dataset(self.data, "r+")
+        self.file.set_auto_maskandscale(False)
+        return self.data.stat().st_size
+
+    def open(self, nbytes: int) -> bool:
+        """Open the file of an earlier run; whether all but its blocks is as it should be."""
+        try:
+            if self.data.stat().st_size < nbytes:
+                os.truncate(self.data, nbytes)  # what was cut off is zeros: the blocks that are whole can be read
+            self.file = netCDF4.Dataset(self.data, "r+")
+            self.file.set_auto_maskandscale(False)
+            return all(
+                np.array_equal(self.file[name][...], coordinate.values)
+                for name, coordinate in self.table.coords.items()
+            ) and all(self.file[name].shape == result.values.shape for name, result in self.table.data_vars.items())
+        except (OSError, RuntimeError, IndexError):
+            return False
+
+    def read(self, number: int, block: Block) -> dict[str, NDArray[Any]] | None:
+        """Return a block's values as they are stored, or None."""
+        assert self.file is not None
+        try:
+            return {
+                name: np.asarray(self.file[name][_where(block, result.dims)])
+                for name, result in self.table.data_vars.items()
+            }
+        except (OSError, RuntimeError):
+            return None
+
+    def write(self, number: int, block: Block, table: Table) -> dict[str, NDArray[Any]]:
+        """Write a block, have it on the disk, and return its values as they are stored."""
+        assert self.file is not None
+        arrays = {}
+        for name, result in table.data_vars.items():
+            arrays[name] = result.values.astype(self.spec.dtype(name), copy=False)
+            self.file[name][_where(block, result.dims)] = arrays[name]
+        self.file.sync()
+        parts.sync(self.data)
+        return arrays
+
+
+class _Files:
+    """A folder with a netCDF file for each block, complete by itself."""
+
+    def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
+        self.spec, self.data, self.command = spec, data, command
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def create(self) -> int:
+        """Make the folder."""
+        self.data.mkdir()
+        return 0
+
+    def open(self, nbytes: int) -> bool:
+        """Whether there is a folder of an earlier run."""
+        return self.data.is_dir()
+
+    def read(self, number: int, block: Block) -> dict[str, NDArray[Any]] | None:
+        """Return a block's values as they are stored, or None."""
+        try:
+            with netCDF4.Dataset(self._name(number)) as file:
+                file.set_auto_maskandscale(False)
+                return {name: np.asarray(file[name][...]) for name in self.spec.output.variables}
+        except (OSError, RuntimeError, IndexError):
+            return None
+
+    def write(self, number: int, block: Block, table: Table) -> dict[str, NDArray[Any]]:
+        """Write a block, have it on the disk, and return its values as they are stored."""
+        results = {
+            name: replace(result, values=result.values.astype(self.spec.dtype(name), copy=False))
+            for name, result in table.data_vars.items()
+        }
+        coords = dict(table.coords)
+        labels = self.spec.labels
+        if "case" in block:
+            # files are put together by the coordinates of their dimensions, which rows of [[cases]] lack
+            rows = np.arange(block["case"].start, block["case"].stop, dtype=np.int32) + 1
+            coords["case"] = Variable(("case",), rows, {"long_name": "row of [[cases]]", "units": "1"})
+            labels = labels[block["case"]]
+        stored = replace(table, coords=coords, data_vars=results)
+        path = self._name(number)
+        temporary = path.with_suffix(".tmp")
+        with _netcdf(temporary, path) as file:
+            _head(file, self.spec, stored, labels, self.command)
+            for name, result in results.items():
+                file[name][...] = result.values
+        parts.sync(temporary)
+        temporary.replace(path)
+        parts.sync(self.data)
+        return {name: result.values for name, result in results.items()}
+
+    def _name(self, number: int) -> Path:
+        return self.data / f"block-{number:06}.nc"
+
+
+def _where(block: Mapping[str, slice], dims: tuple[str, ...]) -> Any:
+    return tuple(block[dim] for dim in dims) or ...
+
+
+def _head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[str, ...], command: str) -> None:
+    """Write all of a sweep's file but its results."""
+    _define(file, table, spec.dtype)
+    _label_cases(file, labels)
+    _describe(file, {**table.attrs, "title": spec.output.title, **_provenance(command), "sweep": spec.text})
+    file.set_auto_maskandscale(False)
+    for name, coordinate in table.coords.items():
+        file[name][...] = coordinate.values
+
+
+def _nbytes(path: Path) -> int:
+    """Bytes that a file, or the files of a folder, take on the disk."""
+    if path.is_dir():
+        return sum(entry.stat().st_size for entry in path.iterdir())
+    return path.stat().st_size if path.exists() else 0
 
 
 def write_table(table: Table, path: Path, *, title: str, command: str, overwrite: bool = False) -> None:
@@ -270,10 +505,11 @@ def write_table(table: Table, path: Path, *, title: str, command: str, overwrite
         _netcdf(temporary, path) as file,
         _writing(path),
     ):
-        shape = table.sizes
-        _define(file, shape, chunk_lengths(shape), table, lambda name: table[name].values.dtype)
+        _define(file, table, lambda name: table[name].values.dtype)
         _describe(file, {**table.attrs, "title": title, **_provenance(command)})
-        _fill(file, table, {})
+        file.set_auto_maskandscale(False)
+        for name, array in {**table.coords, **table.data_vars}.items():
+            file[name][...] = array.values
 
 
 def without_time_axis(table: Table) -> Table:
@@ -293,21 +529,20 @@ def without_time_axis(table: Table) -> Table:
     return Table(coords, data_vars, table.attrs)
 
 
-def _check_size(spec: SweepSpec, path: Path, block_cells: int) -> None:
+def _check_size(spec: SweepSpec, path: Path, block_cells: int, written: int) -> None:
     """Refuse a grid whose file cannot fit on the disk, or whose blocks cannot fit in memory."""
     free = shutil.disk_usage(path.parent).free
-    if spec.nbytes > free:
+    if spec.nbytes > free + written:
         raise InputError(
             f"{spec.source}: a grid of {spec.cells:.3g} cells makes {size_text(spec.nbytes)}, but {path.parent} has "
             f"{size_text(free)} free: take coarser axes, fewer output.variables, "
             'output.dtype = "float32" or another disk'
         )
     memory = available_memory()
-    # a block's results, and as much again for work
-    needed = 2 * math.prod(block_lengths(spec.shape, block_cells).values()) * spec.nbytes // spec.cells
+    needed = block_memory(spec, block_cells)
     if memory is not None and needed > memory:
         raise InputError(
-            f"{spec.source}: a block of {_block_text(spec, block_cells)} needs {size_text(needed)} of memory, "
+            f"{spec.source}: blocks of {_block_text(spec, block_cells)} need {size_text(needed)} of memory, "
             f"but {size_text(memory)} is free: close other programs or take fewer output.variables"
         )
 
@@ -336,14 +571,12 @@ def _netcdf(temporary: Path, path: Path) -> Iterator[netCDF4.Dataset]:
         file.close()
 
 
-def _define(
-    file: netCDF4.Dataset,
-    shape: Mapping[str, int],
-    chunks: Mapping[str, int],
-    table: Table,
-    dtype: Callable[[str], np.dtype[Any]],
-) -> None:
-    """Define dimensions and variables for `table` or, where it is a block, for the grid of `shape`."""
+def _define(file: netCDF4.Dataset, table: Table, dtype: Callable[[str], np.dtype[Any]]) -> None:
+    """Define the dimensions and variables of `table`."""
+    sizes = table.sizes
+    # in the order of the results, which that of the coordinates need not be
+    widest = max((result.dims for result in table.data_vars.values()), key=len, default=())
+    shape = {dim: sizes[dim] for dim in (*widest, *sizes)}
     for dim, length in shape.items():
         file.createDimension(dim, length)
     for name, coordinate in table.coords.items():
@@ -351,11 +584,8 @@ def _define(
         _describe(variable, coordinate.attrs)
     for name, result in table.data_vars.items():
         dims, kind = result.dims, dtype(name)
-        options: dict[str, Any] = {"contiguous": True}
-        if kind.kind != "f" and dims:
-            options = {"chunksizes": [chunks[dim] for dim in dims], "zlib": True, "complevel": 1, "shuffle": True}
         fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name in _WITH_MISSING else None
-        variable = file.createVariable(name, kind, dims, fill_value=fill, **options)
+        variable = file.createVariable(name, kind, dims, fill_value=fill, contiguous=True)
         attributes = dict(result.attrs)
         if attributes.get("ancillary_variables") not in table:
             attributes.pop("ancillary_variables", None)
@@ -399,15 +629,6 @@ def _provenance(command: str) -> dict[str, str]:
         "Conventions": "CF-1.11",
         "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}",
     }
-
-
-def _fill(file: netCDF4.Dataset, table: Table, block: Mapping[str, slice]) -> None:
-    """Write the values of a block; dimensions that `block` does not name are whole."""
-    for name, array in {**table.coords, **table.data_vars}.items():
-        variable = file[name]
-        variable.set_auto_maskandscale(False)
-        where = tuple(block.get(dim, slice(None)) for dim in array.dims)
-        variable[where or ...] = array.values.astype(variable.dtype, copy=False)
 
 
 # --------------------------------------------------------------------------- reading a file
@@ -484,8 +705,17 @@ def _count(file: netCDF4.Dataset) -> Tally:
             variable = file[name]
             variable.set_auto_mask(False)
             tally.cells = variable.size
-            for block in blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
+            for block in grid_blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
                 tally.add({name: variable[tuple(block.values())]})
+    return tally
+
+
+def _stored_tally(path: Path) -> Tally:
+    """Count what is in a file, or in the files of a folder."""
+    tally = Tally()
+    for name in sorted(path.iterdir()) if path.is_dir() else [path]:
+        with netCDF4.Dataset(name) as file:
+            tally.merge(_count(file))
     return tally
 
 

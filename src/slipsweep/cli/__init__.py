@@ -78,9 +78,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _fail("out of memory", 1)
     except (RunError, OSError) as error:
-        return _fail(str(error), 1)
+        return _fail("; ".join([str(error), *getattr(error, "__notes__", [])]), 1)
     except Interrupted as error:
-        print("slipsweep: interrupted; nothing written", file=sys.stderr)
+        kept = "; ".join(getattr(error, "__notes__", ["nothing written"]))
+        print(f"slipsweep: interrupted; {kept}", file=sys.stderr)
         return 128 + error.signum
     return status if isinstance(status, int) else 0
 

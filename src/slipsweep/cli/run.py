@@ -30,23 +30,47 @@ def run(
         ),
     ] = None,
     overwrite: Overwrite = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with an interrupted run, from the blocks that it finished.")
+    ] = False,
+    split: Annotated[
+        bool, typer.Option("--split", help="Write a folder with a netCDF file for each block, not one file.")
+    ] = False,
+    memory: Annotated[
+        str | None,
+        typer.Option(metavar="SIZE", help="Most memory to take, like 512MiB or 2GB (default: 500 to 600 MB)."),
+    ] = None,
     solver: Annotated[
         Literal["auto", "step", "cycle"] | None, typer.Option(help="Solver, over the sweep file's solver.method.")
     ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
-    from slipsweep import spec, store
-    from slipsweep.resources import size_text
+    from slipsweep import blocks, spec, store
+    from slipsweep.resources import parse_size, size_text
 
+    if resume and overwrite:
+        raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
     checked = spec.load(sweep)
     if solver is not None:
         checked = checked.with_solver(solver)
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
+    if split and output is None:
+        path = path.with_suffix("")
+    cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked)
     if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
         raise InputError(f"{path}: is the sweep file itself; give another name with -o")
     with progress_bar(checked.cells, quiet) as progress:
-        report = store.run(checked, path, command=typed_command(), overwrite=overwrite, progress=progress)
+        report = store.run(
+            checked,
+            path,
+            command=typed_command(),
+            overwrite=overwrite,
+            resume=resume,
+            split=split,
+            block_cells=cells,
+            progress=progress,
+        )
     if quiet:
         return
     rate = report.tally.cells / max(report.seconds, 1e-9)

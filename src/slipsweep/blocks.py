@@ -1,0 +1,112 @@
+"""Blocks of a grid: how a sweep is cut, and how its blocks are solved in this process."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import TypeAlias
+
+import numpy as np
+
+from slipsweep.errors import InputError
+from slipsweep.resources import size_text
+from slipsweep.spec import SweepSpec
+from slipsweep.tables import Table
+from slipsweep.variables import RESULT_DTYPES
+
+#: A part of a grid: where it lies along each dimension.
+Block: TypeAlias = dict[str, slice]
+
+#: Called with a number of cells just solved, from any thread.
+Progress: TypeAlias = Callable[[int], None]
+
+#: What solves blocks, given with their numbers: yields each with its number, in any order.
+#: A block's results are let go of before the next is asked for, but for one.
+Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
+
+#: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
+BLOCK_CELLS = 4_000_000
+
+#: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
+#: 469 MB, of which 96 MB were its blocks.
+_BASE_MEMORY = 400_000_000
+
+#: Dimensions that blocks cut last.  Charts are drawn over these two, and a whole
+#: frequency axis costs `sweep` hardly more than one frequency.
+_CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
+
+
+def _cut_order(shape: Mapping[str, int]) -> list[str]:
+    return [dim for dim in shape if dim not in _CUT_LAST] + [dim for dim in _CUT_LAST if dim in shape]
+
+
+def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
+    """Return the block of a grid: at most `most` cells, whole along frequency and amplitude as far as they allow."""
+    lengths: dict[str, int] = {}
+    cells = 1
+    for dim in reversed(_cut_order(shape)):
+        # equal shares rather than full blocks and a remnant
+        pieces = math.ceil(shape[dim] / max(1, most // cells))
+        lengths[dim] = math.ceil(shape[dim] / pieces)
+        cells *= lengths[dim]
+    return {dim: lengths[dim] for dim in shape}
+
+
+def block_memory(spec: SweepSpec, most: int) -> int:
+    """Return the memory that blocks of at most `most` cells take, in bytes.
+
+    Two are there at a time, one being solved and one being written, with 8 bytes a cell
+    for conversion and counting.
+    """
+    return math.prod(block_lengths(spec.shape, most).values()) * _cell_memory(spec)
+
+
+def cells_within(memory: int, spec: SweepSpec) -> int:
+    """Return how many cells a block may have for a run to stay within `memory` bytes.
+
+    Raises
+    ------
+    InputError
+        Not even a small block fits.
+    """
+    cells = (memory - _BASE_MEMORY) // _cell_memory(spec)
+    if cells < 1000:
+        least = _BASE_MEMORY + 1000 * _cell_memory(spec)
+        raise InputError(f"--memory = {size_text(memory)}: must be {size_text(math.ceil(least / 1e6) * 1e6)} at least")
+    return cells
+
+
+def _cell_memory(spec: SweepSpec) -> int:
+    return 2 * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
+
+
+def grid_blocks(shape: Mapping[str, int], most: int) -> Iterator[Block]:
+    """Cut a grid into blocks, in the order of the file."""
+    lengths = block_lengths(shape, most)
+    starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
+    for corner in itertools.product(*starts):
+        yield {
+            dim: slice(start, min(start + lengths[dim], shape[dim])) for dim, start in zip(shape, corner, strict=True)
+        }
+
+
+def solve_here(
+    spec: SweepSpec, blocks: Mapping[int, Block], progress: Progress | None = None
+) -> Iterator[tuple[int, Table]]:
+    """Solve blocks one after the other in this process.
+
+    Parameters
+    ----------
+    spec : SweepSpec
+    blocks : mapping of int to Block
+        The blocks to solve, by their numbers.
+    progress : callable, optional
+
+    Yields
+    ------
+    int, Table
+        The number of a block, and its results with their coordinates.
+    """
+    from slipsweep.plans import plan_sweep  # imports numba: not for `info`, and not to be counted as computing time
+
+    for number, block in blocks.items():
+        yield number, plan_sweep(**spec.arguments(block)).solve(progress)

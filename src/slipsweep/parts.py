@@ -1,0 +1,263 @@
+"""A run's work folder: which blocks are finished, so that an interrupted run can go on.
+
+Beside an output ``OUT.nc`` lies, while it is being made, the folder ``OUT.nc.parts``:
+
+``lock``
+    Held by the run that writes, so that a second is refused.
+``manifest.json``
+    What the blocks belong to: the sweep file's text, the solver, the versions of all that
+    computes, the size of the blocks; under a checksum.
+``journal``
+    One line for each finished block: its number and the SHA-256 of its values.  A line is
+    written after the block itself is on the disk, so that the journal never promises more
+    than there is.
+``data.nc``, or with --split the folder ``data``
+    The blocks.
+
+The data are renamed to the output when all blocks are there; then the folder is removed.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import filelock
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep._version import __version__
+from slipsweep.errors import InputError, RunError
+from slipsweep.spec import SweepSpec
+
+#: Sources whose change may change a result or the blocks it is cut into.
+_SOURCES = (
+    "elementary.py",
+    "equations.py",
+    "variables.py",
+    "parameters.py",
+    "plans.py",
+    "engine.py",
+    "spec.py",
+    "blocks.py",
+    "kernels/*.py",
+)
+
+_COMPLETE = "complete"
+
+
+@cache
+def numerics() -> str:
+    """Digest of all sources that a result depends on."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for pattern in _SOURCES:
+        for source in sorted(here.glob(pattern)):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
+    """What two runs must have in common for one to go on with the blocks of the other."""
+    return {
+        "sweep file": spec.text,
+        "solver": spec.solver.method,
+        "--split": split,
+        "slipsweep version": __version__,
+        "slipsweep sources": numerics(),
+        "numpy version": version("numpy"),
+        "numba version": version("numba"),
+    }
+
+
+def checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """SHA-256 of a block's values."""
+    digest = hashlib.sha256()
+    for name, values in arrays.items():
+        digest.update(f"{name} {values.dtype.str} {values.shape};".encode())
+        digest.update(np.ascontiguousarray(values).data)
+    return digest.hexdigest()
+
+
+def sync(path: Path) -> None:
+    """Have a file, or on POSIX a folder, on the disk itself, so that a power cut does not take it back."""
+    if path.is_dir() and os.name != "posix":  # elsewhere a folder cannot be opened
+        return
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@dataclass
+class Manifest:
+    """What the blocks in a work folder belong to.
+
+    Attributes
+    ----------
+    identity : dict
+        See `identity`.
+    block_cells : int
+        Largest number of cells of a block: with the grid, it says how blocks are cut.
+    overwrite : bool
+        Whether the run may replace an output that exists.
+    nbytes : int
+        Size of the file that the blocks lie in (0: each has its own).
+    """
+
+    identity: dict[str, Any]
+    block_cells: int
+    overwrite: bool
+    nbytes: int = 0
+
+    def difference(self, other: Mapping[str, Any]) -> str | None:
+        """Say in what another identity differs, or None."""
+        for name, value in self.identity.items():
+            if other.get(name) == value:
+                continue
+            if name == "sweep file":
+                return f"the sweep file differs: {_first_difference(value, other[name])}"
+            return f"{name} was {value}, is {other.get(name)}"
+        return None
+
+
+def _first_difference(before: str, after: str) -> str:
+    old, new = before.splitlines(), after.splitlines()
+    number = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), min(len(old), len(new)))
+    lines = [repr(text[number].strip()) if number < len(text) else "missing" for text in (old, new)]
+    return f"line {number + 1} was {lines[0]}, is {lines[1]}"
+
+
+class Folder:
+    """The work folder of one output; see `opened`."""
+
+    def __init__(self, path: Path) -> None:
+        self.output = path
+        self.path = path.with_name(f"{path.name}.parts")
+        self.manifest: Manifest | None = None
+        self.finished: dict[int, str] = {}  # number of a block: checksum
+        self.complete = False
+        self.done = False
+
+    def data(self, split: bool) -> Path:
+        """Where the blocks are."""
+        return self.path / ("data" if split else "data.nc")
+
+    def read(self) -> None:
+        """Read manifest and journal, as far as they are there.
+
+        Raises
+        ------
+        InputError
+            The manifest is damaged although there are finished blocks.
+        """
+        with suppress(FileNotFoundError):
+            for line in (self.path / "journal").read_text(errors="replace").splitlines():
+                number, _, digest = line.partition(" ")
+                if line == _COMPLETE:
+                    self.complete = True
+                elif number.isdecimal() and len(digest) == 64:  # not the torn line of a run that was killed
+                    self.finished[int(number)] = digest
+        try:
+            head, _, content = (self.path / "manifest.json").read_text().partition("\n")
+            if hashlib.sha256(content.encode()).hexdigest() != head:
+                raise ValueError
+            self.manifest = Manifest(**json.loads(content))
+        except (ValueError, TypeError, FileNotFoundError):
+            if self.finished:
+                raise InputError(
+                    f"{self.path / 'manifest.json'}: damaged or missing: what the {len(self.finished)} finished "
+                    "blocks belong to cannot be told; start anew with --overwrite"
+                ) from None
+
+    def clear(self) -> None:
+        """Remove all that an earlier run left."""
+        self.manifest, self.finished, self.complete = None, {}, False
+        for entry in self.path.iterdir():
+            if entry.is_dir():
+                shutil.rmtree(entry)
+            elif entry.name != "lock":
+                entry.unlink()
+
+    def begin(self, manifest: Manifest) -> None:
+        """Write the manifest, after which blocks may be added."""
+        self.manifest = manifest
+        content = json.dumps(vars(manifest), indent=1)
+        self._write("manifest.json", f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}")
+        sync(self.path.parent)
+
+    def keep(self, finished: Mapping[int, str]) -> None:
+        """Set the journal to those blocks that were found to be as they were written."""
+        self.finished = dict(finished)
+        self._write("journal", "".join(f"{number} {digest}\n" for number, digest in finished.items()))
+
+    def add(self, number: int, digest: str) -> None:
+        """Put a block that is on the disk on record."""
+        self._append(f"{number} {digest}")
+        self.finished[number] = digest
+
+    def close(self) -> None:
+        """Put on record that all blocks are there, hence that data which are missing have become the output."""
+        self._append(_COMPLETE)
+
+    def _append(self, line: str) -> None:
+        with (self.path / "journal").open("a") as journal:
+            journal.write(f"{line}\n")
+            journal.flush()
+            os.fsync(journal.fileno())
+
+    def _write(self, name: str, text: str) -> None:
+        """Replace a file in one step."""
+        temporary = self.path / f"{name}.tmp"
+        temporary.write_text(text)
+        sync(temporary)
+        temporary.replace(self.path / name)
+        sync(self.path)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Folder]:
+    """Make or find the work folder of an output, and hold its lock.
+
+    On the way out the folder is removed if the run is `done` or no block is finished.
+    An exception that passes through gets a note of how many blocks are kept.
+
+    Raises
+    ------
+    RunError
+        Another run holds it, or it cannot be locked.
+    """
+    folder = Folder(path)
+    lock = _lock(folder)
+    try:
+        yield folder
+    finally:
+        if folder.done or not (folder.path / "journal").exists() or not (folder.finished or folder.complete):
+            shutil.rmtree(folder.path, ignore_errors=True)
+        lock.release()
+
+
+def _lock(folder: Folder) -> filelock.BaseFileLock:
+    lock = filelock.FileLock(folder.path / "lock", timeout=0)
+    for _ in range(20):
+        try:
+            folder.path.mkdir(exist_ok=True)
+            lock.acquire()
+        except filelock.Timeout:
+            raise RunError(f"{folder.output}: another run is writing it; wait for it, or give another name") from None
+        except FileNotFoundError:  # the run that had it has just removed it
+            continue
+        except (OSError, NotImplementedError) as error:
+            raise RunError(f"{folder.path}: cannot be made or locked: {error}") from error
+        if (folder.path / "lock").exists():
+            return lock
+        lock.release()
+    raise RunError(f"{folder.output}: another run is writing it; wait for it, or give another name")
