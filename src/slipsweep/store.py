@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import netCDF4
 import numpy as np
@@ -162,6 +162,15 @@ def _writing(path: Path) -> Iterator[None]:
 
 # ------------------------------------------------------------------------- running a sweep
 
+#: A part of a grid: where it lies along each dimension.
+Block: TypeAlias = dict[str, slice]
+
+#: Called with a number of cells just solved, from any thread.
+Progress: TypeAlias = Callable[[int], None]
+
+#: What solves blocks, given with their numbers: yields each with its number, in any order.
+Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
+
 
 @dataclass
 class Tally:
@@ -204,6 +213,7 @@ def run(
     overwrite: bool = False,
     block_cells: int = BLOCK_CELLS,
     progress: Callable[[int], None] | None = None,
+    solved: Solved | None = None,
 ) -> Report:
     """Compute a sweep and write it as netCDF, complete or not at all.
 
@@ -220,6 +230,8 @@ def run(
         Cells solved and written at a time, hence in memory.
     progress : callable
         Called with a number of cells just solved, from any thread.
+    solved : callable
+        Solves the blocks; by default one after the other in this process.
 
     Returns
     -------
@@ -234,29 +246,45 @@ def run(
     """
     check_output(path, overwrite)
     _check_size(spec, path, block_cells)
-    from slipsweep.plans import plan_sweep  # imports numba: not for `info`, and not to be counted as computing time
+    import slipsweep.plans  # noqa: F401 - imports numba: not for `info`, and not to be counted as computing time
 
     started = time.perf_counter()
     tally = Tally(spec.cells)
     with complete_or_absent(path, overwrite) as temporary:
         with _netcdf(temporary, path) as file:
-            for number, block in enumerate(blocks(spec.shape, block_cells)):
+            numbered = dict(enumerate(blocks(spec.shape, block_cells)))
+            found = (solved or _solve_here)(spec, numbered, progress)
+            defined = False
+            while True:
                 try:
-                    results = plan_sweep(**spec.arguments(block)).solve(progress)
+                    number, results = next(found, (-1, None))
                 except MemoryError:
                     raise RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}") from None
+                if results is None:
+                    break
                 with _writing(path):
-                    if number == 0:
+                    if not defined:
+                        defined = True
                         chunks = chunk_lengths(spec.shape, block_cells)
                         _define(file, spec.shape, chunks, results, spec.dtype)
                         _label_cases(file, spec.labels)
                         _describe(file, {**results.attrs, "title": spec.output.title, **_provenance(command)})
                         _describe(file, {"sweep": spec.text})
-                    _fill(file, results, block)
+                    _fill(file, results, numbered[number])
                 arrays = {name: results[name].values for name in ("sliding_mode", "validity") if name in results}
                 tally.add(arrays)
         nbytes = temporary.stat().st_size
     return Report(path, spec.shape, time.perf_counter() - started, nbytes, tally)
+
+
+def _solve_here(
+    spec: SweepSpec, numbered: Mapping[int, Block], progress: Progress | None
+) -> Iterator[tuple[int, Table]]:
+    """Solve blocks one after the other, each on all threads of this process."""
+    from slipsweep.plans import plan_sweep
+
+    for number, block in numbered.items():
+        yield number, plan_sweep(**spec.arguments(block)).solve(progress)
 
 
 def write_table(table: Table, path: Path, *, title: str, command: str, overwrite: bool = False) -> None:

@@ -1,5 +1,6 @@
 """`slipsweep run`: a sweep computed and written."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -29,6 +30,14 @@ def run(
     solver: Annotated[
         Literal["auto", "step", "cycle"] | None, typer.Option(help="Solver, over the sweep file's solver.method.")
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Solve on N processes of this machine (needs the extra [cluster])."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Solve on the workers of the dask scheduler at HOST:PORT."),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
@@ -41,8 +50,16 @@ def run(
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
     if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
         raise InputError(f"{path}: is the sweep file itself; give another name with -o")
-    with progress_bar(checked.cells, quiet) as progress:
-        report = store.run(checked, path, command=typed_command(), overwrite=overwrite, progress=progress)
+    with ExitStack() as stack:
+        solved = None
+        progress = stack.enter_context(progress_bar(checked.cells, quiet))
+        if workers is not None or scheduler is not None:
+            from slipsweep.cluster import cluster
+
+            solved = stack.enter_context(cluster(workers=workers, scheduler=scheduler))
+        report = store.run(
+            checked, path, command=typed_command(), overwrite=overwrite, progress=progress, solved=solved
+        )
     if quiet:
         return
     rate = report.tally.cells / max(report.seconds, 1e-9)
