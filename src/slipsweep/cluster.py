@@ -11,6 +11,7 @@ import itertools
 import logging
 import math
 import queue
+import signal
 import time
 import warnings
 from collections.abc import Iterator, Mapping
@@ -129,6 +130,7 @@ def _connect(stack: ExitStack, workers: int | None, scheduler: str | None) -> "t
                 host="127.0.0.1",
                 dashboard_address=None,
                 memory_limit=0,  # blocks are sized to fit: no worker is to be paused or killed over them
+                preload=[__name__],  # calls `dask_setup`
                 silence_logs=logging.CRITICAL,
             )
         )
@@ -141,6 +143,11 @@ def _connect(stack: ExitStack, workers: int | None, scheduler: str | None) -> "t
         raise RunError(f"no scheduler answers at {address}: {error}") from None
     stack.callback(_close, client)
     return client, address
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C, which a terminal sends to all processes, to the one that closes the cluster; dask calls this."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _close(client: "Client") -> None:
