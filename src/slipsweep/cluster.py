@@ -128,7 +128,9 @@ def _connect(stack: ExitStack, workers: int | None, scheduler: str | None) -> "t
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
+                # no dashboard; what status pages are left must not ask for port 8787, which another may have
                 dashboard_address=None,
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
                 memory_limit=0,  # blocks are sized to fit: no worker is to be paused or killed over them
                 preload=[__name__],  # calls `dask_setup`
                 silence_logs=logging.CRITICAL,
