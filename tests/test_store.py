@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slipsweep
-from slipsweep import plans, spec, store, variables
+from slipsweep import blocks, plans, spec, store, variables
 from slipsweep.errors import InputError, RunError
 from slipsweep.tables import Table, Variable
 
@@ -79,8 +79,8 @@ SHAPES = st.dictionaries(
 @given(shape=SHAPES, most=st.integers(1, 400))
 @settings(max_examples=200, deadline=None)
 def test_blocks_cover_the_grid_once_and_keep_within_the_limit(shape: dict[str, int], most: int) -> None:
-    chunks = store.chunk_lengths(shape, most)
-    parts = list(store.blocks(shape, most))
+    chunks = blocks.chunk_lengths(shape, most)
+    parts = list(blocks.grid_blocks(shape, most))
     seen = np.zeros(tuple(shape.values()), int)
     for part in parts:
         block = seen[tuple(part.values())]
@@ -94,14 +94,14 @@ def test_blocks_cover_the_grid_once_and_keep_within_the_limit(shape: dict[str, i
 
 def test_blocks_cut_the_frequency_axis_last() -> None:
     shape = {"theta": 50, "mu_s": 20, "amplitude": 300, "frequency": 1000, "case": 7}
-    assert store.block_lengths(shape, 4_000_000) == {
+    assert blocks.block_lengths(shape, 4_000_000) == {
         "theta": 1,
         "mu_s": 1,
         "amplitude": 300,
         "frequency": 1000,
         "case": 7,
     }
-    assert store.block_lengths(shape, 400_000)["frequency"] == 1000
+    assert blocks.block_lengths(shape, 400_000)["frequency"] == 1000
 
 
 # ----------------------------------------------------------------------------- what is in it

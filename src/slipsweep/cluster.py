@@ -19,9 +19,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from slipsweep._version import __version__
+from slipsweep.blocks import Block, Progress, Solved
 from slipsweep.errors import InputError, RunError
 from slipsweep.spec import SweepSpec
-from slipsweep.store import Block, Progress, Solved
 from slipsweep.tables import Table
 
 if TYPE_CHECKING:

@@ -16,12 +16,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.blocks import Solved, block_lengths, chunk_lengths, grid_blocks, solve_here
 from slipsweep.errors import InputError, RunError
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
@@ -30,56 +31,6 @@ from slipsweep.variables import SlidingMode, Validity
 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
 BLOCK_CELLS = 4_000_000
-
-#: Cells in a chunk of a flag variable: read in well under a millisecond.
-CHUNK_CELLS = 2**18
-
-#: Dimensions that blocks and chunks cut last.  Charts are drawn over these two, and a whole
-#: frequency axis costs `sweep` hardly more than one frequency.
-_CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
-
-
-# ------------------------------------------------------------------------ blocks of a grid
-
-
-def _cut_order(shape: Mapping[str, int]) -> list[str]:
-    return [dim for dim in shape if dim not in _CUT_LAST] + [dim for dim in _CUT_LAST if dim in shape]
-
-
-def chunk_lengths(shape: Mapping[str, int], most: int = CHUNK_CELLS) -> dict[str, int]:
-    """Return the chunk of a grid: whole along frequency and amplitude as far as `most` and `CHUNK_CELLS` allow."""
-    most = min(most, CHUNK_CELLS)
-    lengths: dict[str, int] = {}
-    cells = 1
-    for dim in reversed(_cut_order(shape)):
-        pieces = math.ceil(shape[dim] / max(1, most // cells))
-        lengths[dim] = math.ceil(shape[dim] / pieces)
-        cells *= lengths[dim]
-    return lengths
-
-
-def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the block of a grid: at most `most` cells, in whole chunks."""
-    lengths = dict(shape)
-    chunks = chunk_lengths(shape, most)
-    for dim in _cut_order(shape):
-        others = math.prod(lengths.values()) // lengths[dim]
-        count = math.ceil(shape[dim] / chunks[dim])
-        pieces = math.ceil(count / max(1, most // (others * chunks[dim])))
-        # equal shares rather than full blocks and a remnant
-        lengths[dim] = min(shape[dim], chunks[dim] * math.ceil(count / pieces))
-    return lengths
-
-
-def blocks(shape: Mapping[str, int], most: int) -> Iterator[dict[str, slice]]:
-    """Cut a grid into blocks, in the order of the file."""
-    lengths = block_lengths(shape, most)
-    starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
-    for corner in itertools.product(*starts):
-        yield {
-            dim: slice(start, min(start + lengths[dim], shape[dim])) for dim, start in zip(shape, corner, strict=True)
-        }
-
 
 # ------------------------------------------------------------------- complete or not there
 
@@ -162,15 +113,6 @@ def _writing(path: Path) -> Iterator[None]:
 
 # ------------------------------------------------------------------------- running a sweep
 
-#: A part of a grid: where it lies along each dimension.
-Block: TypeAlias = dict[str, slice]
-
-#: Called with a number of cells just solved, from any thread.
-Progress: TypeAlias = Callable[[int], None]
-
-#: What solves blocks, given with their numbers: yields each with its number, in any order.
-Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
-
 
 @dataclass
 class Tally:
@@ -213,7 +155,7 @@ def run(
     overwrite: bool = False,
     block_cells: int = BLOCK_CELLS,
     progress: Callable[[int], None] | None = None,
-    solved: Solved | None = None,
+    solved: Solved = solve_here,
 ) -> Report:
     """Compute a sweep and write it as netCDF, complete or not at all.
 
@@ -231,7 +173,7 @@ def run(
     progress : callable
         Called with a number of cells just solved, from any thread.
     solved : callable
-        Solves the blocks; by default one after the other in this process.
+        What solves the blocks, in any order (`blocks.Solved`).
 
     Returns
     -------
@@ -246,45 +188,32 @@ def run(
     """
     check_output(path, overwrite)
     _check_size(spec, path, block_cells)
-    import slipsweep.plans  # noqa: F401 - imports numba: not for `info`, and not to be counted as computing time
-
     started = time.perf_counter()
     tally = Tally(spec.cells)
     with complete_or_absent(path, overwrite) as temporary:
         with _netcdf(temporary, path) as file:
-            numbered = dict(enumerate(blocks(spec.shape, block_cells)))
-            found = (solved or _solve_here)(spec, numbered, progress)
-            defined = False
+            cut = dict(enumerate(grid_blocks(spec.shape, block_cells)))
+            found = solved(spec, cut, progress)
             while True:
                 try:
-                    number, results = next(found, (-1, None))
+                    number, results = next(found)
+                except StopIteration:
+                    break
                 except MemoryError:
                     raise RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}") from None
-                if results is None:
-                    break
+                block = cut[number]
                 with _writing(path):
-                    if not defined:
-                        defined = True
+                    if not file.dimensions and not file.variables:  # the first to come
                         chunks = chunk_lengths(spec.shape, block_cells)
                         _define(file, spec.shape, chunks, results, spec.dtype)
                         _label_cases(file, spec.labels)
                         _describe(file, {**results.attrs, "title": spec.output.title, **_provenance(command)})
                         _describe(file, {"sweep": spec.text})
-                    _fill(file, results, numbered[number])
+                    _fill(file, results, block)
                 arrays = {name: results[name].values for name in ("sliding_mode", "validity") if name in results}
                 tally.add(arrays)
         nbytes = temporary.stat().st_size
     return Report(path, spec.shape, time.perf_counter() - started, nbytes, tally)
-
-
-def _solve_here(
-    spec: SweepSpec, numbered: Mapping[int, Block], progress: Progress | None
-) -> Iterator[tuple[int, Table]]:
-    """Solve blocks one after the other, each on all threads of this process."""
-    from slipsweep.plans import plan_sweep
-
-    for number, block in numbered.items():
-        yield number, plan_sweep(**spec.arguments(block)).solve(progress)
 
 
 def write_table(table: Table, path: Path, *, title: str, command: str, overwrite: bool = False) -> None:
@@ -474,7 +403,7 @@ def _count(file: netCDF4.Dataset) -> Tally:
             variable = file[name]
             variable.set_auto_mask(False)
             tally.cells = variable.size
-            for block in blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
+            for block in grid_blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
                 tally.add({name: variable[tuple(block.values())]})
     return tally
 

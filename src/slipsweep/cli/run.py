@@ -41,7 +41,7 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
-    from slipsweep import spec, store
+    from slipsweep import blocks, spec, store
     from slipsweep.resources import size_text
 
     checked = spec.load(sweep)
@@ -51,7 +51,7 @@ def run(
     if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
         raise InputError(f"{path}: is the sweep file itself; give another name with -o")
     with ExitStack() as stack:
-        solved = None
+        solved: blocks.Solved = blocks.solve_here
         progress = stack.enter_context(progress_bar(checked.cells, quiet))
         if workers is not None or scheduler is not None:
             from slipsweep.cluster import cluster
