@@ -48,9 +48,12 @@ BLOCK_CELLS = 400
 def dask(*arguments: str) -> "subprocess.Popen[bytes]":
     """Start `dask scheduler` or `dask worker`."""
     options = ("--host", "127.0.0.1", "--no-dashboard")
+    # by default half a minute goes by until a result is given up that a killed worker had
+    environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "2s"}
     return subprocess.Popen(
-        [sys.executable, "-m", "dask", *arguments, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+        [sys.executable, "-m", "dask", *arguments, *options],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment,
+    )  # fmt: skip
 
 
 @contextlib.contextmanager
