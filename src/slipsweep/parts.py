@@ -39,6 +39,7 @@ from slipsweep.spec import SweepSpec
 
 #: Sources whose change may change a result or the blocks it is cut into.
 _SOURCES = (
+    "compiled.py",
     "elementary.py",
     "equations.py",
     "variables.py",
