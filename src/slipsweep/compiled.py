@@ -14,6 +14,8 @@ would not be noticed.  `_Disk` takes its place:
 * The first process to need a kernel compiles it under a lock, the others wait and load.
   Where there is no lock to be had (some network folders) each compiles for itself.
 * Where no folder can be written, kernels are compiled in memory.
+* A kernel calls its own copies of the functions it is made of (`_Sealed`), so that the process
+  that compiled it computes the same bits as those that load it.
 
 `NUMBA_CACHE_DIR` moves the folder, as it does for numba; `NUMBA_DISABLE_JIT` is honoured.
 """
@@ -33,15 +35,16 @@ from pathlib import Path
 from typing import Any
 
 import filelock  # here: imported in the middle of a fork, its own fork handlers would fail
-import llvmlite
-import numba
+import llvmlite.binding
+import numba.core.compiler
 import platformdirs
 from numba import njit
 from numba.core.caching import NullCache
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-_SOURCES = ("elementary.py", "equations.py", "variables.py", "kernels/*.py")
+_SOURCES = ("compiled.py", "elementary.py", "equations.py", "variables.py", "kernels/*.py")
 
 #: Versions whose kernels are kept.
 _KEPT_FOLDERS = 4
@@ -148,6 +151,31 @@ class _Disk(NullCache):
             _remove_stale(self.path.parent)
 
 
+class _Sealed(JITCodeLibrary):
+    """Machine code of a kernel in which no function can be replaced by one of the same name.
+
+    numba gives a kernel a copy of every function it calls, optimised for it (loops in SIMD, say), as a
+    weak symbol.  Where the process already has such a function, from compiling it by itself or from
+    another kernel, the linker would take that one instead.  It may differ in its roundings: last digits
+    would depend on whether a kernel was just compiled or loaded, and on what was loaded before.
+    """
+
+    def _finalize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._finalize_final_module()
+
+
+class _Compiler(numba.core.compiler.Compiler):
+    """numba's compiler, writing into a sealed library."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
+        library = _Sealed(targetctx.codegen(), "kernel")
+        library.enable_object_caching()
+        super().__init__(typingctx, targetctx, library, *arguments)
+
+
 class Kernel:
     """A jitted function that is compiled, or loaded from disk, when first called.
 
@@ -171,7 +199,7 @@ class Kernel:
         return self._dispatcher(*args)
 
     def _ready(self, args: tuple[Any, ...]) -> Callable[..., Any]:
-        jitted: Any = njit(nogil=True, error_model="numpy")(self._function)
+        jitted: Any = njit(nogil=True, error_model="numpy", pipeline_class=_Compiler)(self._function)
         if numba.config.DISABLE_JIT:
             return jitted
         signature = tuple(numba.typeof(arg) for arg in args)

@@ -39,6 +39,7 @@ from slipsweep.spec import SweepSpec
 
 #: Sources whose change may change a result or the blocks it is cut into.
 _SOURCES = (
+    "compiled.py",
     "elementary.py",
     "equations.py",
     "variables.py",
@@ -66,10 +67,12 @@ def numerics() -> str:
 
 def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
     """What two runs must have in common for one to go on with the blocks of the other."""
+    return {"sweep file": spec.text, "solver": spec.solver.method, "--split": split, **installation()}
+
+
+def installation() -> dict[str, str]:
+    """What two processes must have in common to compute the same."""
     return {
-        "sweep file": spec.text,
-        "solver": spec.solver.method,
-        "--split": split,
         "slipsweep version": __version__,
         "slipsweep sources": numerics(),
         "numpy version": version("numpy"),

@@ -297,17 +297,17 @@ def parse(text: str, source: str) -> SweepSpec:
         # tomllib raises ValueError for integers too long to convert, RecursionError for deep nesting
         content = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
-        raise InputError(f"{source}: not valid TOML: {error}") from None
+        raise InputError(f"{source}: not valid TOML: {_one_line(str(error))}") from None
     try:
         file = SweepFile.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{source}: {_words(error)}") from None
+        raise InputError(f"{source}: {_one_line(_words(error))}") from None
     try:
         parameters = _parameters(file)
         _check_model(file)
         _check_variables(file, parameters)
     except InputError as error:
-        raise InputError(f"{source}: {error}") from None
+        raise InputError(f"{source}: {_one_line(str(error))}") from None
     labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
     return SweepSpec(source, text, parameters, labels, file.model, file.excitation, file.solver, file.output)
 
@@ -549,6 +549,16 @@ def _keys_beside(location: tuple[int | str, ...]) -> tuple[str, ...]:
                 annotation = get_args(annotation)[0]
             table = annotation
     return tuple(table.model_fields)
+
+
+#: Longest message about a sweep file.
+_MOST_CHARACTERS = 600
+
+
+def _one_line(message: str) -> str:
+    """Escape what a terminal would not print as it stands (a file may hold control characters), and cut the rest."""
+    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+    return text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 3]}..."
 
 
 def _show(value: object) -> str:

@@ -1,5 +1,6 @@
 """`slipsweep run`: a sweep computed and written."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -43,6 +44,14 @@ def run(
     solver: Annotated[
         Literal["auto", "step", "cycle"] | None, typer.Option(help="Solver, over the sweep file's solver.method.")
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Solve on N processes of this machine (needs the extra [cluster])."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Solve on the workers of the dask scheduler at HOST:PORT."),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
@@ -60,7 +69,13 @@ def run(
     cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked)
     if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
         raise InputError(f"{path}: is the sweep file itself; give another name with -o")
-    with progress_bar(checked.cells, quiet) as progress:
+    with ExitStack() as stack:
+        solved: blocks.Solved = blocks.solve_here
+        if workers is not None or scheduler is not None:
+            from slipsweep.cluster import cluster
+
+            solved = stack.enter_context(cluster(workers=workers, scheduler=scheduler))
+        progress = stack.enter_context(progress_bar(checked.cells, quiet))
         report = store.run(
             checked,
             path,
@@ -70,6 +85,7 @@ def run(
             split=split,
             block_cells=cells,
             progress=progress,
+            solved=solved,
         )
     if quiet:
         return
