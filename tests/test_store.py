@@ -266,10 +266,10 @@ def test_a_failed_run_leaves_nothing_but_finished_blocks(
         path.write_text("an earlier result")
     write = store._OneFile.write
 
-    def failing(self: store._OneFile, number: int, block: blocks.Block, table: Table) -> Any:
+    def failing(self: store._OneFile, number: int, *arguments: Any) -> Any:
         if number == last:
             raise type(raised)(*raised.args)
-        return write(self, number, block, table)
+        return write(self, number, *arguments)
 
     monkeypatch.setattr(store._OneFile, "write", failing)
     for last, left in ((0, set()), (2, {"a.nc.parts"})):
