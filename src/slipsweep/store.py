@@ -187,6 +187,7 @@ def run(
     resume: bool = False,
     split: bool = False,
     block_cells: int | None = None,
+    shared_cells: int | None = None,
     progress: Progress | None = None,
     solved: Solved = solve_here,
 ) -> Report:
@@ -209,8 +210,11 @@ def run(
     split : bool
         Write a folder with a netCDF file for each block.
     block_cells : int, optional
-        Cells solved and written at a time; two such blocks are in memory.  By default
+        Most cells to solve and write at a time; two such blocks are in memory.  By default
         `BLOCK_CELLS`, or what an interrupted run had.
+    shared_cells : int, optional
+        As many cells or fewer, so that those who solve blocks share them evenly; but what an
+        interrupted run had goes before.
     progress : callable
         Called with a number of cells just solved, from any thread.
     solved : callable
@@ -250,7 +254,7 @@ def run(
                 return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
         else:
             work.clear()
-        block_cells = block_cells or BLOCK_CELLS
+            block_cells = min(filter(None, (block_cells, shared_cells)), default=BLOCK_CELLS)
         # once more: a run that was writing it may have ended before this one got hold of the lock
         check_output(path, overwrite, folder=split)
         data = work.data(split)
