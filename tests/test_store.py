@@ -100,6 +100,20 @@ def test_blocks_cut_the_frequency_axis_last() -> None:
     assert blocks.block_lengths(shape, 400_000)["frequency"] == 1000
 
 
+def test_workers_share_a_sweep_evenly_within_the_memory() -> None:
+    night = spec.parse(GRID.replace("num = 40", "num = 1000000"), "a.toml")  # 60 million cells, 19 bytes each
+    assert blocks.cells_within(2 * 10**9, night) == (2 * 10**9 - 400 * 10**6) // (2 * 19 + 8)
+    assert blocks.cells_within(2 * 10**9, night, 4) == (2 * 10**9 - 1400 * 10**6) // (14 * 19 + 8)
+    with pytest.raises(InputError, match=r"--memory = 1 GB: must be 1\.41 GB at least with --workers 4"):
+        blocks.cells_within(10**9, night, 4)
+    stepping = night.with_solver("step")
+    assert blocks.cells_shared(stepping, 2) == 60_000_000 // 32
+    assert blocks.cells_shared(stepping, None) == 60_000_000 // 1024
+    assert blocks.cells_shared(stepping, 1000) == 10_000
+    assert blocks.cells_shared(night, None) == 500_000  # each but a few times what sending it takes
+    assert blocks.cells_shared(night, 1) == 60_000_000 // 16
+
+
 # ----------------------------------------------------------------------------- what is in it
 
 
@@ -266,10 +280,10 @@ def test_a_failed_run_leaves_nothing_but_finished_blocks(
         path.write_text("an earlier result")
     write = store._OneFile.write
 
-    def failing(self: store._OneFile, number: int, block: blocks.Block, table: Table) -> Any:
+    def failing(self: store._OneFile, number: int, *arguments: Any) -> Any:
         if number == last:
             raise type(raised)(*raised.args)
-        return write(self, number, block, table)
+        return write(self, number, *arguments)
 
     monkeypatch.setattr(store._OneFile, "write", failing)
     for last, left in ((0, set()), (2, {"a.nc.parts"})):

@@ -30,6 +30,18 @@ BLOCK_CELLS = 4_000_000
 #: 469 MB, of which 96 MB were its blocks.
 _BASE_MEMORY = 400_000_000
 
+#: Resident memory of a worker process on this machine beside its blocks (220 MB seen).
+_WORKER_MEMORY = 250_000_000
+
+#: Blocks for each worker process of a cluster, so that all end at about the same time, where
+#: that leaves blocks of this many cells at least: tens of milliseconds of work, against the
+#: two that a block takes on its way.
+_BLOCKS_A_WORKER = 16
+_LEAST_CELLS = {"step": 10_000, "cycle": 500_000}
+
+#: Processes reckoned with where a scheduler has them.
+_UNKNOWN_WORKERS = 64
+
 #: Dimensions that blocks cut last.  Charts are drawn over these two, and a whole
 #: frequency axis costs `sweep` hardly more than one frequency.
 _CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
@@ -60,23 +72,37 @@ def block_memory(spec: SweepSpec, most: int) -> int:
     return math.prod(block_lengths(spec.shape, most).values()) * _cell_memory(spec)
 
 
-def cells_within(memory: int, spec: SweepSpec) -> int:
+def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
     """Return how many cells a block may have for a run to stay within `memory` bytes.
+
+    With `workers` processes beside this one, of which each has a block being solved and two
+    waiting or on their way, that is the memory of all together.
 
     Raises
     ------
     InputError
         Not even a small block fits.
     """
-    cells = (memory - _BASE_MEMORY) // _cell_memory(spec)
+    base, cell = _BASE_MEMORY + workers * _WORKER_MEMORY, _cell_memory(spec, 2 + 3 * workers)
+    cells = (memory - base) // cell
     if cells < 1000:
-        least = _BASE_MEMORY + 1000 * _cell_memory(spec)
-        raise InputError(f"--memory = {size_text(memory)}: must be {size_text(math.ceil(least / 1e6) * 1e6)} at least")
+        least = base + 1000 * cell
+        digits = 10 ** (math.floor(math.log10(least)) - 2)  # three are shown: what is shown must be enough
+        shown = size_text(math.ceil(least / digits) * digits)
+        with_workers = f" with --workers {workers}" if workers else ""
+        raise InputError(f"--memory = {size_text(memory)}: must be {shown} at least{with_workers}")
     return cells
 
 
-def _cell_memory(spec: SweepSpec) -> int:
-    return 2 * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
+def cells_shared(spec: SweepSpec, workers: int | None) -> int:
+    """Return how many cells a block should have for workers to share a sweep evenly (None: a number unknown)."""
+    least = _LEAST_CELLS["step" if spec.solver.method == "step" else "cycle"]
+    share = spec.cells // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
+    return min(BLOCK_CELLS, max(least, share))
+
+
+def _cell_memory(spec: SweepSpec, blocks: int = 2) -> int:
+    return blocks * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
 
 
 def grid_blocks(shape: Mapping[str, int], most: int) -> Iterator[Block]:

@@ -9,8 +9,9 @@ Beside an output ``OUT.nc`` lies, while it is being made, the folder ``OUT.nc.pa
     computes, the size of the blocks; under a checksum.
 ``journal``
     One line for each finished block: its number and the SHA-256 of its values.  A line is
-    written after the block itself is on the disk, so that the journal never promises more
-    than there is.
+    written after the block itself, so that a run that is killed has all that its journal
+    promises.  Both are brought to the disk itself some time later: after a power cut the
+    journal may promise more than there is, which is why it holds checksums.
 ``data.nc``, or with --split the folder ``data``
     The blocks.
 
@@ -203,19 +204,23 @@ class Folder:
         self._write("journal", "".join(f"{number} {digest}\n" for number, digest in finished.items()))
 
     def add(self, number: int, digest: str) -> None:
-        """Put a block that is on the disk on record."""
+        """Put a block that is written on record."""
         self._append(f"{number} {digest}")
         self.finished[number] = digest
+
+    def sync(self) -> None:
+        """Have the journal on the disk itself."""
+        sync(self.path / "journal")
+        sync(self.path)
 
     def close(self) -> None:
         """Put on record that all blocks are there, hence that data which are missing have become the output."""
         self._append(_COMPLETE)
+        self.sync()
 
     def _append(self, line: str) -> None:
         with (self.path / "journal").open("a") as journal:
             journal.write(f"{line}\n")
-            journal.flush()
-            os.fsync(journal.fileno())
 
     def _write(self, name: str, text: str) -> None:
         """Replace a file in one step."""

@@ -14,6 +14,7 @@ import os
 import re
 import shutil
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -186,6 +187,7 @@ def run(
     resume: bool = False,
     split: bool = False,
     block_cells: int | None = None,
+    shared_cells: int | None = None,
     progress: Progress | None = None,
     solved: Solved = solve_here,
 ) -> Report:
@@ -208,8 +210,11 @@ def run(
     split : bool
         Write a folder with a netCDF file for each block.
     block_cells : int, optional
-        Cells solved and written at a time; two such blocks are in memory.  By default
+        Most cells to solve and write at a time; two such blocks are in memory.  By default
         `BLOCK_CELLS`, or what an interrupted run had.
+    shared_cells : int, optional
+        As many cells or fewer, so that those who solve blocks share them evenly; but what an
+        interrupted run had goes before.
     progress : callable
         Called with a number of cells just solved, from any thread.
     solved : callable
@@ -249,7 +254,7 @@ def run(
                 return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
         else:
             work.clear()
-        block_cells = block_cells or BLOCK_CELLS
+            block_cells = min(filter(None, (block_cells, shared_cells)), default=BLOCK_CELLS)
         # once more: a run that was writing it may have ended before this one got hold of the lock
         check_output(path, overwrite, folder=split)
         data = work.data(split)
@@ -331,16 +336,39 @@ def _write_blocks(
     found: Iterator[tuple[int, Table]],
     tally: Tally,
 ) -> None:
-    """Write blocks and put them on record, each while the next is being solved."""
+    """Write blocks and put them on record, each while the next is being solved.
+
+    Checksums and counts are made beside the writing, and what is written is brought to the disk
+    itself beside all, as often as the disk allows.
+    """
+    pending: Future[None] | None = None
+    syncing: Future[None] | None = None
 
     def write(number: int, table: Table) -> None:
+        nonlocal syncing
         with _writing(work.output):
-            arrays = target.write(number, cut[number], table)
-            work.add(number, parts.checksum(arrays))
-        tally.add(arrays)
+            arrays = {
+                name: result.values.astype(target.spec.dtype(name), copy=False)
+                for name, result in table.data_vars.items()
+            }
+            digest = examiner.submit(examine, arrays)
+            target.write(number, cut[number], table, arrays)
+            work.add(number, digest.result())
+            if syncing is None or syncing.done():
+                if syncing is not None:
+                    syncing.result()
+                syncing = syncer.submit(sync_all)
 
-    with ThreadPoolExecutor(1) as writer:  # leaving it waits: a block that is being written is finished
-        pending: Future[None] | None = None
+    def examine(arrays: dict[str, NDArray[Any]]) -> str:
+        tally.add(arrays)
+        return parts.checksum(arrays)
+
+    def sync_all() -> None:
+        target.sync()
+        work.sync()
+
+    # leaving them waits, for the writer first: a block that is being written is finished
+    with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as examiner, ThreadPoolExecutor(1) as writer:
         for number, table in found:
             if pending is not None:
                 pending.result()
@@ -348,6 +376,10 @@ def _write_blocks(
             del table
         if pending is not None:
             pending.result()
+        with _writing(work.output):
+            if syncing is not None:
+                syncing.result()
+            sync_all()
 
 
 class _OneFile:
@@ -405,16 +437,16 @@ class _OneFile:
         except (OSError, RuntimeError):
             return None
 
-    def write(self, number: int, block: Block, table: Table) -> dict[str, NDArray[Any]]:
-        """Write a block, have it on the disk, and return its values as they are stored."""
+    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block, with its values as they are to be stored."""
         assert self.file is not None
-        arrays = {}
         for name, result in table.data_vars.items():
-            arrays[name] = result.values.astype(self.spec.dtype(name), copy=False)
             self.file[name][_where(block, result.dims)] = arrays[name]
         self.file.sync()
+
+    def sync(self) -> None:
+        """Have all that is written on the disk itself; from any thread."""
         parts.sync(self.data)
-        return arrays
 
 
 class _Files:
@@ -422,6 +454,7 @@ class _Files:
 
     def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
         self.spec, self.data, self.command = spec, data, command
+        self.unsynced: deque[Path] = deque()
 
     def __enter__(self) -> Self:
         return self
@@ -447,12 +480,9 @@ class _Files:
         except (OSError, RuntimeError, IndexError):
             return None
 
-    def write(self, number: int, block: Block, table: Table) -> dict[str, NDArray[Any]]:
-        """Write a block, have it on the disk, and return its values as they are stored."""
-        results = {
-            name: replace(result, values=result.values.astype(self.spec.dtype(name), copy=False))
-            for name, result in table.data_vars.items()
-        }
+    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block, with its values as they are to be stored."""
+        results = {name: replace(result, values=arrays[name]) for name, result in table.data_vars.items()}
         coords = dict(table.coords)
         labels = self.spec.labels
         if "case" in block:
@@ -467,10 +497,14 @@ class _Files:
             _head(file, self.spec, stored, labels, self.command)
             for name, result in results.items():
                 file[name][...] = result.values
-        parts.sync(temporary)
         temporary.replace(path)
+        self.unsynced.append(path)
+
+    def sync(self) -> None:
+        """Have all that is written on the disk itself; from any thread."""
+        while self.unsynced:
+            parts.sync(self.unsynced.popleft())
         parts.sync(self.data)
-        return {name: result.values for name, result in results.items()}
 
     def _name(self, number: int) -> Path:
         return self.data / f"block-{number:06}.nc"

@@ -66,15 +66,17 @@ def run(
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
     if split and output is None:
         path = path.with_suffix("")
-    cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked)
+    cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked, workers or 0)
     if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
         raise InputError(f"{path}: is the sweep file itself; give another name with -o")
     with ExitStack() as stack:
         solved: blocks.Solved = blocks.solve_here
+        shared = None
         if workers is not None or scheduler is not None:
             from slipsweep.cluster import cluster
 
             solved = stack.enter_context(cluster(workers=workers, scheduler=scheduler))
+            shared = blocks.cells_shared(checked, workers)
         progress = stack.enter_context(progress_bar(checked.cells, quiet))
         report = store.run(
             checked,
@@ -84,6 +86,7 @@ def run(
             resume=resume,
             split=split,
             block_cells=cells,
+            shared_cells=shared,
             progress=progress,
             solved=solved,
         )
