@@ -382,7 +382,7 @@ def _axis(name: str, axis: Axis, g: float) -> Floats:
         numbers = _spaced(key, axis)
 
     with np.errstate(over="ignore"):
-        values = numbers * _unit_factor(name, axis.units, g)
+        values = numbers * unit_factor(f"{key}.units", name, axis.units, g)
     if (bad := _first_bad(name, values)) is not None:
         where = f"values[entry {bad + 1}]" if axis.values is not None else "start" if bad == 0 else "stop"
         number = axis.stop if where == "stop" else numbers[bad]
@@ -450,9 +450,10 @@ _FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
 _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
 
 
-def _unit_factor(name: str, units: str | None, g: float) -> float:
+def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
     """Return what to multiply a number in `units` by, to have it in the parameter's own unit.
 
+    `key` is what the units are called in errors.
     "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
     meant against the gravity that the block feels.
     """
@@ -462,7 +463,7 @@ def _unit_factor(name: str, units: str | None, g: float) -> float:
     if own == "m s-2" and units == "g":
         return g
 
-    refusal = InputError(f"axes.{name}.units = {_show(units)}: must be a unit that converts to {own}")
+    refusal = InputError(f"{key} = {_show(units)}: must be a unit that converts to {own}")
     # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
     text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
     if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
@@ -511,7 +512,7 @@ def quantity(key: str, text: str, parameter: str, g: float) -> float:
     if found is None:
         raise refusal
     try:
-        return float(found[1]) * _unit_factor(parameter, found[2] or None, g)
+        return float(found[1]) * unit_factor(key, parameter, found[2] or None, g)
     except InputError:
         raise refusal from None
 
