@@ -504,7 +504,7 @@ def sample(
     InputError
         As `sweep`; a distribution that scipy.stats does not know, or draws that no physics allows.
     """
-    from slipsweep.uncertainty import check_sampling, sample_table
+    from slipsweep.uncertainty import check_sampling, plan_samples
 
     given = {
         "theta": theta,
@@ -527,9 +527,8 @@ def sample(
         correlation=correlation,
         g=g,
     )
-    table = sample_table(
+    plan = plan_samples(
         sampling,
-        progress,
         **_plain(given),
         cycles=cycles,
         model=model,
@@ -541,7 +540,7 @@ def sample(
         rule=rule,
         g=g,
     )
-    return _dataset(table, _brought(given, table.coords))
+    return _dataset(plan.solve(progress), _brought(given, plan.coords))
 
 
 def _plain(given: Mapping[str, Any]) -> dict[str, Any]:

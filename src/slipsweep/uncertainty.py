@@ -22,6 +22,7 @@ from slipsweep.errors import InputError
 from slipsweep.parameters import BOUNDS, check_choice, check_values, check_whole, number_text
 from slipsweep.plans import aligned, check_memory, grid_sizes, plan_sweep
 from slipsweep.spec import quantity, unit_factor
+from slipsweep.store import Tally
 from slipsweep.suggest import did_you_mean
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import (
@@ -55,6 +56,8 @@ _MOST_SEED = 2**31 - 1
 
 #: Samples solved together: 30 MB, yet enough to keep the kernels busy.
 _CELLS = 1_000_000
+
+TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
 #: Half of the last digit of scipy's Sobol numbers, some of which are 0: the quantile there may be infinite.
 _LEAST = 2.0**-31
@@ -233,12 +236,15 @@ def check_sampling(
         raise InputError(
             f"{keys or 'uncertain'}: must give the distribution of one parameter at least: {', '.join(DRAWN)}"
         )
-    distributions = {}
-    for name, given in uncertain.items():
-        key = f"{keys or 'uncertain.'}{name}"
+    for name in uncertain:
         if name not in DRAWN:
-            raise InputError(f"{key}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
-        distributions[name] = _distribution(key, name, given, g)
+            raise InputError(f"{keys or 'uncertain.'}{name}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
+    # in one order, whatever that of the caller: the draws are then the same
+    distributions = {
+        name: _distribution(f"{keys or 'uncertain.'}{name}", name, uncertain[name], g)
+        for name in DRAWN
+        if name in uncertain
+    }
     if {"amplitude", "displacement_amplitude"} <= distributions.keys():
         raise InputError(f"{keys or 'uncertain.'}displacement_amplitude: not allowed beside amplitude")
 
@@ -392,21 +398,14 @@ def _check_draws(
 # --------------------------------------------------------------------------------- sampling
 
 
-def sample_table(sampling: Sampling, progress: Callable[[int], None] | None = None, **given: Any) -> Table:
-    """Statistics of the displacement over a grid.
+def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
+    """Plan of the samples of a grid, drawn and checked.
 
     Parameters
     ----------
     sampling : Sampling
-    progress : callable, optional
-        Called with a number of samples just solved, from any thread.
     **given
         Keyword arguments of `plans.plan_sweep` but for `variables`.
-
-    Returns
-    -------
-    Table
-        What `slipsweep.sample` returns.
 
     Raises
     ------
@@ -433,23 +432,23 @@ def sample_table(sampling: Sampling, progress: Callable[[int], None] | None = No
     dropped = {*stand_ins} | ({"amplitude"} if {"displacement_amplitude", "frequency"} & {*stand_ins} else set())
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     _check_draws(sampling, draws, [name for name in sampling.distributions if name not in stand_ins], coords)
-    return _Samples(sampling, draws, plan.tasks[0].problem, coords).table(
-        {
-            **plan.attrs,
-            "title": "Permanent displacement of a rigid block under uncertain inputs",
-            **sampling.attributes,
-        },
-        progress,
-    )
+    attrs = {**plan.attrs, "title": TITLE, **sampling.attributes}
+    return SamplePlan(sampling, draws, plan.tasks[0].problem, coords, attrs)
 
 
-class _Samples:
-    """The samples of every grid point: cells of `solved` dimensions, and frequencies along `scaled` ones."""
+class SamplePlan:
+    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones."""
 
     def __init__(
-        self, sampling: Sampling, draws: Mapping[str, Floats], problem: Problem, coords: dict[str, Variable]
+        self,
+        sampling: Sampling,
+        draws: Mapping[str, Floats],
+        problem: Problem,
+        coords: dict[str, Variable],
+        attrs: dict[str, Any],
     ) -> None:
-        self.sampling, self.draws, self.problem, self.coords = sampling, draws, problem, coords
+        self.sampling, self.draws, self.problem = sampling, draws, problem
+        self.coords, self.attrs = coords, attrs
         self.by_displacement = "displacement_amplitude" in {*coords, *draws}
         own = {
             name: variable
@@ -472,8 +471,19 @@ class _Samples:
         values = np.broadcast_to(frequency.values.transpose(axes).reshape(lengths), [self.sizes[dim] for dim in dims])
         self.frequency: Floats = values.reshape(shape)
 
-    def table(self, attrs: dict[str, Any], progress: Callable[[int], None] | None) -> Table:
-        """Solve the samples slab by slab, and reduce them."""
+    @property
+    def cells(self) -> int:
+        """Number of samples to solve, of all grid points."""
+        return math.prod(self.solved.values()) * self.sampling.samples
+
+    def solve(self, progress: Callable[[int], None] | None = None) -> Table:
+        """Solve the samples slab by slab, and reduce them to what `slipsweep.sample` returns.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with a number of samples just solved, from any thread.
+        """
         sampling, samples = self.sampling, self.sampling.samples
         quantiles, thresholds = sampling.quantiles.size, sampling.thresholds.size
         shape = tuple(self.solved.values())
@@ -522,7 +532,7 @@ class _Samples:
             "flag": np.array([int(flag) for flag in Validity], np.int16),
         }
         coords = {name: Variable((name,), values, STATISTIC_COORDINATES[name]) for name, values in coordinates.items()}
-        return Table(self.coords | coords, results, attrs)
+        return Table(self.coords | coords, results, self.attrs)
 
     def _solve(self, slab: tuple[slice, ...], progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
         """Displacement (at 1 Hz or, where it is drawn, at the frequency over the grid's), mode and flags of a slab."""
@@ -599,6 +609,17 @@ class _Samples:
         # sorting and counting take about an eighth of what solving takes
         threads.spread(rows, work, max(samples // 8, 1))
         return found
+
+
+def tally(table: Table, samples: int) -> Tally:
+    """Count the samples of all grid points by sliding mode and by flag."""
+    modes, flags, valueless = (
+        np.rint(table[name].values * samples).astype(np.int64) for name in ("mode_share", "flag_share", "valueless_share")
+    )
+    known = [mode for mode in SlidingMode if mode is not SlidingMode.MISSING]
+    by_mode = dict(zip(known, modes.reshape(-1, len(known)).sum(0).tolist(), strict=True))
+    by_flag = dict(zip(Validity, flags.reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
+    return Tally(valueless.size * samples, {SlidingMode.MISSING: int(valueless.sum()), **by_mode}, by_flag)
 
 
 def _quantiles(ordered: Floats, wanted: Floats) -> Floats:
