@@ -2,7 +2,8 @@
 
 `sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
 inputs are uncertain, `sweep_record` solves one under a recorded motion, `friction_parameters` gives the
-paper's Eqs. 7-11, `simulate` one time history, `flags` takes a result's `validity` apart.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
+paper's Eqs. 7-11, `simulate` one time history, `flags` takes a result's `validity` apart.  The model is
+that of Mendez, Romo and Botero (2012); `Validity` and
 `SlidingMode` name the codes of the results.
 """
 

@@ -7,6 +7,7 @@ its value at the grid point, or an offset to it.  u = W/ω²: where the samples 
 they are solved and sorted once, and quantiles and probabilities of all frequencies read off that.
 """
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -287,9 +288,13 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
         frozen, about = _named(key, chosen, entries), {"distribution": chosen, **entries}
     else:
         if entries:
-            raise InputError(f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own")
+            raise InputError(
+                f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own"
+            )
         if not callable(getattr(chosen, "ppf", None)):
-            raise InputError(f"{key} = {chosen!r}: must be a name with parameters, or a frozen scipy.stats distribution")
+            raise InputError(
+                f"{key} = {chosen!r}: must be a name with parameters, or a frozen scipy.stats distribution"
+            )
         frozen, about = chosen, _described(chosen)
     if not np.isfinite(frozen.ppf(0.5)):
         raise InputError(f"{key}: parameters that scipy.stats does not allow: {about}")
@@ -338,7 +343,7 @@ def _increasing(key: str, given: Any, bound: str) -> Floats:
     values = np.atleast_1d(check_values(bound, given, key))
     if values.ndim > 1 or not values.size:
         raise InputError(f"{key} = {given!r}: must be a list of one number or more")
-    for before, after in zip(values, values[1:], strict=False):
+    for before, after in itertools.pairwise(values):
         if after <= before:
             raise InputError(
                 f"{key}: {number_text(float(after))} after {number_text(float(before))}: they must increase"
@@ -521,11 +526,11 @@ class SamplePlan:
         for name, values in found.items():
             last = last_dims.get(name, ())
             if name in grid:
-                values = values.reshape(*(self.sizes[dim] for dim in dims), *values.shape[values.ndim - len(last) :])
-                values = np.ascontiguousarray(values.transpose(*order, *([len(dims)] if last else [])))
+                values = values.reshape([*(self.sizes[dim] for dim in dims), *values.shape[values.ndim - len(last) :]])
+                values = np.array(values.transpose([*order, *([len(dims)] if last else [])]), order="C")
             own = tuple(self.sizes) if name in grid else tuple(self.solved)
             results[name] = Variable((*own, *last), values, STATISTICS[name])
-        coordinates = {
+        coordinates: dict[str, NDArray[Any]] = {
             "quantile": sampling.quantiles,
             "threshold": sampling.thresholds,
             "mode": np.array([int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING], np.int8),
@@ -537,19 +542,20 @@ class SamplePlan:
     def _solve(self, slab: tuple[slice, ...], progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
         """Displacement (at 1 Hz or, where it is drawn, at the frequency over the grid's), mode and flags of a slab."""
         base = {name: values[..., None] for name, values in engine.cut(self.base, slab).items()}
-        frequency = base.pop("frequency", None)
+        one = np.ones((1,) * (len(slab) + 1))
+        frequency = base.pop("frequency", one)
         drawn = self.sampling.distributions
         arrays = {
             name: drawn[name].applied(base.get(name), self._row(name, len(slab))) if name in drawn else base[name]
             for name in DRAWN
             if name != "frequency" and (name in base or (name in drawn and drawn[name].kind == "absolute"))
         }
-        relative = np.ones((1,) * (len(slab) + 1))
+        relative = one
         if "frequency" in drawn:
             row = self._row("frequency", len(slab))
             relative = 1.0 + row / frequency if drawn["frequency"].kind == "offset" else row
         if self.by_displacement:
-            omega = 2.0 * math.pi * relative * (1.0 if frequency is None else frequency)
+            omega = 2.0 * math.pi * relative * frequency
             arrays["amplitude"] = omega * omega * arrays.pop("displacement_amplitude")
         lengths = (*(part.stop - part.start for part in slab), self.sampling.samples)
         for name in _ESTIMATED:
@@ -614,9 +620,10 @@ class SamplePlan:
 def tally(table: Table, samples: int) -> Tally:
     """Count the samples of all grid points by sliding mode and by flag."""
     modes, flags, valueless = (
-        np.rint(table[name].values * samples).astype(np.int64) for name in ("mode_share", "flag_share", "valueless_share")
+        np.rint(table[name].values * samples).astype(np.int64)
+        for name in ("mode_share", "flag_share", "valueless_share")
     )
-    known = [mode for mode in SlidingMode if mode is not SlidingMode.MISSING]
+    known: list[SlidingMode] = [mode for mode in SlidingMode if mode is not SlidingMode.MISSING]
     by_mode = dict(zip(known, modes.reshape(-1, len(known)).sum(0).tolist(), strict=True))
     by_flag = dict(zip(Validity, flags.reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
     return Tally(valueless.size * samples, {SlidingMode.MISSING: int(valueless.sum()), **by_mode}, by_flag)
