@@ -27,6 +27,7 @@ DOCUMENTS = (
     "docs/quickstart.md",
     "docs/sweep-files.md",
     "docs/tutorial.md",
+    "docs/uncertainty.md",
 )
 
 
@@ -228,6 +229,7 @@ def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
         ("## `[excitation]`", spec.Excitation),
         ("## `[solver]`", spec.Solver),
         ("## `[output]`", spec.Output),
+        ("## `[uncertainty]`", spec.Uncertainty),
     ],
 )
 def test_keys_are_those_of_the_schema(heading: str, table: Any) -> None:

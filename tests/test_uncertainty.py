@@ -352,6 +352,14 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
         slipsweep.sample(**{**GRID, "uncertain": uncertain, **options})
 
 
+def test_what_memory_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("slipsweep.uncertainty.available_memory", lambda: 10**6)
+    with pytest.raises(
+        InputError, match=r"3 amplitude x 2 frequency, 65536 samples: takes .* but 1 MB of memory is free"
+    ):
+        slipsweep.sample(**GRID, uncertain={"amplitude": FACTOR}, samples=2**16)
+
+
 def test_correlations_that_contradict_each_other() -> None:
     uncertain = {"theta": stats.uniform(0, 5), "amplitude": FACTOR, "mu_s": FACTOR}
     pairs = [("theta", "amplitude", 0.9), ("amplitude", "mu_s", 0.9), ("theta", "mu_s", -0.9)]

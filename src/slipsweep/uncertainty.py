@@ -21,7 +21,8 @@ from slipsweep import engine, threads
 from slipsweep.engine import Problem
 from slipsweep.errors import InputError
 from slipsweep.parameters import BOUNDS, check_choice, check_values, check_whole, number_text
-from slipsweep.plans import aligned, check_memory, grid_sizes, plan_sweep
+from slipsweep.plans import aligned, grid_sizes, plan_sweep
+from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import quantity, unit_factor
 from slipsweep.store import Tally
 from slipsweep.suggest import did_you_mean
@@ -57,6 +58,19 @@ _MOST_SEED = 2**31 - 1
 
 #: Samples solved together: 30 MB, yet enough to keep the kernels busy.
 _CELLS = 1_000_000
+
+#: Statistics and the dimensions that they have beside those of the grid.
+_STATISTICS: dict[str, tuple[str, ...]] = {
+    "displacement_quantile": ("quantile",),
+    "mean_displacement": (),
+    "exceedance_probability": ("threshold",),
+    "mode_share": ("mode",),
+    "flag_share": ("flag",),
+    "valueless_share": (),
+}
+
+#: Those that depend on the frequency even where the samples do not.
+_BY_FREQUENCY = ("displacement_quantile", "mean_displacement", "exceedance_probability")
 
 TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
@@ -489,55 +503,51 @@ class SamplePlan:
         progress : callable, optional
             Called with a number of samples just solved, from any thread.
         """
-        sampling, samples = self.sampling, self.sampling.samples
-        quantiles, thresholds = sampling.quantiles.size, sampling.thresholds.size
-        shape = tuple(self.solved.values())
-        grid = {"displacement_quantile": quantiles, "mean_displacement": 0, "exceedance_probability": thresholds}
-        shares = {"mode_share": 3, "flag_share": len(Validity), "valueless_share": 0}
-        cells = max(_CELLS // samples, 1) * samples
-        check_memory(
-            self.sizes,
-            8 * math.prod(self.sizes.values()) * (quantiles + thresholds + 1)
-            + 8 * math.prod(shape) * (4 + len(Validity))
-            + cells * (11 + 8 * (2 + len(self.draws)))
-            + 24 * samples * len(self.draws),
-        )
-        found = {
-            name: np.empty((*shape, *((self.frequency.shape[-1],) if name in grid else ()), *((last,) if last else ())))
-            for name, last in (grid | shares).items()
+        coordinates: dict[str, NDArray[Any]] = {
+            "quantile": self.sampling.quantiles,
+            "threshold": self.sampling.thresholds,
+            "mode": np.array([int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING], np.int8),
+            "flag": np.array([int(flag) for flag in Validity], np.int16),
         }
-        for slab in engine.slabs(shape, max(_CELLS // samples, 1)):
-            solved = self._solve(slab, progress)
-            lengths = tuple(part.stop - part.start for part in slab)
-            reduced = self._reduce(solved, self.frequency[(*slab, ...)].reshape(-1, self.frequency.shape[-1]))
+        shape, frequencies = tuple(self.solved.values()), self.frequency.shape[-1]
+        shapes = {
+            name: (*shape, *((frequencies,) if name in _BY_FREQUENCY else ()), *(coordinates[dim].size for dim in own))
+            for name, own in _STATISTICS.items()
+        }
+        points = max(_CELLS // self.sampling.samples, 1)
+        self._check_memory(8 * sum(map(math.prod, shapes.values())), points)
+        found = {name: np.empty(lengths) for name, lengths in shapes.items()}
+        for slab in engine.slabs(shape, points):
+            where: Any = (*slab, ...)
+            reduced = self._reduce(self._solve(slab, progress), self.frequency[where].reshape(-1, frequencies))
             for name, values in reduced.items():
-                found[name][slab] = values.reshape(lengths + values.shape[1:])
+                found[name][where] = values.reshape([part.stop - part.start for part in slab] + [*values.shape[1:]])
 
         # the scaled dimensions, one behind the other until here, to their places among the others
         dims = (*self.solved, *self.scaled)
         order = [dims.index(dim) for dim in self.sizes]
-        last_dims = {
-            "displacement_quantile": ("quantile",),
-            "exceedance_probability": ("threshold",),
-            "mode_share": ("mode",),
-            "flag_share": ("flag",),
-        }
         results = {}
-        for name, values in found.items():
-            last = last_dims.get(name, ())
-            if name in grid:
-                values = values.reshape([*(self.sizes[dim] for dim in dims), *values.shape[values.ndim - len(last) :]])
-                values = np.array(values.transpose([*order, *([len(dims)] if last else [])]), order="C")
-            own = tuple(self.sizes) if name in grid else tuple(self.solved)
-            results[name] = Variable((*own, *last), values, STATISTICS[name])
-        coordinates: dict[str, NDArray[Any]] = {
-            "quantile": sampling.quantiles,
-            "threshold": sampling.thresholds,
-            "mode": np.array([int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING], np.int8),
-            "flag": np.array([int(flag) for flag in Validity], np.int16),
-        }
+        for name, own in _STATISTICS.items():
+            values = found[name]
+            if name in _BY_FREQUENCY:
+                whole = values.reshape([*(self.sizes[dim] for dim in dims), *(coordinates[dim].size for dim in own)])
+                values = np.array(whole.transpose([*order, *range(len(dims), whole.ndim)]), order="C")
+            over = tuple(self.sizes) if name in _BY_FREQUENCY else tuple(self.solved)
+            results[name] = Variable((*over, *own), values, STATISTICS[name])
         coords = {name: Variable((name,), values, STATISTIC_COORDINATES[name]) for name, values in coordinates.items()}
         return Table(self.coords | coords, results, self.attrs)
+
+    def _check_memory(self, results: int, points: int) -> None:
+        """Refuse what memory cannot hold: the results, the draws, and the samples of `points` grid points."""
+        samples, drawn = self.sampling.samples, len(self.draws)
+        needed = results + 24 * samples * drawn + points * samples * (8 * (2 + drawn) + 11)
+        free = available_memory()
+        if free is not None and needed > free:
+            grid = " x ".join(f"{size} {dim}" for dim, size in self.sizes.items()) or "one point"
+            raise InputError(
+                f"grid of {grid}, {samples} samples: takes {size_text(needed)}, but {size_text(free)} of memory is "
+                "free; ask for fewer samples, grid points, quantiles or thresholds"
+            )
 
     def _solve(self, slab: tuple[slice, ...], progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
         """Displacement (at 1 Hz or, where it is drawn, at the frequency over the grid's), mode and flags of a slab."""
