@@ -60,7 +60,7 @@ WAVEFORMS = ("sine",)
 SOLVERS = ("auto", "step", "cycle")
 RULES = ("rectangle", "trapezoid", "simpson")
 
-#: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (README).
+#: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (docs/speed.md).
 STEPS_PER_CYCLE = 1024
 
 #: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
