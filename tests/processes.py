@@ -18,11 +18,12 @@ def slipsweep(
     environment: Mapping[str, str] | None = None,
     preexec_fn: Callable[[], object] | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """Run a command in `folder`, with `environment` on top of this process's own, and wait for it."""
+    """Run a command in `folder`, with `environment` on top of this process's own but for colours, and wait for it."""
+    clean = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
     return subprocess.run(
         [*SLIPSWEEP, *map(str, arguments)],
         cwd=folder,
-        env={**os.environ, **(environment or {})},
+        env={**clean, **(environment or {})},
         capture_output=True,
         encoding="utf-8",
         timeout=TIMEOUT,

@@ -1,7 +1,5 @@
 """Charts: what they show is the model's, and nothing is read that they do not show."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
+from processes import slipsweep as command
 
 import slipsweep
 from slipsweep import charts, spec, store
@@ -317,11 +316,9 @@ def test_default_set_of_charts(grid: Path, tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_formats(grid: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "slipsweep", "chart", str(grid), "--at", "theta=12", "--at", "mu_s=0.5"]
+    cuts = ("--at", "theta=12", "--at", "mu_s=0.5")
     outputs = [f"-oa.{suffix}" for suffix in ("png", "svg", "pdf")]
-    done = subprocess.run(
-        [*command, "--kind", "contours", *outputs], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = command(tmp_path, "chart", grid, *cuts, "--kind", "contours", *outputs)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.split() == ["a.png", "a.svg", "a.pdf"]
     assert matplotlib.image.imread(tmp_path / "a.png").shape[2] == 4
