@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep import threads
+from slipsweep.errors import InputError
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
+from slipsweep.waveforms import Waveform
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -41,7 +43,7 @@ Array = NDArray[np.float64]
 class Problem:
     """What all cells of a grid share: the options of `slipsweep.sweep`, checked."""
 
-    waveform: str
+    waveform: Waveform
     model: str
     rise: str
     recoupling: str
@@ -125,6 +127,8 @@ def solve(
     dict of str to ndarray
         Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
     """
+    if not problem.waveform.is_sine:
+        raise InputError(f"waveform = {problem.waveform.name!r}: not solved yet")
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
     results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
