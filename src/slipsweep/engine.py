@@ -21,7 +21,7 @@ from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
-from slipsweep.waveforms import Waveform
+from slipsweep.waveforms import Waveform, wave_of
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -127,7 +127,7 @@ def solve(
     dict of str to ndarray
         Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
     """
-    if not problem.waveform.is_sine:
+    if not problem.waveform.is_sine and solver_of(problem) != "step":
         raise InputError(f"waveform = {problem.waveform.name!r}: not solved yet")
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
@@ -142,7 +142,7 @@ def solve(
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
     if solver_of(problem) == "step":
-        kernel, table = STEP_KERNELS[options.rule], step.sine_table(problem.steps_per_cycle)
+        kernel, table = STEP_KERNELS[options.rule], step.steps_of(wave_of(problem.waveform, problem.cycles), problem.steps_per_cycle)
         work_per_cell += problem.steps_per_cycle // 16
     else:
         kernel, table = CYCLE_KERNEL, np.empty(0)
