@@ -29,6 +29,7 @@ from slipsweep.kernels.block import (
     BEGAN,
     EQ4_BELOW_YIELD,
     INTEGRATE,
+    KD_NOT_POSITIVE,
     LANE_ROWS,
     LITERAL,
     MONOTONE,
@@ -52,8 +53,9 @@ from slipsweep.kernels.block import (
     whole_lanes,
     yield_governs,
 )
+from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train import Pulse, attenuate, pause, train_of
+from slipsweep.kernels.train import Pulse, attenuate, train_of
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -231,9 +233,18 @@ def begin(block: Block, velocity: float, state: np.ndarray, j: int) -> None:
 
 
 @scalar
-def pulse(block: Block, options: Options, table: np.ndarray, velocity: float, last: bool) -> Pulse:
+def pause(block: Block) -> float:
+    """Phase from Üg = 0 (t5) to the next Üg = Üy."""
+    return 1.5 * math.pi + phase(block, block.yield_acceleration)
+
+
+@scalar
+def pulse(
+    block: Block, options: Options, wave: Wave, table: np.ndarray, k: int, following: int, velocity: float
+) -> Pulse:
     """One cell's cycle, step by step, from one Üg = Üy to the next (see `train.Pulse`)."""
     rule, state = options.rule, np.empty(_STATE_SIZE)
+    last = following >= wave.height.size
     began = phase(block, block.yield_acceleration)
     h = min(2.0 * math.pi, -began * _SHARE_OF_CYCLE) / options.steps_per_cycle
     begin(block, velocity, state, 0)
@@ -242,6 +253,8 @@ def pulse(block: Block, options: Options, table: np.ndarray, velocity: float, la
         rise_step(block, rule, start, node * h, state, 0)
         start = node * h
         node += 1
+    if state[SLIDES + 0] == 1.0 and state[HELD + 0] <= 0.0:
+        return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, KD_NOT_POSITIVE)
     end = _HALF_PI
     if options.recoupling == INTEGRATE:
         end = 1.5 * math.pi if last else _HALF_PI + pause(block)
@@ -255,7 +268,7 @@ def pulse(block: Block, options: Options, table: np.ndarray, velocity: float, la
     if velocity > 0.0 and (options.recoupling != INTEGRATE or last):
         velocity, slid = attenuate(state[HELD + 0], velocity, math.inf if last else pause(block))
         moved += slid
-    return Pulse(velocity, moved, state[PEAK + 0], min(state[LEAST + 0], velocity))
+    return Pulse(velocity, moved, state[PEAK + 0], min(state[LEAST + 0], velocity), math.inf, 0)
 
 
 train = train_of(pulse)
@@ -456,7 +469,7 @@ def continuous_cells(
 
 @scalar
 def stick_slip_cells(
-    count: int, rule: int, options: Options, table: np.ndarray, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
+    count: int, rule: int, options: Options, wave: Wave, table: np.ndarray, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
     state: np.ndarray, motion: np.ndarray, codes: np.ndarray,
 ) -> None:  # fmt: skip
     """Stick-slip: the first pulse in lockstep; cells that do not come to rest in it go on one by one."""
@@ -476,9 +489,10 @@ def stick_slip_cells(
             velocity, slid = attenuate(state[HELD + j], velocity, math.inf if options.cycles == 1 else pause(block))
             moved += slid
         if velocity > 0.0 or block.rise == LITERAL or -lanes[BEGAN + j] < shortest:
-            answer = train(block, options, table)
+            answer = train(block, options, wave, table)
         else:
-            validity = EQ4_BELOW_YIELD if yield_governs(block) else 0
+            governs = yield_governs(block, block.yield_acceleration, block.amplitude)
+            validity = EQ4_BELOW_YIELD if governs else 0
             answer = Motion(options.cycles * moved, state[PEAK + j], validity)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
         codes[1, where[j]] |= answer.validity
@@ -488,8 +502,9 @@ def stick_slip_cells(
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, rule: int, options: Options, table: np.ndarray, motion: np.ndarray, codes: np.ndarray
-) -> None:
+    cells: np.ndarray, count: int, rule: int, options: Options, wave: Wave, table: np.ndarray, motion: np.ndarray,
+    codes: np.ndarray,
+) -> None:  # fmt: skip
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
 
     `rule` is a compile-time constant: with it the loops over lanes lose the middle of the
@@ -515,6 +530,6 @@ def solve_cells(
             for row in range(LANE_ROWS):
                 lanes[row * TILE + spare] = lanes[row * TILE]
         if lane > 0 and wanted == STICK_SLIP:
-            stick_slip_cells(lane, rule, options, table, cells, where, lanes, state, motion, codes)
+            stick_slip_cells(lane, rule, options, wave, table, cells, where, lanes, state, motion, codes)
         elif lane > 0:
             continuous_cells(lane, rule, options, table, cells, where, lanes, state, motion)
