@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep import threads
-from slipsweep.errors import InputError
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, Grid, Results, parameter_grid
+from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
 from slipsweep.waveforms import Waveform, wave_of
 
@@ -127,8 +126,6 @@ def solve(
     dict of str to ndarray
         Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
     """
-    if not problem.waveform.is_sine and solver_of(problem) != "step":
-        raise InputError(f"waveform = {problem.waveform.name!r}: not solved yet")
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
     results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
@@ -139,16 +136,17 @@ def solve(
     periods = flat(1.0 / (2.0 * math.pi * frequency))
     rows = tuple(flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in wanted)
+    wave = wave_of(problem.waveform, problem.cycles)
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
     if solver_of(problem) == "step":
-        kernel, table = STEP_KERNELS[options.rule], step.steps_of(wave_of(problem.waveform, problem.cycles), problem.steps_per_cycle)
+        kernel, tables = STEP_KERNELS[options.rule], (step.steps_of(wave, problem.steps_per_cycle),)
         work_per_cell += problem.steps_per_cycle // 16
     else:
-        kernel, table = CYCLE_KERNEL, np.empty(0)
+        kernel, tables = CYCLE_KERNEL if problem.waveform.is_sine else WAVE_KERNEL, (wave,)
 
     def work(first: int, last: int) -> None:
-        kernel(grid, first, last, rows, periods, options, table, targets)
+        kernel(grid, first, last, rows, periods, options, *tables, targets)
         if progress is not None:
             progress((last - first) * grid.frequencies)
 

@@ -97,6 +97,15 @@ def slope(wave: Wave, p: int, tau: float) -> float:
 
 
 @scalar
+def integral(wave: Wave, p: int, start: float, end: float) -> float:
+    """∫ (w − top) dτ over a part of piece p."""
+    sum_start, sum_end = 0.0, 0.0
+    for k in range(wave.degree[p] - 1, -1, -1):
+        sum_start, sum_end = (sum_start + wave.once[p, k]) * start, (sum_end + wave.once[p, k]) * end
+    return sum_end * end - sum_start * start
+
+
+@scalar
 def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
@@ -112,6 +121,12 @@ def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, floa
 def plane(wave: Wave, p: int, amplitude: float, tau: float) -> float:
     """The plane's acceleration on piece p, τ from its anchor."""
     return amplitude * (wave.top[p] + from_top(wave, p, tau))
+
+
+@scalar
+def held_gain(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> float:
+    """∫ (x − b) dτ for a held b on piece p: the gain of V."""
+    return (amplitude * wave.top[p] - held) * (end - start) + amplitude * integral(wave, p, start, end)
 
 
 @scalar

@@ -389,7 +389,7 @@ def mendez(cell: Cell, options: Options, history: History) -> Response:
                     brake(state, end - since)
         else:
             stick_slips += 1
-            if yield_governs(block):
+            if yield_governs(block, threshold, block.amplitude):
                 validity |= EQ4_BELOW_YIELD
             if block.rise == LITERAL and response(block, block.amplitude) <= 0.0:
                 validity |= KD_NOT_POSITIVE

@@ -60,7 +60,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.excitation import Wave, offset_at, phase_at, plane
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train2 import Pulse, attenuate, beginning, train_of, yield_governs
+from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs_wave
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -293,7 +293,9 @@ def longest_step(block: Block, options: Options, wave: Wave, p: int, tau: float,
 
 
 @scalar
-def begin_slide(block: Block, wave: Wave, p: int, tau: float, x: float, held: float, turn: float, state: np.ndarray) -> None:
+def begin_slide(
+    block: Block, wave: Wave, p: int, tau: float, x: float, held: float, turn: float, state: np.ndarray
+) -> None:
     """The block begins to slide at τ on piece p, where Üg = x; its rate grows up to τ = `turn`."""
     state[HELD] = min(held, x)  # equal at an onset, but for rounding
     state[SLIDES] = 1.0
@@ -362,7 +364,7 @@ def rise_step(
             turn = wave.finish[p]
             if x < state[TOUCH] < amplitude * wave.last[p]:
                 turn = offset_at(wave, p, amplitude, state[TOUCH])
-            begin_slide(block, wave, p, tau, x, held, turn, state)
+            begin_slide(wave, p, tau, x, held, turn, state)
         cut, x_cut, switches = end, x_end, False
         longest = longest_step(block, options, wave, p, tau, x, state)
         if longest < end - tau:
@@ -420,7 +422,7 @@ def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
         held = starting_acceleration(block, x)
         if held < x:
             state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
-            begin_slide(block, wave, p, wave.begin[p], x, held, offset_at(wave, p, block.amplitude, held), state)
+            begin_slide(wave, p, wave.begin[p], x, held, offset_at(wave, p, block.amplitude, held), state)
 
 
 @scalar
@@ -446,7 +448,10 @@ def through_stretch(
                 arrive(block, wave, q, state)
         else:
             x = block.yield_acceleration
-            first = min(max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.count[q]), 0), steps.count[q] - 1)
+            first = min(
+                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.count[q]), 0),
+                steps.count[q] - 1,
+            )
         at = steps.offset[q]
         if kind_of(wave, q) == RISES:
             for i in range(first, steps.count[q]):
@@ -480,9 +485,7 @@ def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, 
 
 
 @scalar
-def pulse(
-    block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float
-) -> Pulse:
+def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
     """One pulse, step by step, from Üg = Üy in stretch k to that in the `following` one (see `train.Pulse`)."""
     rule, state = options.rule, np.empty((_STATE_SIZE, 1))[:, 0]
     rest(block, state)
@@ -767,7 +770,7 @@ def stick_slip_lanes(
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
                 moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
-            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs(block, wave) else 0)
+            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs_wave(block, wave) else 0)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
         codes[1, where[j]] |= answer.validity
         if answer.validity & NO_VALUE:
@@ -840,7 +843,7 @@ def continuous_lanes(
     count: int, rule: int, options: Options, steps: Steps, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
     states: np.ndarray, motion: np.ndarray,
 ) -> None:  # fmt: skip
-    """Continuous sliding, cycle by cycle; repeated ones are stepped twice, and the later ones follow from the second."""
+    """Continuous sliding, cycle by cycle; repeated ones are stepped twice, the later ones follow from the second."""
     literally(rule)
     wave, whole = steps.wave, whole_lanes(count)
     for j in range(whole):
