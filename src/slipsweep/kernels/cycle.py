@@ -300,7 +300,7 @@ def arrive(block: Block, x: float, state: np.ndarray) -> None:
         b = starting_acceleration(block, x)
         if b < x:
             state[HELD], state[SLIDES] = b, 1.0
-            state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
+    state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
 
 
 @scalar
