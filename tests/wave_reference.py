@@ -30,7 +30,7 @@ from reference import (
 Function = Callable[[mpf], mpf]
 
 #: Digits: results are compared with doubles, but just above yield u goes with (A - Uy)**2.
-DIGITS = 45
+DIGITS = 40
 
 
 @dataclass
@@ -115,22 +115,17 @@ def sections(
             middle = (a + b) / 2
             periodic, slope = total, total_slope
             if waveform == "square":
-                level = mpf(1 if middle - start < mp.pi else -1)
-                periodic, slope = (lambda phi, level=level: level), (lambda phi: mpf(0))
+                periodic, slope = _line(mpf(1 if middle - start < mp.pi else -1), mpf(0), start)
             if waveform == "triangle":
                 quarter = int(mp.floor((middle - start) / (mp.pi / 2)))
-                rate, at = ((1, 0), (-1, 2), (-1, 2), (1, -4))[quarter]
-                periodic = lambda phi, start=start, rate=rate, at=at: rate * (phi - start) * 2 / mp.pi + at  # noqa: E731
-                slope = lambda phi, rate=rate: rate * 2 / mp.pi  # noqa: E731
+                periodic, slope = _line(mpf((0, 2, 2, -4)[quarter]), (1, -1, -1, 1)[quarter] * 2 / mp.pi, start)
             height, incline = mpf(1), mpf(0)
             if middle < kinks[0]:
                 height, incline = mpf(0), 1 / kinks[0]
             elif middle > kinks[1]:
                 height, incline = 2 * mp.pi * cycles / (2 * mp.pi * mpf(ramp_out)), -1 / (2 * mp.pi * mpf(ramp_out))
 
-            def ground(
-                phi: mpf, w: Function = periodic, height: mpf = height, incline: mpf = incline
-            ) -> mpf:
+            def ground(phi: mpf, w: Function = periodic, height: mpf = height, incline: mpf = incline) -> mpf:
                 return amplitude * (height + incline * phi) * w(phi)
 
             def rate_of(
@@ -147,6 +142,11 @@ def sections(
                     ends.append(phi)
             found += [Section(x, y, ground, fastest) for x, y in pairwise(ends)]
     return found
+
+
+def _line(at: mpf, rate: mpf, start: mpf) -> tuple[Function, Function]:
+    """A straight line and its slope."""
+    return (lambda phi: at + rate * (phi - start)), (lambda phi: rate)
 
 
 def _zeros(f: Function, grid: list[mpf]) -> list[mpf]:
@@ -168,7 +168,7 @@ class Block:
         self.reset = True  # the next Ug = Uy on the rise resets b
         self.flags = 0
         self.governs, self.slid = True, False
-        self.rounding = interface.amplitude * mpf(10) ** (-DIGITS + 12)
+        self.rounding = interface.amplitude * mpf(10) ** (-DIGITS + 10)
 
     def starting(self, x: mpf) -> mpf:
         """c(x)."""
@@ -229,8 +229,8 @@ class Block:
             begin, end, middle = section.ground(a), section.ground(b), section.ground((a + b) / 2)
             if middle > self.threshold and not self.newmark:
                 self.slid = True
-                self.governs = self.governs and interface.eq4(end) <= self.threshold * (1 + mpf(10) ** -30)
-                self.governs = self.governs and interface.eq4(begin) <= self.threshold * (1 + mpf(10) ** -30)
+                self.governs = self.governs and interface.eq4(end) <= self.threshold * (1 + mpf(10) ** -25)
+                self.governs = self.governs and interface.eq4(begin) <= self.threshold * (1 + mpf(10) ** -25)
             self.meet(begin, middle)
             while self.sliding and a < b:
                 a = self.slide(section, a, b)
@@ -272,7 +272,7 @@ class Block:
         if interface.eq4(section.ground(b)) <= self.b:
             stop = self.hold(section, a, b)
             return b if stop is None else stop
-        switch, tiny = a, self.threshold * mpf(10) ** -35
+        switch, tiny = a, self.threshold * mpf(10) ** -28
         if interface.eq4(section.ground(a)) < self.b - tiny:
             level = self.b
             switch = _root(lambda phi: interface.eq4(section.ground(phi)) - level, a, b)

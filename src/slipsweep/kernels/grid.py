@@ -150,14 +150,14 @@ def _step_grid_of(rule: int) -> Kernel:
     # a kernel a rule, so that only the one in use is compiled
     def step_grid(
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-        wave: Wave, table: np.ndarray, results: Results,
+        steps: step.Steps, results: Results,
     ) -> None:  # fmt: skip
         cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
         motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
             gather(grid, begin, count, inputs, cells, offsets)
-            step.solve_cells(cells, count, rule, options, wave, table, motion, codes)
+            step.solve_cells(cells, count, rule, options, steps, motion, codes)
             scatter(grid, count, offsets, periods, motion, codes, results)
 
     return Kernel(step_grid)

@@ -95,7 +95,7 @@ def train_of(
     def pulses(
         block: Block, options: Options, wave: Wave, table: np.ndarray, k: int, until: int, velocity: float
     ) -> tuple[Pulse, int]:
-        """Pulses from that in stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
+        """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
         displacement, peak, least, rested, validity = 0.0, velocity, velocity, 0.0, 0
         while k < wave.height.size and wave.stretch[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
