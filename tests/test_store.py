@@ -178,7 +178,9 @@ def test_float32_is_float64_rounded(tmp_path: Path, cells: int) -> None:
 @pytest.mark.parametrize("split", [False, True])
 def test_float32_does_not_overflow_in_silence(tmp_path: Path, split: bool) -> None:
     text, path = GRID.replace("[0.5, 1, 2, 4]", "[1e-30]") + SINGLE, tmp_path / "a"
-    with pytest.raises(InputError, match=r'output.dtype = "float32": permanent_displacement reaches .*must be "float64"'):
+    with pytest.raises(
+        InputError, match=r'output.dtype = "float32": permanent_displacement reaches .*must be "float64"'
+    ):
         run(text, path, block_cells=100, split=split)
     assert not path.exists()
 

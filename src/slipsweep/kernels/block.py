@@ -255,7 +255,7 @@ slip_root = _root_of(slip_and_slope)
 
 
 @scalar
-def yield_governs(block: Block, start: float, end: float) -> bool:
+def stays_below_yield(block: Block, start: float, end: float) -> bool:
     """Whether Eq. 4 stays at or below the yield value on the plane's way from `start`, no less than it, to `end`."""
     if block.rise == NEWMARK:
         return True

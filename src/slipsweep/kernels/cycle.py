@@ -290,7 +290,7 @@ def follow(block: Block, wave: Wave, p: int, start: float, end: float, state: np
 
 @scalar
 def arrive(block: Block, x: float, state: np.ndarray) -> None:
-    """What x asks where a rise, a plateau or a jump upwards brings it: b of a sliding block, the onset of one at rest."""
+    """What x asks at the beginning of a rise or a plateau and after a jump upwards: b if the block slides, else t1."""
     if state[SLIDES] > 0.0:
         if block.rise == LITERAL:
             state[HELD] = response(block, x)
@@ -300,7 +300,7 @@ def arrive(block: Block, x: float, state: np.ndarray) -> None:
         b = starting_acceleration(block, x)
         if b < x:
             state[HELD], state[SLIDES] = b, 1.0
-            state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
+    state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
 
 
 @scalar

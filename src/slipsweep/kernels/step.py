@@ -59,7 +59,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.excitation import Wave, offset_at, phase_at, plane
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs_wave
+from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -779,7 +779,7 @@ def stick_slip_lanes(
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
                 moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
-            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs_wave(block, wave) else 0)
+            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs(block, wave) else 0)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
         codes[1, where[j]] |= answer.validity
         if answer.validity & NO_VALUE:

@@ -19,7 +19,7 @@ from slipsweep.kernels.block import (
     Block,
     Motion,
     Options,
-    yield_governs,
+    stays_below_yield,
 )
 from slipsweep.kernels.excitation import Wave, offset_at
 from slipsweep.kernels.jit import scalar
@@ -71,14 +71,14 @@ def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
 
 
 @scalar
-def yield_governs_wave(block: Block, wave: Wave) -> bool:
+def yield_governs(block: Block, wave: Wave) -> bool:
     """Whether Eq. 4 stays at or below the yield value over all that the plane rises through or jumps to."""
     governs = True
     for i in range(wave.rises.shape[0]):
         high = block.amplitude * wave.rises[i, 1]
         if governs and high > block.yield_acceleration:
             low = max(block.amplitude * wave.rises[i, 0], block.yield_acceleration)
-            governs = yield_governs(block, low, high)
+            governs = stays_below_yield(block, low, high)
     return governs
 
 
@@ -95,7 +95,7 @@ def train_of(
     def pulses(
         block: Block, options: Options, wave: Wave, table: np.ndarray, k: int, until: int, velocity: float
     ) -> tuple[Pulse, int]:
-        """Pulses from that in stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
+        """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
         displacement, peak, least, rested, validity = 0.0, velocity, velocity, 0.0, 0
         while k < wave.height.size and wave.stretch[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
@@ -121,7 +121,7 @@ def train_of(
         k = first_pulse(block, wave, 0)
         if k == wave.height.size:
             return Motion(0.0, 0.0, 0)
-        validity = EQ4_BELOW_YIELD if yield_governs_wave(block, wave) else 0
+        validity = EQ4_BELOW_YIELD if yield_governs(block, wave) else 0
         now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0)
         velocity, displacement, peak = now.velocity, now.displacement, now.peak
         validity |= now.validity
