@@ -83,7 +83,7 @@ RISES, FALLS, BELOW = 0, 1, 2
 
 
 class Steps(NamedTuple):
-    """The steps of the pieces of a wave: `count` of one `length` on each.
+    """The steps of the pieces of a wave: `counts[p]` of one `length[p]` on each.
 
     ``nodes[offset[p] + 2 * k]`` is w at the beginning of step k of piece p, followed by w at its middle and
     at its end (−0.0 where a negative piece is 0); `mirrored` is whether the two halves of a cycle are, but
@@ -93,7 +93,7 @@ class Steps(NamedTuple):
     wave: Wave
     nodes: np.ndarray
     offset: np.ndarray
-    count: np.ndarray
+    counts: np.ndarray
     length: np.ndarray
     mirrored: bool
 
@@ -153,7 +153,7 @@ def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarr
 @scalar
 def node(steps: Steps, p: int, i: int) -> float:
     """τ on piece p at which step i begins."""
-    return (i if steps.wave.begin[p] == 0.0 else i - steps.count[p]) * steps.length[p]
+    return (i if steps.wave.begin[p] == 0.0 else i - steps.counts[p]) * steps.length[p]
 
 
 @scalar
@@ -461,19 +461,19 @@ def through_stretch(
         else:
             x = block.yield_acceleration
             first = min(
-                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.count[q]), 0),
-                steps.count[q] - 1,
+                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.counts[q]), 0),
+                steps.counts[q] - 1,
             )
         at = steps.offset[q]
         if kind_of(wave, q) == RISES:
-            for i in range(first, steps.count[q]):
+            for i in range(first, steps.counts[q]):
                 if i > first:
                     tau, x = node(steps, q, i), block.amplitude * steps.nodes[at + 2 * i]
                 rise_step(block, rule, options, steps, q, i, tau, x, state)
         elif state[SLIDES] > 0.0:
             if state[HELD] <= 0.0:
                 return KD_NOT_POSITIVE
-            for i in range(steps.count[q]):
+            for i in range(steps.counts[q]):
                 fall_step(block, rule, options, steps, q, i, state)
                 if state[SLIDES] == 0.0:
                     break
@@ -487,7 +487,7 @@ def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, 
     state[RESTED] = math.inf
     for piece in range(q, min(p + 1, wave.first.size)):
         last = tau if piece == p else wave.finish[piece]
-        for i in range(steps.count[piece]):
+        for i in range(steps.counts[piece]):
             start, end = node(steps, piece, i), node(steps, piece, i + 1)
             if end <= last:
                 whole_hold_step(block, rule, steps, piece, i, state)
@@ -599,13 +599,13 @@ def lockstep_rise(
         going += 1 if states[_SLIDES + j] > 0.0 else 0
     if going == 0:
         # at rest below Üy nothing happens
-        while first < steps.count[p] and nodes[at + 2 * first + 2] <= least * (1.0 - 1e-15):
+        while first < steps.counts[p] and nodes[at + 2 * first + 2] <= least * (1.0 - 1e-15):
             first += 1
-        if first == steps.count[p]:
+        if first == steps.counts[p]:
             return
     for j in range(count):
         lanes[_ASKED + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * nodes[at + 2 * first], g)
-    for i in range(first, steps.count[p]):
+    for i in range(first, steps.counts[p]):
         w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events = 0
         for j in range(count):
@@ -653,7 +653,7 @@ def lockstep_fall(
     """Lanes along piece p with b held, or until all have stopped."""
     literally(rule)
     nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
-    for i in range(steps.count[p]):
+    for i in range(steps.counts[p]):
         w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events, going = 0, 0
         for j in range(count):
@@ -800,7 +800,7 @@ def continuous_cycle(
         h = steps.length[p]
         for j in range(count):
             lanes[_ASKED + j] = lane_slip(lanes, j, lanes[AMPLITUDE + j] * nodes[at], side, g)
-        for i in range(steps.count[p]):
+        for i in range(steps.counts[p]):
             w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
             near = min(abs(w_start), abs(w_end))
             events = 0
@@ -862,7 +862,7 @@ def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int,
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
         if wave.top[p] > 0.0:
             at, h = steps.offset[p], steps.length[p]
-            for i in range(steps.count[p]):
+            for i in range(steps.counts[p]):
                 w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
                 for j in range(count):
                     amplitude = lanes[AMPLITUDE + j]
