@@ -24,6 +24,7 @@ from slipsweep.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
 from slipsweep.suggest import did_you_mean
 from slipsweep.tables import Variable
 from slipsweep.variables import DEFAULT_RESULTS, DIMENSION_ORDER, PARAMETERS, RESULT_DTYPES, RESULTS
+from slipsweep.waveforms import check_waveform
 
 if TYPE_CHECKING:
     from slipsweep.uncertainty import Sampling
@@ -116,11 +117,30 @@ class Model(_Table):
     g: Annotated[Number, Field(gt=0)] = 9.81
 
 
+class Harmonics(_Table):
+    """Terms of waveform = "harmonics", a sin(m phi + p) each; phases in degrees."""
+
+    amplitudes: Annotated[list[Number], Field(min_length=1)]
+    multiples: Annotated[list[Whole], Field(min_length=1)]
+    phases: list[Number] | None = None
+
+
 class Excitation(_Table):
     """The shaking, but for its amplitude and frequency, which are axes."""
 
-    waveform: Literal["sine"] = "sine"
+    waveform: Literal["sine", "cosine", "triangle", "square", "harmonics"] = "sine"
     cycles: Annotated[Whole, Field(ge=1, le=MOST_CYCLES)] = 10
+    harmonics: Harmonics | None = None
+    ramp_in: Number = 0.0
+    ramp_out: Number = 0.0
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments of `slipsweep.sweep`."""
+        return {**self.model_dump(exclude={"harmonics"}), "harmonics": self._columns()}
+
+    def _columns(self) -> dict[str, Any] | None:
+        return None if self.harmonics is None else self.harmonics.model_dump(exclude_none=True)
 
 
 class Solver(_Table):
@@ -274,8 +294,7 @@ class SweepSpec:
             else:
                 arguments[name] = Variable((dim,), values[block.get(dim, slice(None))])
         arguments |= {
-            "cycles": self.excitation.cycles,
-            "waveform": self.excitation.waveform,
+            **self.excitation.arguments,
             "model": self.model.friction,
             "g": self.model.g,
             "solver": self.solver.method,
@@ -353,6 +372,7 @@ def parse(text: str, source: str) -> SweepSpec:
         sampling = file.uncertainty.sampling(file.model.g) if file.uncertainty is not None else None
         parameters = _parameters(file, sampling)
         _check_model(file)
+        _check_excitation(file.excitation)
         _check_variables(file, parameters)
     except InputError as error:
         raise InputError(f"{source}: {_one_line(str(error))}") from None
@@ -471,6 +491,13 @@ def _check_model(file: SweepFile) -> None:
         for key in sorted(file.model.model_fields_set & {"rise", "recoupling"}):
             value = getattr(file.model, key)
             raise InputError(f'model.{key} = "{value}": not allowed with friction = "newmark"')
+
+
+def _check_excitation(excitation: Excitation) -> None:
+    try:
+        check_waveform(**excitation.arguments)
+    except InputError as error:
+        raise InputError(f"excitation.{error}") from None
 
 
 def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> None:

@@ -348,7 +348,7 @@ def _write_blocks(
         nonlocal syncing
         with _writing(work.output):
             arrays = {
-                name: result.values.astype(target.spec.dtype(name), copy=False)
+                name: _rounded(name, result.values, target.spec.dtype(name))
                 for name, result in table.data_vars.items()
             }
             digest = examiner.submit(examine, arrays)
@@ -447,6 +447,21 @@ class _OneFile:
     def sync(self) -> None:
         """Have all that is written on the disk itself; from any thread."""
         parts.sync(self.data)
+
+
+def _rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """A result as the file holds it; what is too large for that is an error, and not infinite."""
+    if values.dtype == dtype:
+        return values
+    with np.errstate(over="ignore"):
+        rounded = values.astype(dtype)
+    beyond = np.isinf(rounded)
+    if beyond.any() and np.isfinite(worst := np.abs(values[beyond]).max()):
+        raise InputError(
+            f'output.dtype = "{dtype}": {name} reaches {worst:.4g}, more than the {np.finfo(dtype).max:.4g} that it '
+            'holds; must be "float64"'
+        )
+    return rounded
 
 
 class _Files:

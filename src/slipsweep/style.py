@@ -6,6 +6,7 @@ from typing import Any
 
 from slipsweep.tables import Table
 from slipsweep.variables import PARAMETERS, RESULTS
+from slipsweep.waveforms import text_of
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -53,7 +54,7 @@ def caption(table: Table) -> str:
     attributes = table.attrs
     uncertain = [f"uncertain: {_drawn_text(attributes)}"] if "uncertain" in attributes else []
     options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
-    shaking = f"{attributes['cycles']} cycles of a {attributes['waveform']}"
+    shaking = f"{attributes['cycles']} cycles of a {text_of(attributes)}"
     return "\n".join([", ".join(parts), *uncertain, f"model: {', '.join(options)}; {shaking}"]).strip()
 
 
