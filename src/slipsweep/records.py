@@ -10,6 +10,7 @@ Three formats, told apart by what stands in the file (or by `file_format`):
   (``SAMPLING_INTERVAL_S``, ``NDATA``, ``UNITS``), then accelerations, one a line.
 """
 
+import hashlib
 import math
 import re
 from collections.abc import Iterable
@@ -29,6 +30,10 @@ STANDARD_GRAVITY = 9.80665
 
 #: Units of a recorded acceleration, in m/s².
 UNITS: dict[str, float] = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "cm/s2": 0.01, "gal": 0.01}
+
+#: A day of acceleration at 100 samples a second; what is larger is no record.
+_MOST_BYTES = 200_000_000
+
 BASELINES = ("none", "mean", "linear")
 FORMATS = ("auto", "csv", "at2", "esm")
 
@@ -130,10 +135,13 @@ def read_record(
     if units is not None:
         check_choice("units", units, UNITS)
     try:
-        # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
-        lines = path.read_bytes().decode("utf-8-sig", errors="replace").splitlines()
+        if path.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{path}: {path.stat().st_size} bytes: a record must have {_MOST_BYTES} at most")
+        content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
+    lines = content.decode("utf-8-sig", errors="replace").splitlines()
     kind = _format_of(lines) if file_format == "auto" else file_format
     times, values, own = {"csv": _read_csv, "at2": _read_at2, "esm": _read_esm}[kind](path, lines)
     if own is not None and units is not None and UNITS[own] != UNITS[units]:
@@ -143,7 +151,12 @@ def read_record(
         raise InputError(
             f"{path}: units: must be given, one of {', '.join(map(repr, UNITS))}: the file does not name the unit"
         )
-    attrs = {"record": path.name, "record_format": kind, "record_units": unit}
+    attrs = {
+        "record": path.name,
+        "record_format": kind,
+        "record_units": unit,
+        "record_sha256": hashlib.sha256(content).hexdigest(),
+    }
     return Record(times, values * UNITS[unit], str(path), attrs).corrected(baseline)
 
 

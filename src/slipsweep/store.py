@@ -34,18 +34,24 @@ from slipsweep.blocks import (
     Solved,
     block_lengths,
     block_memory,
+    default_cells,
     grid_blocks,
+    plan_of,
     solve_here,
 )
 from slipsweep.errors import InputError, RunError
 from slipsweep.parts import sync
+from slipsweep.records import Record
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table, Variable
-from slipsweep.variables import RECORD_COUNTS, SlidingMode, Validity
+from slipsweep.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode, Validity
 
 #: Results that are whole numbers, -1 where there is no value.
 _WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
+
+#: Dimension of the samples of a record.
+RECORD_DIM = "record_sample"
 
 #: Name of a block's file in a folder that `run` made.
 _BLOCK_FILE = re.compile(r"block-\d{6,}\.nc")
@@ -209,7 +215,7 @@ def run(
         Write a folder with a netCDF file for each block.
     block_cells : int, optional
         Cells solved and written at a time; two such blocks are in memory.  By default
-        `BLOCK_CELLS`, or what an interrupted run had.
+        `blocks.default_cells`, or what an interrupted run had.
     progress : callable
         Called with a number of cells just solved, from any thread.
     solved : callable
@@ -249,7 +255,7 @@ def run(
                 return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
         else:
             work.clear()
-        block_cells = block_cells or BLOCK_CELLS
+        block_cells = block_cells or default_cells(spec)
         # once more: a run that was writing it may have ended before this one got hold of the lock
         check_output(path, overwrite, folder=split)
         data = work.data(split)
@@ -354,10 +360,8 @@ class _OneFile:
     """All blocks in one netCDF file, each in its place."""
 
     def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
-        from slipsweep.plans import plan_sweep  # imports numba: not for `info`
-
         self.spec, self.data, self.command = spec, data, command
-        self.table = plan_sweep(**spec.arguments()).empty()
+        self.table = plan_of(spec.arguments()).empty()
         self.file: netCDF4.Dataset | None = None
 
     def __enter__(self) -> Self:
@@ -488,6 +492,17 @@ def _head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[st
     file.set_auto_maskandscale(False)
     for name, coordinate in table.coords.items():
         file[name][...] = coordinate.values
+    if spec.record is not None:
+        _embed(file, spec.record)
+
+
+def _embed(file: netCDF4.Dataset, record: Record) -> None:
+    """Write the samples of a record, from which the run can be repeated when its file is gone."""
+    file.createDimension(RECORD_DIM, record.times.size)
+    for name, values in zip(RECORD_SAMPLES, (record.times, record.acceleration), strict=True):
+        variable = file.createVariable(name, "f8", (RECORD_DIM,))
+        _describe(variable, RECORD_SAMPLES[name])
+        variable[:] = values
 
 
 def _nbytes(path: Path) -> int:
@@ -497,8 +512,13 @@ def _nbytes(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
-def write_table(table: Table, path: Path, *, title: str, command: str, overwrite: bool = False) -> None:
-    """Write a table that is in memory (a time history) by the rules that sweeps are written by."""
+def write_table(
+    table: Table, path: Path, *, title: str, command: str, overwrite: bool = False, record: Record | None = None
+) -> None:
+    """Write a table that is in memory (a time history) by the rules that sweeps are written by.
+
+    The `record` that it is the response to is written with it.
+    """
     check_output(path, overwrite)
     with (
         complete_or_absent(path, overwrite) as temporary,
@@ -510,6 +530,8 @@ def write_table(table: Table, path: Path, *, title: str, command: str, overwrite
         file.set_auto_maskandscale(False)
         for name, array in {**table.coords, **table.data_vars}.items():
             file[name][...] = array.values
+        if record is not None:
+            _embed(file, record)
 
 
 def without_time_axis(table: Table) -> Table:

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -64,7 +64,7 @@ def record(
         "delta_mu": delta_mu,
         "minimum_friction": minimum_friction,
     }
-    given = {name: numbers(name, text) for name, text in texts.items() if text is not None}
+    given: dict[str, Any] = {name: numbers(name, text) for name, text in texts.items() if text is not None}
 
     from slipsweep import store
     from slipsweep.records import read_record
@@ -76,23 +76,23 @@ def record(
 
     import numpy as np
 
-    from slipsweep.record_sweeps import record_table
+    from slipsweep.record_sweeps import plan_record
 
-    sizes = [len(values) for name, values in given.items() if isinstance(values, list) and name != "time_scale"]
-    cells = math.prod(sizes) * (2 if polarity == "both" else 1)
-    with progress_bar(cells, quiet) as progress:
-        table = record_table(
-            motion,
-            **given,
-            polarity=polarity if polarity == "both" else int(polarity),
-            model=model,
-            rise=rise,
-            recoupling=recoupling,
-            g=g,
-            progress=progress,
-        )
+    plan = plan_record(
+        motion,
+        **given,
+        polarity=polarity if polarity == "both" else int(polarity),
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        g=g,
+    )
+    with progress_bar(math.prod(plan.sizes.values()), quiet) as progress:
+        table = plan.solve(progress)
     if output is not None:
-        store.write_table(table, output, title=table.attrs["title"], command=typed_command(), overwrite=overwrite)
+        store.write_table(
+            table, output, title=table.attrs["title"], command=typed_command(), overwrite=overwrite, record=motion
+        )
     if quiet:
         return
     peak = float(np.abs(motion.acceleration).max())
