@@ -18,7 +18,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 import slipsweep
-from slipsweep import InputError, Record, read_record, sweep_record
+from slipsweep import InputError, Record, sweep_record
 from slipsweep.kernels.block import MONOTONE, Cell, block_of
 from slipsweep.kernels.linear import follow_integrals, held_stop
 
@@ -426,73 +426,7 @@ def test_where_there_is_no_value(shaking: Record) -> None:
     assert int(lifted.validity) == 2, "n = g + Üg tan θ < 0 on the way down"
 
 
-# ------------------------------------------------------------------------------------ files
-
-
-def write(folder: Path, name: str, text: str) -> Path:
-    path = folder / name
-    path.write_text(text)
-    return path
-
-
-@pytest.mark.parametrize(
-    ("text", "units", "factor"),
-    [
-        ("0,0.1\n0.01,0.2\n", "g", 9.80665),
-        ("time (s),acceleration (m/s2)\n0,0.1\n0.01,0.2\n", None, 1.0),
-        ("# a comment\n# Time (s),Acceleration (g's)\n0;0.1\n0.01;0.2\n", None, 9.80665),
-        ("t [s]\ta [cm/s^2]\n0\t0.1\n0.01\t0.2\n\n", None, 0.01),
-        ("0 0.1\n0.01 0.2\n", "gal", 0.01),
-    ],
-)
-def test_csv(tmp_path: Path, text: str, units: str | None, factor: float) -> None:
-    record = read_record(write(tmp_path, "a.csv", text), units=units)
-    np.testing.assert_array_equal(record.times, [0.0, 0.01])
-    np.testing.assert_allclose(record.acceleration, [0.1 * factor, 0.2 * factor], rtol=1e-15)
-
-
-AT2 = "PEER STRONG MOTION DATABASE RECORD\nA PLACE, 1/1/2000\nACCELERATION TIME HISTORY IN UNITS OF G\n"
-
-
-def test_at2_and_esm(tmp_path: Path) -> None:
-    at2 = write(tmp_path, "a.AT2", f"{AT2}NPTS=   3, DT=   .0050 SEC\n  .1E-01 -.2E-01\n  .3E-01\n")
-    esm = write(tmp_path, "a.ASC", "SAMPLING_INTERVAL_S: 0.005\nNDATA: 3\nUNITS: cm/s^2\n9.80665\n-19.6133\n29.41995\n")
-    for path in (at2, esm):
-        record = read_record(path)
-        np.testing.assert_allclose(record.times, [0.0, 0.005, 0.01], rtol=1e-15)
-        np.testing.assert_allclose(record.acceleration, np.array([1, -2, 3]) * 0.0980665, rtol=1e-14)
-
-
-def test_baseline() -> None:
-    times = np.linspace(0.0, 4.0, 401)
-    record = Record(times, np.cos(2 * pi * times) + 0.3 + 0.2 * times)
-    np.testing.assert_array_equal(record.corrected("none").acceleration, record.acceleration)
-    assert record.corrected("mean").acceleration.mean() == pytest.approx(0.0, abs=1e-15)
-    slope, offset = np.polyfit(times, record.corrected("linear").acceleration, 1)
-    assert (slope, offset) == pytest.approx((0.0, 0.0), abs=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "units", "message"),
-    [
-        ("a.csv", "0,1\n1,2\n", None, "units: must be given"),
-        ("a.csv", "t,a (g)\n0,1\n1,2\n", "gal", "the file itself says 'g'"),
-        ("a.csv", "0,1\n1,x\n", "g", "line 2: '1,x'"),
-        ("a.csv", "0,1\n1,nan\n", "g", "line 2"),
-        ("a.csv", "0,1\n1,1\n1,2\n", "g", "line 3: time 1: must be greater than 1"),
-        ("a.csv", "0,1\n1,2,3\n", "g", "line 2"),
-        ("a.csv", "no numbers\n", "g", "no line of a time and an acceleration"),
-        ("a.csv", "0,1\n", "g", "must be at least 2"),
-        ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n", None, "2 accelerations, where its header says 3"),
-        ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n oops\n", None, "line 6: ' oops'"),
-        ("a.AT2", f"{AT2}NPTS= 2, DT= .005 SEC\n 1 nan\n", None, "sample 2 = nan"),
-        ("a.VT2", f"{AT2}VELOCITY\nNPTS= 2, DT= .005 SEC\n 1 2\n", None, "velocity or displacement"),
-    ],
-)
-def test_files_that_are_refused(tmp_path: Path, name: str, text: str, units: str | None, message: str) -> None:
-    with pytest.raises(InputError, match=name.replace(".", "[.]")) as error:
-        read_record(write(tmp_path, name, text), units=units)
-    assert message in str(error.value)
+# ---------------------------------------------------------------------------------- arguments
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ _HARMONIC = ("amplitude", "displacement_amplitude", "frequency", "structure_freq
 _INPUTS = PARAMETERS | {name: attrs for name, attrs in RECORD_PARAMETERS.items() if name != "polarity"}
 
 #: Keys of [excitation] that go with a record, and no other.
-_RECORD_KEYS = ("record", "units", "baseline", "format", "polarity")
+_RECORD_KEYS = ("record", "units", "baseline", "format", "channel", "polarity")
 
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
@@ -144,7 +144,8 @@ class Excitation(_Table):
     record: Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None = None
     units: Literal["m/s2", "g", "cm/s2", "gal"] | None = None
     baseline: Literal["none", "mean", "linear"] = "none"
-    format: Literal["auto", "csv", "at2", "esm"] = "auto"
+    format: Literal["auto", "csv", "at2", "esm", "cosmos"] = "auto"
+    channel: Annotated[Whole, Field(ge=1)] | None = None
     polarity: Literal[1, -1, "both"] = 1
 
 
@@ -449,6 +450,7 @@ def _read(excitation: Excitation, folder: Path) -> Record:
             units=excitation.units,
             baseline=excitation.baseline,
             file_format=excitation.format,
+            channel=excitation.channel,
         )
     except InputError as error:
         raise InputError(f"excitation.record: {error}") from None

@@ -17,7 +17,9 @@ _MOST_POINTS = 1_000_000
 
 
 def record(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV (time, acceleration), PEER AT2 or ESM text file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV (time, acceleration), PEER AT2, COSMOS or ESM text.")
+    ],
     theta: Annotated[str, typer.Option(metavar="VALUES", help="Plane inclinations, degrees: 5 or 0,5,10 or 0:20:41.")],
     mu_s: Annotated[str, typer.Option(metavar="VALUES", help="Static friction coefficients.")],
     scale: Annotated[str, typer.Option(metavar="VALUES", help="Factors on the acceleration.")] = "1",
@@ -33,8 +35,11 @@ def record(
         Literal["none", "mean", "linear"], typer.Option(help="What is taken off the accelerations.")
     ] = "none",
     file_format: Annotated[
-        Literal["auto", "csv", "at2", "esm"], typer.Option("--format", help="Format of the file.")
+        Literal["auto", "csv", "at2", "esm", "cosmos"], typer.Option("--format", help="Format of the file.")
     ] = "auto",
+    channel: Annotated[
+        int | None, typer.Option(help="Channel of acceleration in a COSMOS file that holds several, from 1.")
+    ] = None,
     yield_acceleration: Annotated[
         str | None, typer.Option(metavar="VALUES", help="Yield accelerations, m/s² (default: Coulomb's).")
     ] = None,
@@ -70,7 +75,7 @@ def record(
     from slipsweep.records import read_record
     from slipsweep.resources import size_text
 
-    motion = read_record(file, units=units, baseline=baseline, file_format=file_format)
+    motion = read_record(file, units=units, baseline=baseline, file_format=file_format, channel=channel)
     if output is not None:
         store.check_output(output, overwrite)
 
