@@ -168,6 +168,9 @@ def rise_piece(block: Block, state: np.ndarray, x: float, top: float, slope: flo
             state[HELD] = min(starting_acceleration(block, x), x)  # equal at an onset, but for rounding
             state[SLIDES], state[FOLLOWS] = 1.0, 1.0 if literal else 0.0
             state[SLIPS] += 1.0
+        elif not literal:
+            # where a fall before it has left b below what Eq. 4 asks at the beginning of the rise
+            state[HELD] = max(state[HELD], response(block, x))
         end, follows, follows_on = rising_leg(block, x, top, state[HELD], state[FOLLOWS] > 0.0)
         duration = left if end == top else min((end - x) / slope, left)
         if follows:
