@@ -9,15 +9,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import reference
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from slipsweep import Record
-from tests import reference
 
-RTOL, ATOL = 1e-11, 1e-14
+RTOL, ATOL = 1e-13, 1e-17
 
 #: Points between which a switch is looked for on a piece.
 _POINTS = 200
@@ -67,7 +68,7 @@ def pieces_of(record: Record, scale: float) -> list[Piece]:
 class Block:
     """A block on the record, pulse by pulse."""
 
-    def __init__(self, theta: float, mu_s: float, g: float, recoupling: str, **given: float) -> None:
+    def __init__(self, theta: float, mu_s: float, g: float, recoupling: str, **given: Any) -> None:
         self.theta, self.mu_s, self.g, self.recoupling, self.given = theta, mu_s, g, recoupling, given
         self.tan = math.tan(math.radians(theta))
         self.v = self.u = self.peak = self.held = 0.0
@@ -185,7 +186,9 @@ class Block:
             self.brake(math.inf)
         return Response(self.u, self.peak, self.slips, modes[reference.STICK_SLIP], modes[reference.CONTINUOUS])
 
-    def stick_and_slip(self, parts: list[Piece], begin: tuple[int, float], end: int, following: tuple[int, float]) -> None:
+    def stick_and_slip(
+        self, parts: list[Piece], begin: tuple[int, float], end: int, following: tuple[int, float]
+    ) -> None:
         self.v = max(self.v, 0.0)
         self.sliding = self.v > 0.0
         self.held = max(self.onset, self.eq4(self.onset))
