@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 WRITES = {
     "report": ["report.md"],
     "roofline": ["roofline.md"],
+    "records": ["records.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
 }
