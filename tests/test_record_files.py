@@ -1,11 +1,14 @@
 """Files of recorded motions: formats, units, baseline, channels, and what is refused."""
 
 import hashlib
+from contextlib import suppress
 from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from slipsweep import InputError, Record, read_record, records
 
@@ -145,6 +148,45 @@ def test_no_cosmos_file_cut_off_anywhere_is_taken_for_whole(tmp_path: Path) -> N
 
 
 # ------------------------------------------------------------------------------- all files
+
+
+SAMPLES = {
+    "cosmos": V1.read_bytes(),
+    "at2": f"{AT2}NPTS=   3, DT=   .0050 SEC\n  .1E-01 -.2E-01\n  .3E-01\n".encode(),
+    "esm": b"SAMPLING_INTERVAL_S: 0.005\nNDATA: 3\nUNITS: cm/s^2\n9.8\n-19.6\n29.4\n",
+    "csv": b"time (s),acceleration (g)\n0,0.1\n0.01,0.2\n0.02,-0.1\n",
+}
+PIECES = [
+    b"",
+    b"\n",
+    b" ",
+    b"-",
+    b"1e999",
+    b"nan",
+    b"9" * 5000,
+    b"\xb2",
+    b"0",
+    b"\x00",
+    b":",
+    b"=",
+    b"(1F0.0)",
+    b"1e308",
+]
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+@given(data=st.data())
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_damaged_files_are_refused_or_read_but_never_break(tmp_path: Path, kind: str, data: st.DataObject) -> None:
+    content = SAMPLES[kind]
+    for _ in range(data.draw(st.integers(1, 3))):
+        at = data.draw(st.integers(0, len(content)))
+        content = content[:at] + data.draw(st.sampled_from(PIECES)) + content[at + data.draw(st.integers(0, 3)) :]
+    path = tmp_path / "a"
+    path.write_bytes(content)
+    with suppress(InputError):
+        record = read_record(path, file_format=kind, baseline=data.draw(st.sampled_from(records.BASELINES)))
+        assert np.isfinite(record.acceleration).all()
 
 
 def test_checksum_is_that_of_the_file() -> None:

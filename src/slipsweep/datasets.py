@@ -270,6 +270,7 @@ def sweep_record(
     rise: str = "monotone",
     recoupling: str = "eq12",
     g: float = 9.81,
+    variables: Sequence[str] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Response of a sliding block to a recorded motion, over a grid of parameters.
@@ -295,6 +296,8 @@ def sweep_record(
         What replaces its estimate; by default each pulse has those of its own peak.
     model, rise, recoupling, g
         As in `sweep`.
+    variables : sequence of str, optional
+        Which of the results below to return, by default all.
     progress : callable, optional
         Called with the number of cells just finished, from any thread.
 
@@ -321,7 +324,16 @@ def sweep_record(
         "scale": scale,
         "time_scale": time_scale,
     }
-    plan = plan_record(record, **_plain(given), polarity=polarity, model=model, rise=rise, recoupling=recoupling, g=g)
+    plan = plan_record(
+        record,
+        **_plain(given),
+        polarity=polarity,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        g=g,
+        variables=variables,
+    )
     return _dataset(plan.solve(progress), _brought(given, plan.coords))
 
 

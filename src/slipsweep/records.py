@@ -180,7 +180,8 @@ def read_record(
         **({} if channel is None else {"record_channel": str(channel)}),
         "record_sha256": hashlib.sha256(content).hexdigest(),
     }
-    return Record(times, values * UNITS[unit], str(path), attrs).corrected(baseline)
+    with np.errstate(over="ignore"):  # what is not finite then is refused
+        return Record(times, values * UNITS[unit], str(path), attrs).corrected(baseline)
 
 
 def _format_of(lines: list[str]) -> str:
@@ -258,7 +259,7 @@ def _read_at2(path: Path, lines: list[str]) -> tuple[Floats, Floats, str | None]
     at = next((i for i, line in enumerate(lines[:6]) if re.search(r"NPTS\s*=", line, re.IGNORECASE)), None)
     if at is None:
         raise InputError(f"{path}: no NPTS= and DT= in its first lines: not a PEER AT2 file")
-    points = re.search(r"NPTS\s*=\s*(\d+)", lines[at], re.IGNORECASE)
+    points = re.search(r"NPTS\s*=\s*(\d{1,9})\b", lines[at], re.IGNORECASE)
     interval = re.search(r"DT\s*=\s*([0-9.eE+-]+)", lines[at], re.IGNORECASE)
     if points is None or interval is None or not _is_number(interval[1]):
         raise InputError(f"{path}: line {at + 1}: {_shown(lines[at])}: must give NPTS= and DT=")
@@ -284,16 +285,17 @@ def _read_esm(path: Path, lines: list[str]) -> tuple[Floats, Floats, str | None]
     unit = keys["UNITS"].lower().replace("^", "")
     if unit not in UNITS:
         raise InputError(f"{path}: UNITS = {keys['UNITS']!r}: must be one of {', '.join(map(repr, UNITS))}")
-    if not keys["NDATA"].isdigit() or not _is_number(keys["SAMPLING_INTERVAL_S"]):
+    if not re.fullmatch(r"[0-9]{1,9}", keys["NDATA"]) or not _is_number(keys["SAMPLING_INTERVAL_S"]):
         raise InputError(f"{path}: NDATA = {keys['NDATA']!r}, SAMPLING_INTERVAL_S: must be numbers")
     values = _numbers(path, enumerate(lines[body:], body + 1))
     return _sampled(path, values, int(keys["NDATA"]), float(keys["SAMPLING_INTERVAL_S"])), values, unit
 
 
-_COSMOS_HEAD = re.compile(r"\(Format v\s*[\d.]+ with\s+(\d+)\s+text lines\)", re.IGNORECASE)
-_COSMOS_HEADER = r"\s*(\d+)\s+{}-header values follow on\s+(\d+)\s+lines\s*,\s*Format\s*=?\s*\(\d*[IFEG](\d+)"
-_COSMOS_COMMENTS = r"\s*(\d+)\s+Comment line"
-_COSMOS_DATA = r"\s*(\d+)\s+(\w+).*?\bpts?\b.*Format\s*=?\s*\(\d*[IFEG](\d+)"
+_COSMOS_HEAD = re.compile(r"\(Format v\s*[\d.]+ with\s+(\d{1,4})\s+text lines\)", re.IGNORECASE)
+# of each section's first line: how many numbers (or lines) follow, and how many columns each of them has
+_COSMOS_HEADER = r"\s*(\d{1,9})\s+%s-header values follow on\s+\d+\s+lines\s*,\s*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
+_COSMOS_COMMENTS = r"\s*(\d{1,9})\s+Comment line"
+_COSMOS_DATA = r"\s*(\d{1,9})\s+\w+.*?\bpts?\b.*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
 
 
 def _read_cosmos(path: Path, lines: list[str], channel: int | None) -> tuple[Floats, Floats, str | None]:
@@ -317,8 +319,8 @@ def _cosmos_channels(path: Path, lines: list[str]) -> Iterator[tuple[float, Floa
             at += 1
             continue
         start = at
-        at, whole = _cosmos_values(path, lines, at + int(head[1]), _COSMOS_HEADER.format("Integer"))
-        at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER.format("Real"))
+        at, whole = _cosmos_values(path, lines, at + int(head[1]), _COSMOS_HEADER % "Integer")
+        at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
         if whole.size < 3 or reals.size < 62:
             raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
         at += 1 + int(_cosmos_line(path, lines, at, _COSMOS_COMMENTS)[1])
@@ -348,7 +350,7 @@ def _cosmos_line(path: Path, lines: list[str], at: int, pattern: str) -> re.Matc
 def _cosmos_values(path: Path, lines: list[str], at: int, pattern: str) -> tuple[int, Floats]:
     """A section: a line that says how many values follow and in what columns, then these; and the line after it."""
     head = _cosmos_line(path, lines, at, pattern)
-    count, width = int(head[1]), int(head[3])
+    count, width = int(head[1]), int(head[2])
     values: list[float] = []
     while len(values) < count:
         at += 1
@@ -374,7 +376,8 @@ def _sampled(path: Path, values: Floats, points: int, interval: float) -> Floats
 
 
 def _even(points: int, interval: float) -> Floats:
-    return np.arange(points, dtype=np.float64) * interval
+    with np.errstate(over="ignore"):
+        return np.arange(points, dtype=np.float64) * interval
 
 
 def _shown(line: str) -> str:

@@ -6,9 +6,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, progress_bar, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, echo_tally, progress_bar, typed_command
 from slipsweep.errors import InputError
-from slipsweep.variables import VALIDITY_TEXT, Validity
 
 EXAMPLE = "Example: slipsweep record motion.AT2 --theta 5 --mu-s 0.3:0.6:4 --scale 0.5,1,2 -o motion.nc"
 
@@ -56,7 +55,7 @@ def record(
     rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
     recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
     g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compute the response to a recorded motion, over a grid of blocks and scales."""
     texts = {
@@ -122,10 +121,9 @@ def record(
         if (values >= 0).any():
             low, high = values[values >= 0].min(), values.max()
             typer.echo(f"{name.replace('_', ' '):<24}{low}" + (f" to {high}" if high > low else ""))
-    for flag in Validity:
-        share = np.count_nonzero(validity & int(flag)) / count
-        if share:
-            typer.echo(f"flag {(flag.name or '').lower():<24}{share:7.2%}  {VALIDITY_TEXT[flag]}")
+    tally = store.Tally(count)
+    tally.add({"validity": validity})
+    echo_tally(tally)
     if output is not None:
         typer.echo(f"{output}  {size_text(output.stat().st_size)}")
 
