@@ -68,8 +68,11 @@ def pieces_of(record: Record, scale: float) -> list[Piece]:
 class Block:
     """A block on the record, pulse by pulse."""
 
-    def __init__(self, theta: float, mu_s: float, g: float, recoupling: str, **given: Any) -> None:
-        self.theta, self.mu_s, self.g, self.recoupling, self.given = theta, mu_s, g, recoupling, given
+    def __init__(
+        self, theta: float, mu_s: float, g: float, rise: str = "monotone", recoupling: str = "eq12", **given: Any
+    ) -> None:
+        self.theta, self.mu_s, self.g, self.given = theta, mu_s, g, given
+        self.literal, self.recoupling = rise == "literal", recoupling
         self.tan = math.tan(math.radians(theta))
         self.v = self.u = self.peak = self.held = 0.0
         self.slips = 0
@@ -88,6 +91,10 @@ class Block:
         friction = self.top_friction * math.exp(-self.decay * abs(x) / self.g)
         n = self.g + x * self.tan
         return math.copysign(1.0, x) * (abs(x) - n * (self.mu_s - self.tan - friction) - self.g * self.tan)
+
+    def asked(self, x: float) -> float:
+        """The acceleration that a slide begins with."""
+        return self.eq4(x) if self.literal else max(self.onset, self.eq4(x))
 
     # ------------------------------------------------------------------------ parts of motion
 
@@ -133,24 +140,21 @@ class Block:
 
     def along_a_rise(self, piece: Piece) -> None:
         while piece.end > 0.0:
-            if piece.x < self.onset:
-                to_onset = (self.onset - piece.x) / piece.slope if piece.slope > 0.0 else math.inf
-                below, piece = piece.cut(min(to_onset, piece.end))
-                if self.sliding:
-                    self.hold(below)
-                if to_onset >= below.end + piece.end:
-                    return
-                piece = Piece(self.onset, piece.slope, piece.end)
             if not self.sliding:
-                began = _first(piece, lambda x: x - max(self.onset, self.eq4(x)))
+                if piece.at(piece.end) <= self.onset:
+                    return
+                if piece.x < self.onset:
+                    rest = piece.cut((self.onset - piece.x) / piece.slope)[1]
+                    piece = Piece(self.onset, rest.slope, rest.end)
+                began = _first(piece, lambda x: x - self.asked(x))
                 if began is None:
                     return
                 piece = piece.cut(began)[1]
-                self.held = max(self.onset, self.eq4(piece.x))
+                self.held = self.asked(piece.x)
                 self.sliding = True
                 self.slips += 1
-            self.held = max(self.held, self.eq4(piece.x))
-            switch = _first(piece, lambda x: self.eq4(x) - self.held)
+            self.held = self.eq4(piece.x) if self.literal else max(self.held, self.eq4(piece.x))
+            switch = 0.0 if self.literal else _first(piece, lambda x: self.eq4(x) - self.held)
             held, rest = piece.cut(piece.end if switch is None else switch)
             took = self.hold(held)
             if not self.sliding:
@@ -191,7 +195,7 @@ class Block:
     ) -> None:
         self.v = max(self.v, 0.0)
         self.sliding = self.v > 0.0
-        self.held = max(self.onset, self.eq4(self.onset))
+        self.held = self.asked(self.onset)
         for piece in _between(parts, begin, (end, 0.0)):
             if piece.slope >= 0.0:
                 self.along_a_rise(piece)

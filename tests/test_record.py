@@ -197,7 +197,7 @@ PRINTED = {"yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09}
 
 
 @pytest.mark.filterwarnings("ignore")  # pySLAMMER's own
-@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+@pytest.mark.parametrize("options", [{}, {"recoupling": "integrate"}], ids=["eq12", "integrate"])
 @pytest.mark.parametrize(
     ("name", "peak", "given", "modes"),
     [
@@ -211,18 +211,20 @@ PRINTED = {"yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09}
         ("Kobe_1995_TAK-090", 8.0, {}, (1, 4)),
         ("Kobe_1995_TAK-090", 4.0, PRINTED, (6, 0)),
         ("Kobe_1995_TAK-090", 6.0, PRINTED, (2, 5)),
+        ("Kobe_1995_TAK-090", 6.0, {**PRINTED, "rise": "literal"}, (2, 5)),
+        ("Northridge_1994_PAC-175", 5.0, {**PRINTED, "rise": "literal"}, (6, 0)),
     ],
 )
 def test_mendez_against_scipy_on_recorded_motions(
-    name: str, peak: float, given: dict[str, Any], modes: tuple[int, int], recoupling: str
+    name: str, peak: float, given: dict[str, Any], modes: tuple[int, int], options: dict[str, Any]
 ) -> None:
     """Five seconds about the largest acceleration, scaled to `peak`; seen: 5e-13 and better."""
     motion = _pyslammer().load_sample_ground_motion(name)
     largest, half = int(np.argmax(np.abs(motion.accel))), round(2.5 / motion.dt)
     record = Record.sampled(motion.accel[max(largest - half, 0) : largest + half] * G, motion.dt)
     scale = peak / float(np.abs(record.acceleration).max())
-    result = sweep_record(record, 5.0, 0.38, scale=scale, recoupling=recoupling, **given)
-    expected = Block(5.0, 0.38, G, recoupling, **given).respond(record, scale)
+    result = sweep_record(record, 5.0, 0.38, scale=scale, **given, **options)
+    expected = Block(5.0, 0.38, G, **given, **options).respond(record, scale)
     assert (expected.stick_slip_pulses, expected.continuous_pulses) == modes
     assert expected.permanent_displacement > 1e-6
     for quantity, value in vars(expected).items():
