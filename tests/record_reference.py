@@ -20,6 +20,9 @@ from slipsweep import Record
 
 RTOL, ATOL = 1e-13, 1e-17
 
+#: More stops and onsets than a piece has.
+_MOST_LEGS = 20
+
 #: Points between which a switch is looked for on a piece.
 _POINTS = 200
 
@@ -128,7 +131,13 @@ class Block:
         return float(solution.t[-1])
 
     def hold(self, piece: Piece) -> float:
-        return self.integrate(piece, lambda x: self.held, True)
+        # in two parts where the velocity turns: within a step it could fall below zero and rise again unseen
+        turn = (self.held - piece.x) / piece.slope if piece.slope else 0.0
+        if not 1e-9 * piece.end < turn < piece.end:
+            return self.integrate(piece, lambda x: self.held, True)
+        first, second = piece.cut(turn)
+        took = self.integrate(first, lambda x: self.held, True)
+        return took + self.integrate(second, lambda x: self.held, True) if self.sliding else took
 
     def brake(self, duration: float) -> None:
         """Eq. 12 until the velocity, of either sign, is zero."""
@@ -139,7 +148,9 @@ class Block:
         self.sliding = self.v != 0.0
 
     def along_a_rise(self, piece: Piece) -> None:
-        while piece.end > 0.0:
+        for _ in range(_MOST_LEGS):
+            if piece.end <= 0.0:
+                return
             if not self.sliding:
                 if piece.at(piece.end) <= self.onset:
                     return
@@ -195,7 +206,11 @@ class Block:
     ) -> None:
         self.v = max(self.v, 0.0)
         self.sliding = self.v > 0.0
-        self.held = self.asked(self.onset)
+        x = parts[begin[0]].at(begin[1])
+        self.held = self.asked(max(x, self.onset))
+        if not self.sliding and x > self.onset and self.held < x:  # the record begins there: the plane jumps to it
+            self.sliding = True
+            self.slips += 1
         for piece in _between(parts, begin, (end, 0.0)):
             if piece.slope >= 0.0:
                 self.along_a_rise(piece)
@@ -214,9 +229,11 @@ class Block:
         bottom = end
         while bottom < len(parts) and parts[bottom].at(0.5 * parts[bottom].end) < 0.0:
             bottom += 1
-        # what comes after the negative half wave: the pulse that follows, or less than one
-        at_once = following[0] < len(parts) and all(p.x >= 0.0 and p.slope > 0.0 for p in parts[bottom : bottom + 1])
-        at_once = at_once and all(p.at(0.5 * p.end) > 0.0 for p in parts[bottom : following[0]])
+            if bottom < len(parts) and parts[bottom].x == 0.0:
+                break
+        # whether what comes after the negative half wave, at once, is the pulse that follows
+        way_up = parts[bottom : following[0] + 1]
+        at_once = following[0] < len(parts) and way_up[0].x >= 0.0 and all(piece.x > 0.0 for piece in way_up[1:])
         for piece in _between(parts, begin, following if at_once else (bottom, 0.0)):
             self.integrate(piece, self.eq4, False)
         if not at_once:
@@ -241,12 +258,12 @@ def _half_waves(parts: list[Piece]) -> list[tuple[int, int, float]]:
     waves: list[tuple[int, int, float]] = []
     start: int | None = None
     for i, piece in enumerate([*parts, Piece(-1.0, 0.0, 1.0)]):
-        if piece.at(0.5 * piece.end) > 0.0:
-            start = i if start is None else start
-        elif start is not None:
-            peak = max(max(p.x, p.at(p.end)) for p in parts[start:i])
-            waves.append((start, i, peak))
+        above = piece.at(0.5 * piece.end) > 0.0
+        if start is not None and not (above and piece.x > 0.0):  # to touch zero ends a half wave
+            waves.append((start, i, max(max(p.x, p.at(p.end)) for p in parts[start:i])))
             start = None
+        if above and start is None:
+            start = i
     return waves
 
 

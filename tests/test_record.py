@@ -231,6 +231,40 @@ def test_mendez_against_scipy_on_recorded_motions(
         assert result[quantity].item() == pytest.approx(value, rel=3e-12), quantity
 
 
+#: Accelerations that meet each other: plateaus, samples at zero, peaks of one height.
+LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mendez_against_scipy_on_made_up_records(seed: int) -> None:
+    """Plateaus, zeros touched, records that begin and end anywhere, under all options."""
+    rng = np.random.default_rng(seed)
+    compared = 0
+    for _ in range(12):
+        count = int(rng.integers(3, 25))
+        steps = np.clip(np.cumsum(rng.normal(0.0, 2.0, count)), -7.0, 7.0)
+        values = rng.choice(LEVELS, count) * rng.choice([1, 1, -1], count) if rng.random() < 0.6 else steps
+        record = Record.sampled(values, float(rng.choice([0.02, 0.05, 0.1])))
+        theta, mu_s = float(rng.choice([0.0, 5.0, 8.0])), float(rng.choice([0.3, 0.38, 0.5]))
+        given: dict[str, Any] = {
+            name: float(rng.choice(choices))
+            for name, choices in (
+                ("yield_acceleration", [0.59, 1.0, 2.0]),
+                ("decay_rate", [0.5, 2.7, 8.0]),
+                ("delta_mu", [0.0, 0.09, 0.3]),
+            )
+            if rng.random() < 0.5
+        }
+        given["recoupling"] = str(rng.choice(["eq12", "integrate"]))
+        given["rise"] = str(rng.choice(["monotone", "literal"]))
+        result = sweep_record(record, theta, mu_s, **given)
+        if not np.isnan(result.permanent_displacement):
+            compared += 1
+            for quantity, value in vars(Block(theta, mu_s, G, **given).respond(record, 1.0)).items():
+                assert result[quantity].item() == pytest.approx(value, rel=1e-9, abs=1e-12), (quantity, values, given)
+    assert compared >= 8
+
+
 class Stepped:
     """Newmark's block on a record by `solve_ivp`, piece by piece."""
 
