@@ -228,7 +228,10 @@ BAD = {
         'axes.theta.values[entry 1] = "2012-01-01": must be a valid number',
     ),
     "wrong word": (GOOD + '[model]\nrise = "slow"', "model.rise = \"slow\": must be 'monotone' or 'literal'"),
-    "waveform": (GOOD + '[excitation]\nwaveform = "square"', "excitation.waveform = \"square\": must be 'sine'"),
+    "waveform": (
+        GOOD + '[excitation]\nwaveform = "sawtooth"',
+        "excitation.waveform = \"sawtooth\": must be 'sine', 'cosine', 'triangle', 'square' or 'harmonics'",
+    ),
     "yield word": (
         GOOD + '[model]\nyield_acceleration = "c"',
         'yield_acceleration = "c": must be "coulomb" or a number',

@@ -25,6 +25,9 @@ from slipsweep.variables import RESULT_DTYPES
 #: What a caller may give for a parameter.
 Values = float | Sequence[float] | np.ndarray | xr.DataArray
 
+#: A sum of harmonics, by columns.
+Harmonics = Mapping[str, Sequence[float]]
+
 
 def sweep(
     theta: Values,
@@ -43,6 +46,9 @@ def sweep(
     rise: str = "monotone",
     recoupling: str = "eq12",
     waveform: str = "sine",
+    harmonics: Harmonics | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
     solver: str = "auto",
     steps_per_cycle: int = STEPS_PER_CYCLE,
     rule: str = "trapezoid",
@@ -84,8 +90,14 @@ def sweep(
         falling, or Eq. 4 as printed.
     recoupling : {"eq12", "integrate"}
         After the plane's acceleration has reversed: Eq. 12, or integration until the stop.
-    waveform : {"sine"}
-        Shape of the ground acceleration.
+    waveform : {"sine", "cosine", "triangle", "square", "harmonics"}
+        Shape of the ground acceleration, of peak A.
+    harmonics : mapping, optional
+        With "harmonics": ``amplitudes``, ``multiples`` (of the frequency, whole numbers) and
+        ``phases`` (degrees; 0 if left out) of its terms a sin(mφ + p).  Their scale does not
+        matter: the sum's largest magnitude is A.
+    ramp_in, ramp_out : float
+        Cycles at the beginning and at the end over which the shaking grows and fades linearly.
     solver : {"auto", "cycle", "step"}
         Event by event, or time stepping.  "auto" takes "cycle".
     steps_per_cycle : int
@@ -132,6 +144,9 @@ def sweep(
         rise=rise,
         recoupling=recoupling,
         waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
         solver=solver,
         steps_per_cycle=steps_per_cycle,
         rule=rule,
@@ -201,6 +216,9 @@ def simulate(
     rise: str = "monotone",
     recoupling: str = "eq12",
     waveform: str = "sine",
+    harmonics: Harmonics | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
     g: float = 9.81,
 ) -> xr.Dataset:
     """Time history of one block, event by event: the samples carry rounding errors only.
@@ -249,6 +267,9 @@ def simulate(
         rise=rise,
         recoupling=recoupling,
         waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
         g=g,
     )
     return _dataset(table, {})
@@ -353,6 +374,9 @@ def limit_amplitude(
     rise: str = "monotone",
     recoupling: str = "eq12",
     waveform: str = "sine",
+    harmonics: Harmonics | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
     g: float = 9.81,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
@@ -421,6 +445,9 @@ def limit_amplitude(
         rise=rise,
         recoupling=recoupling,
         waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
         g=g,
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,

@@ -18,8 +18,10 @@ from slipsweep import threads
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, Grid, Results, parameter_grid
+from slipsweep.kernels.excitation import Wave
+from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
+from slipsweep.waveforms import Waveform, wave_of
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -41,7 +43,7 @@ Array = NDArray[np.float64]
 class Problem:
     """What all cells of a grid share: the options of `slipsweep.sweep`, checked."""
 
-    waveform: str
+    waveform: Waveform
     model: str
     rise: str
     recoupling: str
@@ -135,16 +137,18 @@ def solve(
     periods = flat(1.0 / (2.0 * math.pi * frequency))
     rows = tuple(flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in wanted)
+    wave = wave_of(problem.waveform, problem.cycles)
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
+    shaking: Wave | step.Steps
     if solver_of(problem) == "step":
-        kernel, table = STEP_KERNELS[options.rule], step.sine_table(problem.steps_per_cycle)
+        kernel, shaking = STEP_KERNELS[options.rule], step.steps_of(wave, problem.steps_per_cycle)
         work_per_cell += problem.steps_per_cycle // 16
     else:
-        kernel, table = CYCLE_KERNEL, np.empty(0)
+        kernel, shaking = CYCLE_KERNEL if problem.waveform.is_sine else WAVE_KERNEL, wave
 
     def work(first: int, last: int) -> None:
-        kernel(grid, first, last, rows, periods, options, table, targets)
+        kernel(grid, first, last, rows, periods, options, shaking, targets)
         if progress is not None:
             progress((last - first) * grid.frequencies)
 

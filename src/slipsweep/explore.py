@@ -29,6 +29,7 @@ from slipsweep.resources import size_text
 from slipsweep.style import BLUE, VERMILION, axis_label, caption, unit, value_text
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import PARAMETERS, VALIDITY_TEXT, VALUELESS, SlidingMode, Validity
+from slipsweep.waveforms import ATTRIBUTES
 
 #: Bytes of a page when no other number is asked for: what most mail servers let pass.
 PAGE_BYTES = 25_000_000
@@ -223,11 +224,14 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     Returns
     -------
     Histories or None
-        None where the shaking is not harmonic, or where not even one history fits.
+        None where the shaking is not periodic or ends with a ramp beyond the cycles shown, or where not
+        even one history fits.
     """
     table = excerpt.table
     if table.attrs.get("waveform") not in WAVEFORMS:
         return None
+    if int(table.attrs["cycles"]) > _CYCLES and "ramp_out" in table.attrs:
+        return None  # the first cycles alone have no ramp at their end
     inputs = {
         name: variable
         for name, variable in table.coords.items()
@@ -248,7 +252,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     if math.prod(left.values()) * each > most_bytes:
         return None
     options: dict[str, Any] = {
-        name: table.attrs[name] for name in ("model", "rise", "recoupling", "waveform", "g") if name in table.attrs
+        name: table.attrs[name] for name in ("model", "rise", "recoupling", *ATTRIBUTES, "g") if name in table.attrs
     }
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)

@@ -14,6 +14,7 @@ from slipsweep.plans import check_options, plan_sweep
 from slipsweep.resources import available_memory, size_text
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import HISTORY, PARAMETERS
+from slipsweep.waveforms import wave_of
 
 
 def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: Any) -> Table:
@@ -28,10 +29,11 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
     own = {name: variable.values for name, variable in summary.coords.items()}
     omega = 2.0 * math.pi * float(own["frequency"])
     cells = np.repeat([float(values) for values in engine.cell_inputs(own, 0)], TILE)
+    wave = wave_of(problem.waveform, problem.cycles)
 
     def sampled(phases: np.ndarray) -> np.ndarray:
         table = np.empty((phases.size, len(HISTORY)))
-        history(cells, problem.options(True), phases, table)
+        history(cells, problem.options(True), wave, phases, table)
         return table
 
     if times is None:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from slipsweep.tables import Table
 from slipsweep.variables import PARAMETERS, TOLERABLE_DISPLACEMENT, LimitStatus
+from slipsweep.waveforms import text_of
 
 #: Most curves in a panel, and panels across and down, that a page can show.
 _MOST_CURVES, _MOST_PANELS = 6, 3
@@ -130,7 +131,7 @@ def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int]) -
     options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
     lines = [
         ", ".join(single),
-        f"model: {', '.join(options)}; {attributes['cycles']} cycles of a {attributes['waveform']}; "
+        f"model: {', '.join(options)}; {attributes['cycles']} cycles of a {text_of(attributes)}; "
         "circles: reached in a jump or behind a gap",
         f"shown: {', '.join(thinned)}" if thinned else "",
     ]

@@ -54,7 +54,7 @@ BOUNDS: dict[str, Bound] = {
 MODELS = ("mendez", "newmark")
 RISES = ("monotone", "literal")
 RECOUPLINGS = ("eq12", "integrate")
-WAVEFORMS = ("sine",)
+WAVEFORMS = ("sine", "cosine", "triangle", "square", "harmonics")
 SOLVERS = ("auto", "step", "cycle")
 RULES = ("rectangle", "trapezoid", "simpson")
 

@@ -26,7 +26,6 @@ from slipsweep.parameters import (
     RULES,
     SOLVERS,
     STEPS_PER_CYCLE,
-    WAVEFORMS,
     check_choice,
     check_values,
     check_whole,
@@ -44,6 +43,7 @@ from slipsweep.variables import (
     RESULT_DTYPES,
     RESULTS,
 )
+from slipsweep.waveforms import check_waveform
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
@@ -207,6 +207,9 @@ def check_options(
     rise: str = "monotone",
     recoupling: str = "eq12",
     waveform: str = "sine",
+    harmonics: Mapping[str, Sequence[float]] | str | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
     cycles: int = 10,
     solver: str = "auto",
     steps_per_cycle: int = STEPS_PER_CYCLE,
@@ -214,12 +217,13 @@ def check_options(
     g: float = 9.81,
 ) -> Problem:
     """The options of `slipsweep.sweep`, checked (InputError names the one that is not allowed)."""
+    cycles = check_whole("cycles", cycles, 1, MOST_CYCLES)
     return Problem(
-        waveform=check_choice("waveform", waveform, WAVEFORMS),
+        waveform=check_waveform(waveform, harmonics, ramp_in, ramp_out, cycles),
         model=check_choice("model", model, MODELS),
         rise=check_choice("rise", rise, RISES),
         recoupling=check_choice("recoupling", recoupling, RECOUPLINGS),
-        cycles=check_whole("cycles", cycles, 1, MOST_CYCLES),
+        cycles=cycles,
         solver=check_choice("solver", solver, SOLVERS),
         rule=check_choice("rule", rule, RULES),
         steps_per_cycle=check_whole("steps_per_cycle", steps_per_cycle, 8, MOST_STEPS, multiple_of=4),
@@ -330,7 +334,7 @@ def _attributes(title: str, problem: Problem) -> dict[str, Any]:
         **_SOURCE,
         "g": problem.g,
         "model": problem.model,
-        "waveform": problem.waveform,
+        **problem.waveform.attributes,
         "cycles": problem.cycles,
     }
     if problem.model == "mendez":

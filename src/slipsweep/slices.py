@@ -277,6 +277,7 @@ def boundaries(table: Table) -> dict[str, Variable]:
 def newmark(table: Table) -> Variable:
     """Permanent displacement of Newmark's block on the cells of a slice, swept anew."""
     from slipsweep.plans import plan_sweep
+    from slipsweep.waveforms import ATTRIBUTES
 
     drive = "displacement_amplitude" if "displacement_amplitude" in table.coords else "amplitude"
     given = ("theta", "mu_s", drive, "frequency", "yield_acceleration")
@@ -284,7 +285,7 @@ def newmark(table: Table) -> Variable:
         **{name: table[name] for name in given if name in table.coords},
         model="newmark",
         cycles=int(table.attrs["cycles"]),
-        waveform=str(table.attrs["waveform"]),
+        **{name: table.attrs[name] for name in ATTRIBUTES if name in table.attrs},
         g=float(table.attrs["g"]),
         variables=["permanent_displacement"],
     )

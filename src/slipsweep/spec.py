@@ -34,6 +34,7 @@ from slipsweep.variables import (
     RESULT_DTYPES,
     RESULTS,
 )
+from slipsweep.waveforms import check_waveform
 
 Floats = NDArray[np.float64]
 
@@ -136,17 +137,36 @@ class Model(_Table):
     g: Annotated[Number, Field(gt=0)] = 9.81
 
 
+class Harmonics(_Table):
+    """Terms of waveform = "harmonics", a sin(m phi + p) each; phases in degrees."""
+
+    amplitudes: Annotated[list[Number], Field(min_length=1)]
+    multiples: Annotated[list[Whole], Field(min_length=1)]
+    phases: list[Number] | None = None
+
+
 class Excitation(_Table):
     """The shaking, but for its amplitude and frequency, or the scales of a record, which are axes."""
 
-    waveform: Literal["sine"] = "sine"
+    waveform: Literal["sine", "cosine", "triangle", "square", "harmonics"] = "sine"
     cycles: Annotated[Whole, Field(ge=1, le=MOST_CYCLES)] = 10
+    harmonics: Harmonics | None = None
+    ramp_in: Number = 0.0
+    ramp_out: Number = 0.0
     record: Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None = None
     units: Literal["m/s2", "g", "cm/s2", "gal"] | None = None
     baseline: Literal["none", "mean", "linear"] = "none"
     format: Literal["auto", "csv", "at2", "esm", "cosmos"] = "auto"
     channel: Annotated[Whole, Field(ge=1)] | None = None
     polarity: Literal[1, -1, "both"] = 1
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments of `slipsweep.sweep`."""
+        return {**self.model_dump(exclude={"harmonics", *_RECORD_KEYS}), "harmonics": self._columns()}
+
+    def _columns(self) -> dict[str, Any] | None:
+        return None if self.harmonics is None else self.harmonics.model_dump(exclude_none=True)
 
 
 class Solver(_Table):
@@ -266,8 +286,7 @@ class SweepSpec:
         if self.record is not None:
             return {"record": self.record, **arguments}
         arguments |= {
-            "cycles": self.excitation.cycles,
-            "waveform": self.excitation.waveform,
+            **self.excitation.arguments,
             "solver": self.solver.method,
             "rule": self.solver.rule,
         }
@@ -357,6 +376,7 @@ def parse(text: str, source: str, folder: Path | None = None, record: Record | N
     try:
         parameters = _parameters(file)
         _check_model(file)
+        _check_excitation(file.excitation)
         _check_variables(file, parameters)
         if file.excitation.record is not None and record is None:
             record = _read(file.excitation, folder or Path())
@@ -375,7 +395,7 @@ def parse(text: str, source: str, folder: Path | None = None, record: Record | N
 
 def _parameters(file: SweepFile) -> dict[str, Parameter]:
     """Gather the inputs from [axes], [[cases]] and [model]: each once, none missing."""
-    _check_excitation(file)
+    _check_shaking(file)
     axes = {name: axis for name in _INPUTS if (axis := getattr(file.axes, name)) is not None}
     cases = _cases(file.cases or [])
     # yield_acceleration = "coulomb" is None here: it only says what holds by default
@@ -410,7 +430,7 @@ def _parameters(file: SweepFile) -> dict[str, Parameter]:
     return {name: parameters[name] for name in PARAMETERS | RECORD_PARAMETERS if name in parameters}
 
 
-def _check_excitation(file: SweepFile) -> None:
+def _check_shaking(file: SweepFile) -> None:
     """Refuse keys of a harmonic motion beside a record, and keys of a record without one."""
     given = file.excitation.model_fields_set
     if file.excitation.record is None:
@@ -531,6 +551,13 @@ def _check_model(file: SweepFile) -> None:
         for key in sorted(file.model.model_fields_set & {"rise", "recoupling"}):
             value = getattr(file.model, key)
             raise InputError(f'model.{key} = "{value}": not allowed with friction = "newmark"')
+
+
+def _check_excitation(excitation: Excitation) -> None:
+    try:
+        check_waveform(**excitation.arguments)
+    except InputError as error:
+        raise InputError(f"excitation.{error}") from None
 
 
 def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> None:

@@ -2,6 +2,7 @@
 
 from slipsweep.tables import Table
 from slipsweep.variables import PARAMETERS, RESULTS
+from slipsweep.waveforms import text_of
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -48,5 +49,5 @@ def caption(table: Table) -> str:
     parts = [value_text(name, table[name].item()) for name in single]
     attributes = table.attrs
     options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
-    shaking = f"{attributes['cycles']} cycles of a {attributes['waveform']}"
+    shaking = f"{attributes['cycles']} cycles of a {text_of(attributes)}"
     return f"{', '.join(parts)}\nmodel: {', '.join(options)}; {shaking}".strip()

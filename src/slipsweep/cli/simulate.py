@@ -18,6 +18,7 @@ EXAMPLE = examples(
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8",
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o history.png -o history.csv",
     "slipsweep simulate --theta 10 --mu-s 0.5 --displacement-amplitude 0.05 --frequency 2 --model newmark",
+    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 --waveform triangle --ramp-in 2",
 )
 
 
@@ -35,6 +36,15 @@ def simulate(
     ] = None,
     overwrite: Overwrite = False,
     cycles: Annotated[int, typer.Option(help="Cycles of shaking.")] = 10,
+    waveform: Annotated[
+        Literal["sine", "cosine", "triangle", "square", "harmonics"], typer.Option(help="Shape of the shaking.")
+    ] = "sine",
+    harmonics: Annotated[
+        str | None,
+        typer.Option(metavar="A:M:P,...", help="Terms of harmonics: amplitude:multiple:phase in degrees, again."),
+    ] = None,
+    ramp_in: Annotated[float, typer.Option(help="Cycles over which the shaking grows.")] = 0.0,
+    ramp_out: Annotated[float, typer.Option(help="Cycles over which it fades.")] = 0.0,
     yield_acceleration: Annotated[
         float | None, typer.Option(help="Yield acceleration, m/s² (default: Coulomb's).")
     ] = None,
@@ -74,6 +84,10 @@ def simulate(
         displacement_amplitude=displacement_amplitude,
         frequency=frequency,
         cycles=cycles,
+        waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
         yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,

@@ -255,16 +255,15 @@ slip_root = _root_of(slip_and_slope)
 
 
 @scalar
-def yield_governs(block: Block) -> bool:
-    """Whether Eq. 4 stays at or below the yield value from Üg = Üy to the peak."""
-    start, end = block.yield_acceleration, block.amplitude
+def stays_below_yield(block: Block, start: float, end: float) -> bool:
+    """Whether Eq. 4 stays at or below the yield value on the plane's way from `start`, no less than it, to `end`."""
     if block.rise == NEWMARK:
         return True
     highest = max(response(block, start), response(block, end))
     bend = min(inflection(block), end)
     if bend > start and slope_and_curvature(block, start)[0] > 0.0 > slope_and_curvature(block, bend)[0]:
         highest = max(highest, response(block, slope_root(block, 0.0, start, bend)))
-    return highest <= start
+    return highest <= block.yield_acceleration
 
 
 #: Rows of lanes, blocks laid out for SIMD loops: row + j is cell j.  A solver's own rows

@@ -1,13 +1,14 @@
-"""The cycle solver: the response to a sine, event by event.
+"""The cycle solver: the response to any periodic shaking, event by event.
 
-Between two events the block's acceleration is either held (closed forms) or follows
-Eq. 4 (Gauss-Legendre quadrature of a smooth function), so that no step is taken and the
-answer carries rounding errors only.  The phases of the motion stand below in their order:
-`onset` (t1), `rise` (to the peak), `fall` (the hold, to t5), `recouple` or Eq. 12, and
-`follow_pulse`, which goes through them; `train` strings pulses together; `continuous` needs
-integrals over a quarter cycle.  The common cases go a shorter way (`sine`).  Notation:
-ψ is the phase from the pulse's peak, x the plane's acceleration, b the block's, V and W
-velocity and displacement (see `block`).
+Between two events the block's acceleration is either held (polynomials of the phase) or follows
+Eq. 4 (closed forms on a straight piece of the wave, Gauss-Legendre quadrature of a smooth function
+on a curved one), so that no step is taken and the answer carries rounding errors only.  The shaking
+comes in monotone pieces (`excitation`).  What the plane does on one decides the phase of the
+motion: `rise` (stick, slide and follow Eq. 4; from t1 on), `hold` (to the stop, or to Üg = 0, t5), and
+then Eq. 12 or the hold again.  `follow_pulse` goes through them; `train` strings pulses together.
+In continuous sliding Eq. 4 is integrated over a cycle, and the cycles are a series.  The sine has shorter
+ways to the same (`sine`).  Notation: τ is the phase on a piece, from its anchor, x the plane's acceleration,
+b the block's, V and W velocity and displacement (see `block`).
 
 Events need not be located to the last digit: at an onset the rate of V is zero, at a stop
 V itself, so an error δ in an event's phase moves W by δ² or less.
@@ -17,19 +18,20 @@ import math
 
 import numpy as np
 
-from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, versine
 from slipsweep.equations import CONTINUOUS, STUCK
 from slipsweep.kernels.block import (
     EVENT_TOLERANCE,
     INTEGRATE,
+    KD_NOT_POSITIVE,
     LITERAL,
     NEWMARK,
+    NO_VALUE,
     Block,
     Motion,
     Options,
+    block_at,
     friction,
     inflection,
-    phase,
     response,
     response_and_slope,
     response_root,
@@ -39,76 +41,118 @@ from slipsweep.kernels.block import (
     slope_root,
     starting_acceleration,
 )
-from slipsweep.kernels.jit import in_lanes, scalar, summed
-from slipsweep.kernels.train import Pulse, attenuate, pause, train_of
-
-_HALF_PI = 0.5 * math.pi
+from slipsweep.kernels.excitation import Wave, held_gain, held_integrals, offset_at, phase_at, plane
+from slipsweep.kernels.jit import scalar, summed
+from slipsweep.kernels.linear import exponential_moments
+from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of
 
 #: 16 Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
-_NODES, _WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
+NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
 
-#: Where panels of the quadrature end, in e-foldings of the friction from the start; past the
-#: third it has decayed to 1e-18.
-_PANEL_BOUNDS = (6.0, 18.0, 42.0, math.inf)
+#: Where panels of the quadrature end, in e-foldings of the friction from the end where it is larger;
+#: past the third it has decayed to 1e-18.
+PANEL_BOUNDS = (6.0, 18.0, 42.0, math.inf)
 
 #: Signs at the start of a leg are read this fraction of the leg inside it.
-_SLIVER = 1e-10
+SLIVER = 1e-10
 
 #: More legs than any rise has: five breaks, and a stop and an onset between each.
-_MOST_LEGS = 32
+MOST_LEGS = 32
 
+# A moving block is a small array, which functions can change: rows of it.  SLIDES and FOLLOWS (b follows
+# Eq. 4) are 1.0 or 0.0; PEAK and LEAST the largest and the least V; RESTED the phase of the last stop.
+VELOCITY, DISPLACEMENT, PEAK, LEAST, HELD, SLIDES, FOLLOWS, RESTED = range(8)
+STATE_SIZE = 8
 
-@summed
-def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple[float, float]:
-    """∫ D dψ and ∫ (end − ψ) D dψ over a part of a rising quarter: gains of V and W from rest.
-
-    `side` is 1 for the positive half cycle and −1 for the negative one.
-    """
-    amplitude = side * block.amplitude
-    x_start = amplitude * (1.0 - versine(start))
-    decay = block.decay_rate / block.g
-    e_foldings = decay * abs(amplitude * (1.0 - versine(end)) - x_start)
-    first, second = 0.0, 0.0
-    left = start
-    for bound in _PANEL_BOUNDS:
-        right = end if e_foldings <= bound else phase(block, abs(x_start) + bound / decay)
-        width = right - left
-        rate, moment = 0.0, 0.0
-        for node in range(_NODES.size):
-            weighted = _WEIGHTS[node] * slip(block, amplitude * (1.0 - versine(left + width * _NODES[node])))
-            rate += weighted
-            moment += (1.0 - _NODES[node]) * weighted
-        second += (first + moment * width) * width
-        first += rate * width
-        left = right
-        if e_foldings <= bound:
-            break
-    return first, second
-
-
-@in_lanes
-def held_motion(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
-    """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest."""
-    width = end - start
-    excess = amplitude - held
-    sine_part = angle_minus_sine(start)
-    first = excess * width - amplitude * (angle_minus_sine(end) - sine_part)
-    second = 0.5 * excess * width * width - amplitude * (
-        half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * width
-    )
-    return first, second
+#: Kinds of legs, and the columns of a record of them, which `history` samples: kind, piece, phase on
+#: it and in the table at the start, phase at the end, b, V and W.
+STICK, HOLD, FOLLOW, ATTENUATE = range(4)
+LEG_COLUMNS = 8
 
 
 @scalar
-def held_integrals(block: Block, held: float, start: float, end: float) -> tuple[float, float]:
-    """`held_motion` of a block."""
-    return held_motion(block.amplitude, held, start, end)
+def record(legs: np.ndarray, kind: int, piece: int, tau: float, start: float, end: float, state: np.ndarray) -> None:
+    """Add a leg to a record whose first row counts them; a sweep keeps none and gives an empty one."""
+    if legs.size:
+        legs[0, 0] += 1.0
+        row = int(legs[0, 0])
+        legs[row, 0], legs[row, 1], legs[row, 2], legs[row, 3], legs[row, 4] = kind, piece, tau, start, end
+        legs[row, 5], legs[row, 6], legs[row, 7] = state[HELD], state[VELOCITY], state[DISPLACEMENT]
+
+
+@scalar
+def straight_lag(block: Block, x: float, change: float, width: float) -> tuple[float, float, float, float]:
+    """`lag_integrals` where |Üg| goes along a straight line, by `change`: closed forms.
+
+    The exponential is taken from the end where the friction is larger, so that its argument is
+    never positive: nothing overflows, however large λ is.
+    """
+    largest = friction(block, min(x, x + change))
+    whole, early, late, both = exponential_moments(block.decay_rate / block.g * abs(change))
+    if change < 0.0:
+        early, late = late, early
+    kept = block.mu_s - block.tan_theta
+    return (
+        (block.mu_s - largest * whole) * width,
+        (0.5 * block.mu_s - largest * early) * width * width,
+        (kept * (x + 0.5 * change) - largest * (x * whole + change * late)) * width,
+        (kept * (0.5 * x + change / 6.0) - largest * (x * early + change * both)) * width * width,
+    )
+
+
+@summed
+def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) -> tuple[float, float, float, float]:
+    """What Eq. 4 takes the block behind the plane over a part of piece p.
+
+    ∫ (μs − μ) dτ and ∫ |x| (μs − tan θ − μ) dτ, each followed by itself with the weight end − τ: on
+    the side ±1 of Üg = 0 the relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ).
+    Apart, because over a symmetric cycle the first must cancel to the last digit.
+    """
+    amplitude = block.amplitude
+    x_start, x_end = abs(plane(wave, p, amplitude, start)), abs(plane(wave, p, amplitude, end))
+    if wave.degree[p] <= 1:
+        return straight_lag(block, x_start, x_end - x_start, end - start)
+    mu_s, kept = block.mu_s, block.mu_s - block.tan_theta
+    decay = block.decay_rate / block.g
+    rising = x_start <= x_end
+    least = min(x_start, x_end)
+    e_foldings = decay * abs(x_end - x_start)
+    near, far = (start, end) if rising else (end, start)
+    first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
+    for bound in PANEL_BOUNDS:
+        until = far
+        if e_foldings > bound:
+            until = offset_at(wave, p, amplitude, math.copysign(least + bound / decay, wave.top[p]))
+        width = until - near
+        for node in range(NODES.size):
+            tau = near + width * NODES[node]
+            x = abs(plane(wave, p, amplitude, tau))
+            mu = friction(block, x)
+            weight = abs(width) * WEIGHTS[node]
+            left = end - tau
+            lag, lag_x = weight * (mu_s - mu), weight * x * (kept - mu)
+            first += lag
+            second += left * lag
+            first_x += lag_x
+            second_x += left * lag_x
+        near = until
+        if e_foldings <= bound:
+            break
+    return first, second, first_x, second_x
+
+
+@scalar
+def slip_integrals(block: Block, wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
+    """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest."""
+    first, second, first_x, second_x = lag_integrals(block, wave, p, start, end)
+    side_g = math.copysign(block.g, wave.top[p])
+    return side_g * first + block.tan_theta * first_x, side_g * second + block.tan_theta * second_x
 
 
 @scalar
 def next_break(block: Block, x: float, end: float) -> float:
     """Where, on the way from x to end, one of E, dE/dx and D first ceases to be monotone."""
-    inner = x + _SLIVER * (end - x)
+    inner = x + SLIVER * (end - x)
     if 0.0 < inner < inflection(block):
         end = min(inflection(block), end)
     before = slope_and_curvature(block, inner)[0]
@@ -125,11 +169,11 @@ def onset(block: Block, x: float, top: float) -> float:
     """t1: where on the rise from x to `top` the block at rest starts to slide (`top` if it does not)."""
     if block.rise == NEWMARK:
         return x
-    for _ in range(_MOST_LEGS):
+    for _ in range(MOST_LEGS):
         if x >= top:
             break
         end = next_break(block, x, top)
-        inner = x + _SLIVER * (end - x)
+        inner = x + SLIVER * (end - x)
         if slip(block, inner) > 0.0:
             return x
         if slip(block, end) > 0.0:
@@ -147,7 +191,7 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
     end, crosses = top, False
     if block.rise != NEWMARK:
         end = next_break(block, x, top)
-        inner = x + _SLIVER * (end - x)
+        inner = x + SLIVER * (end - x)
         asked, slope = response_and_slope(block, inner)
         if block.rise != LITERAL:
             follows = slope > 0.0 and (follows or asked >= b)
@@ -163,283 +207,339 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
 
 
 @scalar
-def stop(block: Block, held: float, follows: bool, velocity: float, start: float, end: float) -> float:
-    """The phase in [start, end] at which a falling relative velocity reaches zero."""
-    low, high = start, end
-    psi = 0.5 * (start + end)
+def stop(
+    block: Block, wave: Wave, p: int, held: float, follows: bool, velocity: float, start: float, low: float, high: float
+) -> float:
+    """Where on piece p, between low and high, V is zero that was `velocity` at `start` and falls."""
+    amplitude = block.amplitude
+    tau = 0.5 * (low + high)
     for _ in range(200):
-        x = block.amplitude * (1.0 - versine(psi))
+        x = plane(wave, p, amplitude, tau)
         if follows:
-            left, rate = velocity + slip_integrals(block, start, psi, 1.0)[0], slip(block, x)
+            left, rate = velocity + slip_integrals(block, wave, p, start, tau)[0], slip(block, x)
         else:
-            left, rate = velocity + held_integrals(block, held, start, psi)[0], x - held
+            left, rate = velocity + held_gain(wave, p, amplitude, held, start, tau), x - held
         if left > 0.0:
-            low = psi
+            low = tau
         else:
-            high = psi
-        new = psi - left / rate
+            high = tau
+        new = tau - left / rate
         if not low <= new <= high:
             new = 0.5 * (low + high)
-        step = abs(new - psi)
-        psi = new
-        if step <= EVENT_TOLERANCE * (psi - start):
+        step = abs(new - tau)
+        tau = new
+        if step <= EVENT_TOLERANCE * (tau - start):
             break
-    return psi
-
-
-#: Kinds of legs, and the columns of a record of legs: what `history` needs to draw them.
-STICK, HOLD, FOLLOW, RECOUPLE, ATTENUATE = range(5)
-LEG_COLUMNS = 6
-MOST_LEGS = 2 * _MOST_LEGS + 4
+    return tau
 
 
 @scalar
-def record(
-    legs: np.ndarray, kind: int, start: float, end: float, held: float, velocity: float, displacement: float
+def advance(
+    wave: Wave, p: int, end: float, stops: bool, gained: float, moved: float, width: float, state: np.ndarray
 ) -> None:
-    """Add a leg to a record whose first row counts them; a sweep keeps none and gives an empty one."""
-    if legs.size:
-        legs[0, 0] += 1.0
-        row = int(legs[0, 0])
-        legs[row, 0], legs[row, 1], legs[row, 2] = kind, start, end
-        legs[row, 3], legs[row, 4], legs[row, 5] = held, velocity, displacement
+    """Add a leg's gains; where the block stops there, it is at rest from then on."""
+    state[DISPLACEMENT] += state[VELOCITY] * width + moved
+    state[VELOCITY] += gained
+    if stops:
+        state[VELOCITY] = state[SLIDES] = 0.0
+        state[RESTED] = phase_at(wave, p, end)
+    state[PEAK] = max(state[PEAK], state[VELOCITY])
+    state[LEAST] = min(state[LEAST], state[VELOCITY])
 
 
 @scalar
-def rise(block: Block, velocity: float, legs: np.ndarray) -> tuple[float, float, float, float, float]:
-    """From Üg = Üy to the peak: b, V, W, the largest and the least V.
+def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.ndarray, legs: np.ndarray) -> float:
+    """Slide with b held along piece p from start to end, or to the stop: where that is."""
+    amplitude, held, velocity = block.amplitude, state[HELD], state[VELOCITY]
+    rate = plane(wave, p, amplitude, start) - held
+    rate_end = plane(wave, p, amplitude, end) - held
+    low, high = start, end
+    stops = velocity + held_gain(wave, p, amplitude, held, start, end) <= 0.0
+    if rate * rate_end < 0.0 and (rate > 0.0 or velocity > 0.0):
+        # V turns where x = b; one that starts from rest there only seems to fall, by rounding
+        turn = offset_at(wave, p, amplitude, held)
+        extreme = velocity + held_gain(wave, p, amplitude, held, start, turn)
+        if rate > 0.0:
+            state[PEAK] = max(state[PEAK], extreme)
+            low = turn
+        else:
+            state[LEAST] = min(state[LEAST], extreme)
+            stops, high = extreme <= 0.0, turn
+    if stops:
+        end = (
+            start if velocity <= 0.0 and rate <= 0.0 else stop(block, wave, p, held, False, velocity, start, low, high)
+        )
+    gained, moved = held_integrals(wave, p, amplitude, held, start, end)
+    record(legs, HOLD, p, start, phase_at(wave, p, start), phase_at(wave, p, end), state)
+    advance(wave, p, end, stops, gained, moved, end - start, state)
+    return end
+
+
+@scalar
+def follow(block: Block, wave: Wave, p: int, start: float, end: float, state: np.ndarray, legs: np.ndarray) -> float:
+    """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop: where that is."""
+    gained, moved = slip_integrals(block, wave, p, start, end)
+    stops = state[VELOCITY] + gained <= 0.0
+    if stops:
+        end = stop(block, wave, p, 0.0, True, state[VELOCITY], start, start, end)
+        gained, moved = slip_integrals(block, wave, p, start, end)
+    record(legs, FOLLOW, p, start, phase_at(wave, p, start), phase_at(wave, p, end), state)
+    advance(wave, p, end, stops, gained, moved, end - start, state)
+    return end
+
+
+@scalar
+def arrive(block: Block, x: float, state: np.ndarray) -> None:
+    """What x asks at the beginning of a rise or a plateau and after a jump upwards: b if the block slides, else t1."""
+    if state[SLIDES] > 0.0:
+        if block.rise == LITERAL:
+            state[HELD] = response(block, x)
+        elif block.rise != NEWMARK:
+            state[HELD] = max(state[HELD], response(block, x))
+    elif x >= block.yield_acceleration:
+        b = starting_acceleration(block, x)
+        if b < x:
+            state[HELD], state[SLIDES] = b, 1.0
+    state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
+
+
+@scalar
+def rise(block: Block, wave: Wave, p: int, tau: float, x: float, state: np.ndarray, legs: np.ndarray) -> None:
+    """Along a piece on which the plane's acceleration rises, from x at τ on.
 
     Goes from event to event: the block stays with the plane (stick), holds b, or follows
     Eq. 4; each leg ends where that changes, where E or D turns, or where V turns or vanishes.
     """
     amplitude, literal = block.amplitude, block.rise == LITERAL
-    x = block.yield_acceleration
-    psi = phase(block, x)
-    b = starting_acceleration(block, x)
-    displacement, peak, least = 0.0, velocity, velocity
-    follows = literal
-    for _ in range(_MOST_LEGS):
-        if velocity <= 0.0:
-            velocity = least = 0.0
-            began = onset(block, x, amplitude)
-            record(legs, STICK, psi, phase(block, began), 0.0, 0.0, displacement)
+    top, finish = amplitude * wave.last[p], wave.finish[p]
+    for _ in range(MOST_LEGS):
+        if state[SLIDES] == 0.0:
+            began = top
+            if top > block.yield_acceleration:
+                began = onset(block, max(x, block.yield_acceleration), top)
+            if began >= top:
+                break
             if began > x:
-                psi = phase(block, began)
-                x = b = began  # where Eq. 4 meets Üg; to evaluate it there would add the rounding of g μs
-            else:
-                b = min(starting_acceleration(block, x), x)
-            if x >= amplitude:
-                break
-            follows = literal
-        end, follows, follows_on = rising_leg(block, x, amplitude, b, follows)
-        psi_end = phase(block, end)
+                tau = max(tau, offset_at(wave, p, amplitude, began))
+            # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g μs
+            beyond = began > max(x, block.yield_acceleration)
+            state[HELD] = began if beyond else min(starting_acceleration(block, began), began)
+            x = began
+            state[VELOCITY], state[LEAST] = 0.0, 0.0
+            state[SLIDES], state[FOLLOWS] = 1.0, 1.0 if literal else 0.0
+        end, follows, follows_on = rising_leg(block, x, top, state[HELD], state[FOLLOWS] > 0.0)
+        tau_end = finish if end >= top else max(tau, offset_at(wave, p, amplitude, end))
         if follows:
-            gained, moved = slip_integrals(block, psi, psi_end, 1.0)
+            tau = follow(block, wave, p, tau, tau_end, state, legs)
         else:
-            gained, moved = held_integrals(block, b, psi, psi_end)
-        if velocity + gained <= 0.0:
-            stopped = stop(block, b, follows, velocity, psi, psi_end)
-            if follows:
-                gained, moved = slip_integrals(block, psi, stopped, 1.0)
-            else:
-                gained, moved = held_integrals(block, b, psi, stopped)
-            record(legs, FOLLOW if follows else HOLD, psi, stopped, b, velocity, displacement)
-            displacement += velocity * (stopped - psi) + moved
-            velocity = 0.0
-            psi = stopped
-            x = amplitude * (1.0 - versine(psi))
+            tau = hold(block, wave, p, tau, tau_end, state, legs)
+        if state[SLIDES] == 0.0 and tau < tau_end:
+            x = plane(wave, p, amplitude, tau)
             continue
-        record(legs, FOLLOW if follows else HOLD, psi, psi_end, b, velocity, displacement)
-        displacement += velocity * (psi_end - psi) + moved
-        velocity += gained
-        peak = max(peak, velocity)
-        least = min(least, velocity)
-        x, psi = end, psi_end
+        x, tau = end, tau_end
+        state[FOLLOWS] = 1.0 if follows_on else 0.0
         if follows:
-            b = response(block, x)
-        follows = follows_on
-        if x >= amplitude:
+            state[HELD] = response(block, x)
+        if x >= top:
             break
-    return b, velocity, displacement, peak, least
 
 
 @scalar
-def fall(block: Block, b: float, velocity: float, displacement: float, legs: np.ndarray) -> tuple[float, float, float]:
-    """The hold from the peak to Üg = 0 (t2 to t5): V left at the end, W, and the largest V."""
-    peak = velocity
-    if b < block.amplitude:
-        peak += held_integrals(block, b, 0.0, -phase(block, b))[0]
-    end, left = _HALF_PI, velocity + held_integrals(block, b, 0.0, _HALF_PI)[0]
-    if left <= 0.0:
-        end, left = stop(block, b, False, velocity, 0.0, _HALF_PI), 0.0
-    record(legs, HOLD, 0.0, end, b, velocity, displacement)
-    return left, displacement + velocity * end + held_integrals(block, b, 0.0, end)[1], peak
-
-
-@scalar
-def recoupling_integrals(block: Block, b: float, chi: float) -> tuple[float, float]:
-    """What integrating on takes from V and from W by χ = φ - π past t5."""
-    sine = math.sin(0.5 * chi)
-    return b * chi + 2.0 * block.amplitude * sine * sine, 0.5 * b * chi * chi + block.amplitude * (chi - math.sin(chi))
-
-
-@scalar
-def recouple(
-    block: Block, b: float, velocity: float, duration: float, displacement: float, legs: np.ndarray
-) -> tuple[float, float]:
-    """From Üg = 0 (t5) on, for `duration` of phase at most, integrating on: V left and W."""
+def through_stretch(block: Block, wave: Wave, k: int, p: int, tau: float, state: np.ndarray, legs: np.ndarray) -> None:
+    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of stretch k; b ≤ 0 at the end of a rise makes b NaN."""
     amplitude = block.amplitude
-    # V falls until the plane's next pulse exceeds b
-    low, high = 0.0, duration
-    if b < amplitude:
-        high = min(duration, math.pi + math.asin(b / amplitude))
-    chi, left = duration, 0.0
-    if velocity > recoupling_integrals(block, b, high)[0]:
-        left = velocity - recoupling_integrals(block, b, duration)[0]
-    else:
-        chi = high
-        for _ in range(200):
-            over = velocity - recoupling_integrals(block, b, chi)[0]
-            if over > 0.0:
-                low = chi
-            else:
-                high = chi
-            new = chi + over / (b + amplitude * math.sin(chi))
-            if not low <= new <= high:
-                new = 0.5 * (low + high)
-            step = abs(new - chi)
-            chi = new
-            if step <= EVENT_TOLERANCE * chi:
+    for q in range(p, wave.stretch[k, 1]):
+        first, last = wave.first[q], wave.last[q]
+        x = amplitude * first
+        if q == p:
+            x = max(x, block.yield_acceleration)
+        else:
+            tau = wave.begin[q]
+        if wave.jumps[q] or first == last or (q > p and first < last and wave.first[q - 1] > wave.last[q - 1]):
+            arrive(block, x, state)
+        if first < last:
+            rise(block, wave, q, tau, x, state, legs)
+        elif state[SLIDES] > 0.0:
+            if first > last and state[HELD] <= 0.0:
                 break
-    record(legs, RECOUPLE, _HALF_PI, _HALF_PI + chi, b, velocity, displacement)
-    return left, displacement + velocity * chi - recoupling_integrals(block, b, chi)[1]
+            hold(block, wave, q, tau, wave.finish[q], state, legs)
+    if state[SLIDES] > 0.0 and state[HELD] <= 0.0:
+        state[HELD] = math.nan
 
 
 @scalar
-def follow_pulse(block: Block, options: Options, velocity: float, last: bool, legs: np.ndarray) -> Pulse:
-    """From one Üg = Üy to the next, or to the end of the motion if no pulse follows."""
-    b, velocity, displacement, peak, least = rise(block, velocity, legs)
-    if velocity > 0.0:
-        velocity, displacement, highest = fall(block, b, velocity, displacement, legs)
-        peak = max(peak, highest)
-    started, duration = _HALF_PI, math.inf if last else pause(block)
-    if velocity > 0.0 and options.recoupling == INTEGRATE:
-        shaken = math.pi if last else duration
-        velocity, displacement = recouple(block, b, velocity, shaken, displacement, legs)
-        started += shaken
-        duration -= shaken
-    if velocity > 0.0 and duration > 0.0:
-        record(legs, ATTENUATE, started, started + min(duration, velocity / b), b, velocity, displacement)
-        velocity, slid = attenuate(b, velocity, duration)
-        displacement += slid
-    return Pulse(velocity, displacement, peak, min(least, velocity))
+def recouple(block: Block, wave: Wave, q: int, p: int, tau: float, state: np.ndarray, legs: np.ndarray) -> None:
+    """From the beginning of piece q (t5) to τ on piece p, integrating on."""
+    for piece in range(q, min(p + 1, wave.start.size)):
+        if state[SLIDES] == 0.0:
+            break
+        end = tau if piece == p else wave.finish[piece]
+        if end > wave.begin[piece]:
+            hold(block, wave, piece, wave.begin[piece], end, state, legs)
 
 
 @scalar
-def pulse(block: Block, options: Options, table: np.ndarray, velocity: float, last: bool) -> Pulse:
-    """One cycle of a sweep, of which no record is kept."""
-    return follow_pulse(block, options, velocity, last, np.empty((0, LEG_COLUMNS)))
+def follow_pulse(
+    block: Block, options: Options, wave: Wave, legs: np.ndarray, k: int, following: int, velocity: float
+) -> Pulse:
+    """From Üg = Üy in stretch k to that in the `following` one, or to the end of the motion if none follows."""
+    state = np.zeros(STATE_SIZE)
+    p, tau = beginning(block, wave, k)
+    x = max(block.amplitude * wave.first[p], block.yield_acceleration)
+    state[VELOCITY] = state[PEAK] = state[LEAST] = velocity
+    state[HELD], state[SLIDES] = starting_acceleration(block, x), 1.0 if velocity > 0.0 else 0.0
+    state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
+    through_stretch(block, wave, k, p, tau, state, legs)
+    if math.isnan(state[HELD]):
+        return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, KD_NOT_POSITIVE)
+    if state[SLIDES] > 0.0:
+        q, last = wave.stretch[k, 1], following >= wave.height.size
+        p, tau = wave.start.size, 0.0
+        if not last:
+            p, tau = beginning(block, wave, following)
+        if options.recoupling == INTEGRATE:
+            recouple(block, wave, q, p, tau, state, legs)
+        started = wave.start[q] if q < wave.start.size else wave.end[q - 1]
+        if options.recoupling == INTEGRATE:
+            started = wave.end[wave.end.size - 1]
+        if state[SLIDES] > 0.0 and (last or options.recoupling != INTEGRATE):
+            duration = math.inf if last else phase_at(wave, p, tau) - started
+            b = state[HELD]
+            left, slid = attenuate(b, state[VELOCITY], duration)
+            record(legs, ATTENUATE, 0, 0.0, started, started + min(duration, state[VELOCITY] / b), state)
+            if left == 0.0:
+                # Eq. 12 goes on beyond the shaking: where it ends there, the end of the shaking has not mattered
+                state[RESTED] = started if options.recoupling != INTEGRATE else math.inf
+            state[VELOCITY] = left
+            state[DISPLACEMENT] += slid
+            state[LEAST] = min(state[LEAST], left)
+    return Pulse(
+        state[VELOCITY], state[DISPLACEMENT], state[PEAK], min(state[LEAST], state[VELOCITY]), state[RESTED], 0
+    )
 
 
-train = train_of(pulse)
+train = train_of(follow_pulse)
 
 
 @scalar
-def continuous_peak(block: Block, side: float, half_gain: float, after: float) -> float:
-    """Largest V in a half cycle entered with V = 0, where the plane has passed `after` on its rise.
-
-    V peaks where its rate D changes sign; the falling quarter mirrors the rising one, over
-    which and back V gains `half_gain`.
-    """
-    peak = half_gain if after > 0.0 else max(0.0, half_gain)
-    x, end = 0.0, side * block.amplitude
-    for _ in range(_MOST_LEGS):
+def zeros_of_slip(block: Block, side: float, zeros: np.ndarray) -> int:
+    """Where on the way from Üg = 0 to the peak of one side D changes its sign; their number."""
+    count = 0
+    x, end = math.copysign(0.0, side), side * block.amplitude
+    for _ in range(zeros.size):
         target = next_break(block, x, end)
-        inner = x + _SLIVER * (target - x)
+        inner = x + SLIVER * (target - x)
         if slip(block, inner) * slip(block, target) < 0.0:
-            zero = abs(slip_root(block, 0.0, inner, target))
-            gained = slip_integrals(block, -_HALF_PI, phase(block, zero), side)[0]
-            peak = max(peak, half_gain - gained)
-            if zero > after:
-                peak = max(peak, gained)
+            zeros[count] = slip_root(block, 0.0, inner, target)
+            count += 1
         x = target
         if x == end:
             break
-    return peak
-
-
-@in_lanes
-def continuous_displacement(
-    up: float, missed: float, missed_moment: float, drift: float, began: float, cycles: int
-) -> float:
-    """W of all cycles, from integrals over the rising quarter of the positive half cycle.
-
-    `up` is ∫ D over the quarter, `missed` and `missed_moment` the integrals of D (as
-    `slip_integrals`) up to ψ = `began`, where sliding starts, and `drift` the gain of V
-    over a cycle.
-    """
-    down = 0.5 * drift - up  # ∫ D over a quarter of the negative half cycle
-    # to the peak W misses what D would have given before Üg = Üy; the other quarters are whole
-    displacement = (
-        began * missed - missed_moment + _HALF_PI * (2.0 * up - missed) + math.pi * (2.0 * up - missed + down)
-    )
-    later = cycles - 1.0
-    return displacement + later * math.pi * (2.0 * (drift - missed) + 3.0 * up + down + drift * (later - 1.0))
+    return count
 
 
 @scalar
-def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
-    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.
-
-    |Üg| and the friction repeat every quarter cycle, mirrored, so that integrals over a
-    quarter give a cycle, and the cycles an arithmetic series.
-    """
-    began = phase(block, block.yield_acceleration)
-    missed, missed_moment = slip_integrals(block, -_HALF_PI, began, 1.0)
-    up = missed + slip_integrals(block, began, 0.0, 1.0)[0]
-    drift = drift_integral(block)
-    displacement = continuous_displacement(up, missed, missed_moment, drift, began, cycles)
-    peak = math.nan
+def continuous_cycle(
+    block: Block, wave: Wave, c: int, p: int, tau: float, wants_peak: bool
+) -> tuple[float, float, float]:
+    """Eq. 4 from rest, τ on piece p, to the end of cycle c of the table: gains of V and W, the largest V."""
+    zeros = np.empty((2, MOST_LEGS)) if wants_peak else np.empty((2, 0))
+    up, down = 0, 0
     if wants_peak:
-        positive = continuous_peak(block, 1.0, 2.0 * up, block.yield_acceleration)
-        negative = 2.0 * up + continuous_peak(block, -1.0, drift - 2.0 * up, 0.0)
-        peak = max(0.0, max(positive, negative) - missed)
-        if cycles > 1:
-            positive = continuous_peak(block, 1.0, 2.0 * up, 0.0)
-            peak = max(peak, drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift))
-    return Motion(displacement, peak, 0)
-
-
-@summed
-def drift_integral(block: Block) -> float:
-    """Gain of V over a whole cycle, 4 tan θ ∫ x (μs − tan θ − μ) dψ over a quarter.
-
-    The sum of the two half cycles with g cancelled by hand: over 10⁶ cycles the rounding
-    of that cancellation would show.
-    """
-    decay = block.decay_rate / block.g
-    e_foldings = decay * block.amplitude
-    total = 0.0
-    left = -_HALF_PI
-    for bound in _PANEL_BOUNDS:
-        right = 0.0 if e_foldings <= bound else phase(block, bound / decay)
-        width = right - left
-        part = 0.0
-        for node in range(_NODES.size):
-            x = block.amplitude * (1.0 - versine(left + width * _NODES[node]))
-            part += _WEIGHTS[node] * x * (block.mu_s - block.tan_theta - friction(block, x))
-        total += part * width
-        left = right
-        if e_foldings <= bound:
-            break
-    return 4.0 * block.tan_theta * total
+        up, down = zeros_of_slip(block, 1.0, zeros[0]), zeros_of_slip(block, -1.0, zeros[1])
+    velocity, displacement, peak = 0.0, 0.0, 0.0
+    above, below, both = 0.0, 0.0, 0.0
+    for q in range(p, wave.cycle[c + 1]):
+        start, end = tau if q == p else wave.begin[q], wave.finish[q]
+        side = 1 if wave.top[q] > 0.0 else 0
+        if wants_peak:
+            least, most = sorted_pair(block.amplitude * wave.first[q], block.amplitude * wave.last[q])
+            for i in range(up if side == 1 else down):
+                zero = zeros[1 - side, i]
+                if least < zero < most:
+                    at = offset_at(wave, q, block.amplitude, zero)
+                    if at > start:
+                        peak = max(peak, velocity + slip_integrals(block, wave, q, start, at)[0])
+        first, second, first_x, second_x = lag_integrals(block, wave, q, start, end)
+        side_g = block.g if side == 1 else -block.g
+        displacement += velocity * (end - start) + side_g * second + block.tan_theta * second_x
+        if side == 1:
+            above += first
+        else:
+            below += first
+        both += first_x
+        velocity = block.g * (above - below) + block.tan_theta * both
+        peak = max(peak, velocity)
+    return velocity, displacement, peak
 
 
 @scalar
-def solve(block: Block, options: Options, table: np.ndarray) -> Motion:
+def sorted_pair(a: float, b: float) -> tuple[float, float]:
+    """The smaller and the larger of two numbers."""
+    return (a, b) if a < b else (b, a)
+
+
+@scalar
+def continuous(block: Block, options: Options, wave: Wave) -> Motion:
+    """Continuous sliding from the first Üg ≥ Üy on: Eq. 4 throughout.
+
+    Cycles of one shape give the same gains from rest, so that the repeated ones are an arithmetic series.
+    """
+    k = first_pulse(block, wave, 0)
+    if k >= wave.height.size:
+        return Motion(0.0, 0.0, 0)
+    p, tau = beginning(block, wave, k)
+    velocity, displacement, peak = 0.0, 0.0, 0.0
+    gain, moved, highest, known = 0.0, 0.0, 0.0, -1
+    for c in range(wave.shape.size):
+        if wave.cycle[c + 1] <= p:
+            continue
+        repeats = wave.repeats if wave.repeats > 0 and c == wave.lead else 1
+        if wave.cycle[c] <= p:
+            velocity, displacement, peak = continuous_cycle(block, wave, c, p, tau, options.wants_peak)
+            repeats -= 1
+        if repeats == 0:
+            continue
+        if wave.shape[c] != known:
+            gain, moved, highest = continuous_cycle(
+                block, wave, c, wave.cycle[c], wave.begin[wave.cycle[c]], options.wants_peak
+            )
+            known = wave.shape[c]
+        later = repeats - 1.0
+        peak = max(peak, max(velocity, velocity + later * gain) + highest)
+        displacement += repeats * (moved + math.pi * (2.0 * velocity + gain * later))
+        velocity += repeats * gain
+    return Motion(displacement, peak if options.wants_peak else math.nan, 0)
+
+
+@scalar
+def solve(block: Block, options: Options, wave: Wave) -> Motion:
     """The motion of a block that has a value."""
     if block.sliding_mode == STUCK:
         return Motion(0.0, 0.0, 0)
     if block.sliding_mode == CONTINUOUS:
-        return continuous(block, options.cycles, options.wants_peak)
-    return train(block, options, table)
+        return continuous(block, options, wave)
+    return train(block, options, wave, np.empty((0, LEG_COLUMNS)))
+
+
+@scalar
+def solve_cells(
+    cells: np.ndarray, count: int, options: Options, wave: Wave, motion: np.ndarray, codes: np.ndarray
+) -> None:
+    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
+    for j in range(count):
+        block = block_at(cells, j, options)
+        codes[0, j], codes[1, j] = block.sliding_mode, block.validity
+        motion[0, j] = motion[1, j] = math.nan
+        if block.validity & NO_VALUE == 0:
+            solve_cell(block, options, wave, j, motion, codes)
+
+
+@scalar
+def solve_cell(block: Block, options: Options, wave: Wave, j: int, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Solve cell j of a tile, which has a mode."""
+    answer = solve(block, options, wave)
+    motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
+    codes[1, j] |= answer.validity
+    if answer.validity & NO_VALUE:
+        codes[0, j] = -1

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.compiled import Kernel
-from slipsweep.kernels import sine, step
+from slipsweep.kernels import cycle, sine, step
 from slipsweep.kernels.block import TILE, Options, block_of, cell_of
+from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.jit import scalar
 
 
@@ -119,16 +120,29 @@ def scatter(
                 results.validity[offsets[1, j] + k * stride] = codes[1, j]
 
 
-def _cycle_grid(
+def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    table: np.ndarray, results: Results,
+    wave: Wave, results: Results,
 ) -> None:  # fmt: skip
     cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         gather(grid, begin, count, inputs, cells, offsets)
-        sine.solve_cells(cells, count, options, table, motion, codes)
+        sine.solve_cells(cells, count, options, wave, motion, codes)
+        scatter(grid, count, offsets, periods, motion, codes, results)
+
+
+def _wave_grid(
+    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    wave: Wave, results: Results,
+) -> None:  # fmt: skip
+    cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
+    motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
+        gather(grid, begin, count, inputs, cells, offsets)
+        cycle.solve_cells(cells, count, options, wave, motion, codes)
         scatter(grid, count, offsets, periods, motion, codes, results)
 
 
@@ -136,22 +150,23 @@ def _step_grid_of(rule: int) -> Kernel:
     # a kernel a rule, so that only the one in use is compiled
     def step_grid(
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-        table: np.ndarray, results: Results,
+        steps: step.Steps, results: Results,
     ) -> None:  # fmt: skip
         cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
         motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
             gather(grid, begin, count, inputs, cells, offsets)
-            step.solve_cells(cells, count, rule, options, table, motion, codes)
+            step.solve_cells(cells, count, rule, options, steps, motion, codes)
             scatter(grid, count, offsets, periods, motion, codes, results)
 
     return Kernel(step_grid)
 
 
-#: Kernels of the stepping solver by its rule, and of the cycle solver.
+#: Kernels of the stepping solver by its rule; of the cycle solver for any waveform; and its short way for the sine.
 STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (step.RECTANGLE, step.TRAPEZOID, step.SIMPSON)}
-CYCLE_KERNEL = Kernel(_cycle_grid)
+WAVE_KERNEL = Kernel(_wave_grid)
+CYCLE_KERNEL = Kernel(_sine_grid)
 
 
 def _parameter_grid(

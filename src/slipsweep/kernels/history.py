@@ -12,117 +12,151 @@ from slipsweep import equations as eq
 from slipsweep.compiled import Kernel
 from slipsweep.equations import CONTINUOUS
 from slipsweep.kernels import cycle
-from slipsweep.kernels.block import NO_VALUE, Block, Options, block_at, phase, response
-from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, RECOUPLE, STICK
+from slipsweep.kernels.block import NO_VALUE, Block, Options, block_at, response
+from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS
+from slipsweep.kernels.excitation import Wave, held_integrals, phase_at, plane
 from slipsweep.kernels.jit import scalar
-
-_HALF_PI = 0.5 * math.pi
+from slipsweep.kernels.train import beginning, first_pulse
 
 #: Columns of a history.
 GROUND, BLOCK, FRICTION, VELOCITY, DISPLACEMENT = range(5)
 
 
 @scalar
-def sample_leg(block: Block, legs: np.ndarray, row: int, psi: float) -> tuple[float, float, float]:
-    """Ü - Üg, V and W at phase ψ (from the cycle's peak) on a leg of a stick-slip block."""
-    kind, start, b = int(legs[row, 0]), legs[row, 1], legs[row, 3]
-    velocity, displacement = legs[row, 4], legs[row, 5]
-    x = block.amplitude * math.cos(psi)
-    since = psi - start
-    if kind == STICK:
-        return 0.0, 0.0, displacement
-    if kind == ATTENUATE:
-        return b, velocity - b * since, displacement + (velocity - 0.5 * b * since) * since
-    if kind == RECOUPLE:
-        lost, unmoved = cycle.recoupling_integrals(block, b, since)
-        return b - x, velocity - lost, displacement + velocity * since - unmoved
-    if kind == FOLLOW:
-        b = response(block, x)
-        gained, moved = cycle.slip_integrals(block, start, psi, 1.0)
-    else:
-        gained, moved = cycle.held_integrals(block, b, start, psi)
-    return b - x, velocity + gained, displacement + velocity * since + moved
+def table_cycle(wave: Wave, n: int) -> int:
+    """The cycle of the table that is cycle n of the shaking."""
+    if n < wave.lead:
+        return n
+    return wave.lead if n < wave.lead + wave.repeats else n - max(wave.repeats - 1, 0)
 
 
 @scalar
-def stick_slip_history(block: Block, options: Options, phases: np.ndarray, history: np.ndarray) -> None:
-    """Fill Ü - Üg, V and W of a stick-slip (or Newmark) block at increasing phases φ."""
-    legs = np.zeros((MOST_LEGS, LEG_COLUMNS))
-    start = phase(block, block.yield_acceleration)  # where a cycle's pulse may begin, from its peak
+def ground_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
+    """Fill the plane's acceleration; at a jump, the value after it."""
+    for at in range(phases.size):
+        history[at, GROUND] = 0.0
+        if phases[at] < 2.0 * math.pi * options.cycles:
+            n = min(int(phases[at] / (2.0 * math.pi)), options.cycles - 1)
+            c = table_cycle(wave, n)
+            phi = phases[at] - 2.0 * math.pi * (n - c)
+            p = wave.cycle[c]
+            while p + 1 < wave.cycle[c + 1] and wave.end[p] <= phi:
+                p += 1
+            tau = min(max(wave.begin[p] + (phi - wave.start[p]), wave.begin[p]), wave.finish[p])
+            history[at, GROUND] = plane(wave, p, block.amplitude, tau)
+
+
+@scalar
+def sample_leg(
+    block: Block, wave: Wave, legs: np.ndarray, row: int, phi: float, sample: np.ndarray, displacement: float
+) -> None:
+    """Fill Ü, V and W, `displacement` at the beginning of the pulse, at phase φ of the table on a leg."""
+    kind, p, tau = int(legs[row, 0]), int(legs[row, 1]), legs[row, 2]
+    since, b, velocity, moved = phi - legs[row, 3], legs[row, 5], legs[row, 6], legs[row, 7]
+    if kind == ATTENUATE:
+        sample[BLOCK] += b
+        gained, gained_way = -b * since, -0.5 * b * since * since
+    elif kind == FOLLOW:
+        sample[BLOCK] = response(block, sample[GROUND])
+        gained, gained_way = cycle.slip_integrals(block, wave, p, tau, tau + since)
+    else:
+        sample[BLOCK] = b
+        gained, gained_way = held_integrals(wave, p, block.amplitude, b, tau, tau + since)
+    sample[VELOCITY] = max(velocity + gained, 0.0)
+    sample[DISPLACEMENT] = displacement + moved + velocity * since + gained_way
+
+
+@scalar
+def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
+    """Fill Ü, V and W of a stick-slip (or Newmark) block at increasing phases φ."""
+    longest = 0
+    for k in range(wave.height.size):
+        longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
+    legs = np.zeros((longest * MOST_LEGS + wave.start.size + 2, LEG_COLUMNS))
     at, velocity, displacement = 0, 0.0, 0.0
-    for pulse in range(options.cycles):
-        peak = 2.0 * math.pi * pulse + _HALF_PI
-        last = pulse == options.cycles - 1
+    k, repeat = first_pulse(block, wave, 0), 0
+    stretches = wave.height.size
+    while at < phases.size and k < stretches:
+        # the plain cycle of the table comes again and again
+        again = first_pulse(block, wave, k + 1)
+        offset = 2.0 * math.pi * repeat
         legs[0, 0] = 0.0
-        now = cycle.follow_pulse(block, options, velocity, last, legs)
+        p, tau = beginning(block, wave, k)
+        start = phase_at(wave, p, tau) + offset
+        now = cycle.follow_pulse(block, options, wave, legs, k, again, velocity)
+        until = math.inf
+        if again < stretches:
+            p, tau = beginning(block, wave, again)
+            until = phase_at(wave, p, tau) + offset
         row = 1
-        while at < phases.size and (last or phases[at] < peak + 2.0 * math.pi + start):
-            psi = phases[at] - peak
-            while row < legs[0, 0] and psi > legs[row, 2]:
+        while at < phases.size and phases[at] < until:
+            phi = phases[at] - offset
+            while row <= legs[0, 0] and phi >= legs[row, 4]:
                 row += 1
-            history[at, VELOCITY], history[at, DISPLACEMENT] = velocity, displacement
-            if psi >= start:
-                difference, v, w = 0.0, 0.0, now.displacement
-                if legs[0, 0] > 0.0 and psi <= legs[row, 2]:
-                    difference, v, w = sample_leg(block, legs, row, psi)
-                history[at, BLOCK], history[at, VELOCITY] = difference, max(v, 0.0)
-                history[at, DISPLACEMENT] = displacement + w
+            moved = 0.0
+            if phases[at] >= start:
+                moved = now.displacement if row > legs[0, 0] else legs[row, 7]
+            history[at, DISPLACEMENT] = displacement + moved
+            if row <= legs[0, 0] and phi >= legs[row, 3]:
+                sample_leg(block, wave, legs, row, phi, history[at], displacement)
             at += 1
         velocity = now.velocity
         displacement += now.displacement
+        if again < stretches and repeat < wave.repeats - 1 and wave.stretch[again, 0] >= wave.cycle[wave.lead + 1]:
+            repeat += 1
+            again = first_pulse(block, wave, 0)
+            while wave.stretch[again, 0] < wave.cycle[wave.lead]:
+                again = first_pulse(block, wave, again + 1)
+        k = again
 
 
 @scalar
-def continuous_history(block: Block, options: Options, phases: np.ndarray, history: np.ndarray) -> None:
-    """Fill Ü - Üg, V and W of a continuously sliding block at increasing phases φ, quarter by quarter."""
-    began = phase(block, block.yield_acceleration)
+def continuous_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
+    """Fill Ü, V and W of a continuously sliding block at increasing phases φ, piece by piece."""
+    k = first_pulse(block, wave, 0)
+    if k == wave.height.size:
+        return
+    first, began = beginning(block, wave, k)
     at, velocity, displacement = 0, 0.0, 0.0
-    shaken = 2.0 * math.pi * options.cycles
-    for quarter in range(4 * options.cycles):
-        side = 1.0 if quarter % 4 < 2 else -1.0
-        rising = quarter % 2 == 0
-        start = began if quarter == 0 else -_HALF_PI
-        whole, moment = cycle.slip_integrals(block, start, 0.0, side)
-        phi_start = quarter * _HALF_PI + (_HALF_PI + start if quarter == 0 else 0.0)
-        last = quarter == 4 * options.cycles - 1
-        while at < phases.size and (phases[at] < (quarter + 1) * _HALF_PI or last):
-            since = min(phases[at], shaken) - phi_start
-            if since >= 0.0:
-                if rising:
-                    psi = min(start + since, 0.0)
-                    gained, moved = cycle.slip_integrals(block, start, psi, side)
-                else:
-                    psi = -min(since, _HALF_PI)
-                    gained, fell = cycle.slip_integrals(block, psi, 0.0, side)
-                    moved = since * gained - fell
-                x = side * block.amplitude * math.cos(psi)
-                history[at, BLOCK] = response(block, x) - x
+    while at < phases.size and phases[at] < phase_at(wave, first, began):
+        at += 1
+    for n in range(options.cycles):
+        c = table_cycle(wave, n)
+        offset = 2.0 * math.pi * (n - c)
+        for p in range(max(wave.cycle[c], first), wave.cycle[c + 1]):
+            start = began if p == first and n == c else wave.begin[p]
+            start_phase = phase_at(wave, p, start) + offset
+            while at < phases.size and phases[at] < wave.end[p] + offset:
+                since = max(phases[at] - start_phase, 0.0)
+                gained, moved = cycle.slip_integrals(block, wave, p, start, min(start + since, wave.finish[p]))
+                history[at, BLOCK] = response(block, history[at, GROUND])
                 history[at, VELOCITY] = velocity + gained
                 history[at, DISPLACEMENT] = displacement + velocity * since + moved
-            at += 1
-        if rising:
-            displacement += moment - velocity * start
-        else:
-            displacement += velocity * _HALF_PI + whole * _HALF_PI - moment
-        velocity += whole
+                at += 1
+            gained, moved = cycle.slip_integrals(block, wave, p, start, wave.finish[p])
+            displacement += velocity * (wave.finish[p] - start) + moved
+            velocity += gained
+        if c == wave.lead:
+            first = 0 if wave.cycle[c] == 0 else min(first, wave.cycle[c])
+    for rest in range(at, phases.size):
+        history[rest, VELOCITY], history[rest, DISPLACEMENT] = velocity, displacement
 
 
-def _history(cells: np.ndarray, options: Options, phases: np.ndarray, history: np.ndarray) -> None:
+def _history(cells: np.ndarray, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
     block = block_at(cells, 0, options)
-    shaken = 2.0 * math.pi * options.cycles
     history[:] = 0.0
-    if block.validity & NO_VALUE == 0:
-        if block.sliding_mode == CONTINUOUS:
-            continuous_history(block, options, phases, history)
-        elif block.amplitude > block.yield_acceleration:
-            stick_slip_history(block, options, phases, history)
+    ground_history(block, options, wave, phases, history)
+    history[:, BLOCK] = history[:, GROUND]
+    if block.validity & NO_VALUE:
+        history[:, BLOCK:] = math.nan
+    elif block.sliding_mode == CONTINUOUS:
+        continuous_history(block, options, wave, phases, history)
+    elif block.amplitude > block.yield_acceleration:
+        stick_slip_history(block, options, wave, phases, history)
     for at in range(phases.size):
-        x = block.amplitude * math.sin(phases[at]) if phases[at] <= shaken else 0.0
-        history[at, GROUND] = x
-        history[at, BLOCK] += x
-        if block.validity & NO_VALUE:
-            history[at, BLOCK:] = math.nan
-        history[at, FRICTION] = eq.mobilised_friction(x, history[at, BLOCK], block.mu_s, block.tan_theta, block.g)
+        history[at, FRICTION] = eq.mobilised_friction(
+            history[at, GROUND], history[at, BLOCK], block.mu_s, block.tan_theta, block.g
+        )
 
 
 #: Fills rows of ground and block acceleration, friction, V and W for one cell at increasing phases.

@@ -40,7 +40,7 @@ from slipsweep.kernels.block import (
     slip,
     slip_root,
     starting_acceleration,
-    yield_governs,
+    stays_below_yield,
 )
 from slipsweep.kernels.cycle import next_break, onset, rising_leg
 from slipsweep.kernels.grid import Grid, gather
@@ -389,7 +389,7 @@ def mendez(cell: Cell, options: Options, history: History) -> Response:
                     brake(state, end - since)
         else:
             stick_slips += 1
-            if yield_governs(block):
+            if stays_below_yield(block, threshold, block.amplitude):
                 validity |= EQ4_BELOW_YIELD
             if block.rise == LITERAL and response(block, block.amplitude) <= 0.0:
                 validity |= KD_NOT_POSITIVE

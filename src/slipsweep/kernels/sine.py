@@ -5,7 +5,8 @@ follow Eq. 4 to the peak, hold again and stop before the next pulse; or they sli
 continuously with a friction that decays gently.  The functions below are that way, phase by
 phase, for many cells at a time, in loops that LLVM turns into SIMD (Newton with a fixed
 number of iterations, quadrature nodes outside, cells inside).  A cell whose iteration has
-not converged, or that goes another way, is solved by `cycle.solve`.
+not converged, or that goes another way, is solved as any waveform is, by `cycle`; in continuous sliding
+by symmetry from one quarter of the cycle (`continuous`).
 """
 
 import math
@@ -13,7 +14,7 @@ import math
 import numpy as np
 
 from slipsweep import equations as eq
-from slipsweep.elementary import angle_minus_sine, inverse_versine, versine
+from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
 from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     AMPLITUDE,
@@ -25,23 +26,28 @@ from slipsweep.kernels.block import (
     MONOTONE,
     MU_S,
     NEWMARK,
-    NO_VALUE,
     NOT_RECOUPLED,
     TAN_THETA,
     TILE,
     YIELD,
     Block,
+    Motion,
     Options,
     block_at,
     block_of,
     cell_of,
+    friction,
     lane_friction,
     lane_of,
     lane_response,
+    phase,
+    slip,
+    slip_root,
     whole_lanes,
 )
-from slipsweep.kernels.cycle import continuous_displacement, held_motion, solve
-from slipsweep.kernels.jit import in_lanes, scalar
+from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break, solve_cell
+from slipsweep.kernels.excitation import Wave
+from slipsweep.kernels.jit import in_lanes, scalar, summed
 
 _HALF_PI = 0.5 * math.pi
 
@@ -79,6 +85,138 @@ _LANE_ITERATIONS = 5
 #: For lanes that stick first, few, whose curves start flat.
 _STICKS_ITERATIONS = 9
 _LANE_TOLERANCE = 1e-5
+
+
+@in_lanes
+def held_motion(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+    """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest."""
+    width = end - start
+    excess = amplitude - held
+    sine_part = angle_minus_sine(start)
+    first = excess * width - amplitude * (angle_minus_sine(end) - sine_part)
+    second = 0.5 * excess * width * width - amplitude * (
+        half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * width
+    )
+    return first, second
+
+
+@summed
+def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple[float, float]:
+    """∫ D dψ and ∫ (end − ψ) D dψ over a part of a rising quarter: gains of V and W from rest.
+
+    `side` is 1 for the positive half cycle and −1 for the negative one.
+    """
+    amplitude = side * block.amplitude
+    x_start = amplitude * (1.0 - versine(start))
+    decay = block.decay_rate / block.g
+    e_foldings = decay * abs(amplitude * (1.0 - versine(end)) - x_start)
+    first, second = 0.0, 0.0
+    left = start
+    for bound in PANEL_BOUNDS:
+        right = end if e_foldings <= bound else phase(block, abs(x_start) + bound / decay)
+        width = right - left
+        rate, moment = 0.0, 0.0
+        for node in range(NODES.size):
+            weighted = WEIGHTS[node] * slip(block, amplitude * (1.0 - versine(left + width * NODES[node])))
+            rate += weighted
+            moment += (1.0 - NODES[node]) * weighted
+        second += (first + moment * width) * width
+        first += rate * width
+        left = right
+        if e_foldings <= bound:
+            break
+    return first, second
+
+
+@scalar
+def continuous_peak(block: Block, side: float, half_gain: float, after: float) -> float:
+    """Largest V in a half cycle entered with V = 0, where the plane has passed `after` on its rise.
+
+    V peaks where its rate D changes sign; the falling quarter mirrors the rising one, over
+    which and back V gains `half_gain`.
+    """
+    peak = half_gain if after > 0.0 else max(0.0, half_gain)
+    x, end = 0.0, side * block.amplitude
+    for _ in range(MOST_LEGS):
+        target = next_break(block, x, end)
+        inner = x + SLIVER * (target - x)
+        if slip(block, inner) * slip(block, target) < 0.0:
+            zero = abs(slip_root(block, 0.0, inner, target))
+            gained = slip_integrals(block, -_HALF_PI, phase(block, zero), side)[0]
+            peak = max(peak, half_gain - gained)
+            if zero > after:
+                peak = max(peak, gained)
+        x = target
+        if x == end:
+            break
+    return peak
+
+
+@in_lanes
+def continuous_displacement(
+    up: float, missed: float, missed_moment: float, drift: float, began: float, cycles: int
+) -> float:
+    """W of all cycles, from integrals over the rising quarter of the positive half cycle.
+
+    `up` is ∫ D over the quarter, `missed` and `missed_moment` the integrals of D (as
+    `slip_integrals`) up to ψ = `began`, where sliding starts, and `drift` the gain of V
+    over a cycle.
+    """
+    down = 0.5 * drift - up  # ∫ D over a quarter of the negative half cycle
+    # to the peak W misses what D would have given before Üg = Üy; the other quarters are whole
+    displacement = (
+        began * missed - missed_moment + _HALF_PI * (2.0 * up - missed) + math.pi * (2.0 * up - missed + down)
+    )
+    later = cycles - 1.0
+    return displacement + later * math.pi * (2.0 * (drift - missed) + 3.0 * up + down + drift * (later - 1.0))
+
+
+@scalar
+def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
+    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.
+
+    |Üg| and the friction repeat every quarter cycle, mirrored, so that integrals over a
+    quarter give a cycle, and the cycles an arithmetic series.
+    """
+    began = phase(block, block.yield_acceleration)
+    missed, missed_moment = slip_integrals(block, -_HALF_PI, began, 1.0)
+    up = missed + slip_integrals(block, began, 0.0, 1.0)[0]
+    drift = drift_integral(block)
+    displacement = continuous_displacement(up, missed, missed_moment, drift, began, cycles)
+    peak = math.nan
+    if wants_peak:
+        positive = continuous_peak(block, 1.0, 2.0 * up, block.yield_acceleration)
+        negative = 2.0 * up + continuous_peak(block, -1.0, drift - 2.0 * up, 0.0)
+        peak = max(0.0, max(positive, negative) - missed)
+        if cycles > 1:
+            positive = continuous_peak(block, 1.0, 2.0 * up, 0.0)
+            peak = max(peak, drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift))
+    return Motion(displacement, peak, 0)
+
+
+@summed
+def drift_integral(block: Block) -> float:
+    """Gain of V over a whole cycle, 4 tan θ ∫ x (μs − tan θ − μ) dψ over a quarter.
+
+    The sum of the two half cycles with g cancelled by hand: over 10⁶ cycles the rounding
+    of that cancellation would show.
+    """
+    decay = block.decay_rate / block.g
+    e_foldings = decay * block.amplitude
+    total = 0.0
+    left = -_HALF_PI
+    for bound in PANEL_BOUNDS:
+        right = 0.0 if e_foldings <= bound else phase(block, bound / decay)
+        width = right - left
+        part = 0.0
+        for node in range(NODES.size):
+            x = block.amplitude * (1.0 - versine(left + width * NODES[node]))
+            part += WEIGHTS[node] * x * (block.mu_s - block.tan_theta - friction(block, x))
+        total += part * width
+        left = right
+        if e_foldings <= bound:
+            break
+    return 4.0 * block.tan_theta * total
 
 
 @in_lanes
@@ -432,7 +570,7 @@ def collect(
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, table: np.ndarray, motion: np.ndarray, codes: np.ndarray
+    cells: np.ndarray, count: int, options: Options, wave: Wave, motion: np.ndarray, codes: np.ndarray
 ) -> None:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
     blocks, lanes, where = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE, np.int64)
@@ -456,8 +594,9 @@ def solve_cells(
                 collect(used, way, lanes, where, blocks, motion, codes)
     for j in range(count):
         if blocks[_WAY + j] == _OTHER and codes[0, j] > STUCK:
-            answer = solve(block_at(cells, j, options), options, table)
-            motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
-            codes[1, j] |= answer.validity
-            if answer.validity & NO_VALUE:
-                codes[0, j] = -1
+            block = block_at(cells, j, options)
+            if block.sliding_mode == CONTINUOUS:
+                answer = continuous(block, options.cycles, options.wants_peak)
+                motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
+            else:
+                solve_cell(block, options, wave, j, motion, codes)

@@ -11,37 +11,44 @@ trapezoid   start, end             2      linear acceleration
 simpson     start, middle, end     4      Runge-Kutta 4 for a rate free of V
 ==========  =====================  =====  ==================================
 
-The orders hold because a step in which something happens (t1, a switch to or from the
-hold, a turn of Eq. 4, the stop) is divided there by `rise_step` and `fall_step`.  Steps
-in which nothing happens, nearly all, are taken by lanes of cells in lockstep, with sin φ
-from a table (`stick_slip_cells`, `continuous_cells`).
+Steps end where a piece of the waveform does (`excitation`): on its jumps, kinks, turns and zeros, and are
+of one length on each piece (`steps_of`).  The orders hold because a step in which something happens (t1, a
+switch to or from the hold, a turn of Eq. 4, the stop) is divided there by `rise_step` and `fall_step`, and
+because a slide or a layer of friction shorter than a few steps is given steps of its own.  Steps in
+which nothing happens, nearly all, are taken by lanes of cells in lockstep, with w from a table
+(`stick_slip_lanes`, `continuous_lanes`); what is no matter of lanes goes pulse by pulse (`pulse`, `train`).
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import literally
 
-from slipsweep.elementary import versine
 from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     AMPLITUDE,
-    BEGAN,
     EQ4_BELOW_YIELD,
     INTEGRATE,
+    KD_NOT_POSITIVE,
     LANE_ROWS,
     LITERAL,
     MONOTONE,
+    MU_S,
     NEWMARK,
     NO_VALUE,
+    TAN_THETA,
     TILE,
+    YIELD,
     Block,
     Motion,
     Options,
     block_at,
+    friction,
+    inflection,
+    lane_friction,
     lane_of,
     lane_response,
-    phase,
     response,
     response_and_slope,
     response_root,
@@ -50,33 +57,130 @@ from slipsweep.kernels.block import (
     slope_root,
     starting_acceleration,
     whole_lanes,
-    yield_governs,
 )
+from slipsweep.kernels.excitation import Wave, offset_at, phase_at, plane
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train import Pulse, attenuate, pause, train_of
+from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
-#: A slide's rise is never covered by fewer than steps_per_cycle / 64 steps, or a cell just
-#: above yield, whose slide is shorter than a step, would not converge with the step.
+#: No slide up to its greatest rate, and no layer of decaying friction, is covered by fewer than
+#: steps_per_cycle / 64 steps, or one shorter than a step would not converge with the step.
 _SHARE_OF_CYCLE = 64
+_SHORTEST = 2.0 * math.pi / _SHARE_OF_CYCLE
+
+#: Friction decays in a layer of this many e-foldings: e^-40 of it is less than rounding.
+_FOLDINGS = 40.0
+
+#: No step is shorter: it would no longer move the phase.
+_LEAST_STEP = 1e-14
 
 #: More events than any step holds.
 _MOST_EVENTS = 16
 
-_HALF_PI = 0.5 * math.pi
+
+#: Kinds of pieces: Üg > 0 not falling, Üg > 0 falling, Üg < 0.
+RISES, FALLS, BELOW = 0, 1, 2
 
 
-def sine_table(steps_per_cycle: int) -> np.ndarray:
-    """sin φ at every half step of a half cycle, shape (steps_per_cycle + 1,)."""
-    quarter = np.sin(np.linspace(0.0, _HALF_PI, steps_per_cycle // 2 + 1))
-    return np.concatenate([quarter, quarter[-2::-1]])
+class Steps(NamedTuple):
+    """The steps of the pieces of a wave: `count` of one length on each.
+
+    ``nodes[offset[p] + 2 * k]`` is w at the beginning of step k of piece p, followed by w at its middle and
+    at its end (−0.0 where a negative piece is 0); `mirrored` is whether the two halves of a cycle are, but
+    for the sign, the same.
+    """
+
+    wave: Wave
+    nodes: np.ndarray
+    offset: np.ndarray
+    count: np.ndarray
+    mirrored: bool
 
 
-#: Rows of a state: V, W, the block's acceleration b, the largest and the least V, and
-#: whether the block slides and whether b follows Eq. 4 (1.0 or 0.0).  Row + j is cell j.
-VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS = range(0, 7 * TILE, TILE)
-_STATE_SIZE = 7 * TILE
+def steps_of(wave: Wave, steps_per_cycle: int) -> Steps:
+    """Steps of all pieces of a wave, `steps_per_cycle` at least in a cycle."""
+    pieces = wave.first.size
+    length = wave.finish - wave.begin
+    count = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
+    offset = np.empty(pieces, np.int64)
+    parts: list[np.ndarray] = []
+    known: dict[int, int] = {}
+    size = 0
+    for c in range(wave.shape.size):
+        low, high = wave.cycle[c], wave.cycle[c + 1]
+        same = known.setdefault(int(wave.shape[c]), c)
+        if same != c:
+            offset[low:high] = offset[wave.cycle[same] : wave.cycle[same + 1]]
+            continue
+        for p in range(low, high):
+            offset[p] = size
+            parts.append(_nodes(wave, p, int(count[p])))
+            size += parts[-1].size
+    nodes = np.concatenate(parts)
+    return Steps(wave, nodes, offset, count, _mirrored(wave, nodes, offset, count))
+
+
+def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
+    """w at every half step of piece p."""
+    # counted from the anchor, so that mirrored pieces have mirrored nodes
+    tau = np.arange(2 * count + 1) * ((wave.finish[p] - wave.begin[p]) / (2 * count))
+    tau = -tau[::-1] if wave.finish[p] == 0.0 else tau
+    nodes = np.zeros(tau.size)
+    for k in range(wave.degree[p] - 1, -1, -1):
+        nodes = (nodes + wave.coefficients[p, k]) * tau
+    nodes += wave.top[p]
+    nodes[0], nodes[-1] = wave.first[p], wave.last[p]
+    side = math.copysign(1.0, wave.top[p])
+    return side * np.maximum(side * nodes, 0.0)
+
+
+def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarray) -> bool:
+    """Whether in the repeated cycle w(φ + π) = −w(φ)."""
+    if wave.repeats == 0:
+        return False
+    low, high = wave.cycle[wave.lead], wave.cycle[wave.lead + 1]
+    if (high - low) % 2:
+        return False
+    half = (high - low) // 2
+    for p in range(low, low + half):
+        a, b = (slice(offset[q], offset[q] + 2 * count[q] + 1) for q in (p, p + half))
+        if count[p] != count[p + half] or not np.allclose(nodes[a], -nodes[b], rtol=0.0, atol=1e-14):
+            return False
+    return True
+
+
+@scalar
+def node(steps: Steps, p: int, k: int) -> float:
+    """τ on piece p at which step k begins."""
+    wave, count = steps.wave, steps.count[p]
+    h = (wave.finish[p] - wave.begin[p]) / count
+    return k * h if wave.begin[p] == 0.0 else (k - count) * h
+
+
+@scalar
+def kind_of(wave: Wave, p: int) -> int:
+    """Whether Üg > 0 does not fall on piece p, falls, or Üg < 0."""
+    if wave.top[p] < 0.0:
+        return BELOW
+    return RISES if wave.last[p] >= wave.first[p] else FALLS
+
+
+#: A state: V, W, the block's acceleration b, the largest and the least V; whether (1.0 or 0.0) the block
+#: slides and b follows Eq. 4; the phase at which it had come to rest; the phases at which the last
+#: slide began and up to which it needs steps of its own, and how long its rate grows; the plane's acceleration
+#: where D has its maximum on the way up, and that up to which friction is a layer thinner than steps; what of
+#: V's gain both sides of Üg = 0 share.
+(
+    VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS, RESTED, ONSET, REACH, LENGTH, TOUCH, LAYER, SHARED,
+) = range(14)  # fmt: skip
+_STATE_SIZE = 14
+
+
+@scalar
+def state_of(states: np.ndarray, j: int) -> np.ndarray:
+    """The state of lane j."""
+    return states.reshape((_STATE_SIZE, TILE))[:, j]
 
 
 @in_lanes
@@ -123,230 +227,449 @@ def stop(velocity: float, c0: float, c1: float, c2: float, h: float) -> float:
 
 
 @scalar
-def take(c0: float, c1: float, c2: float, h: float, stops: bool, state: np.ndarray, j: int) -> float:
+def take(c0: float, c1: float, c2: float, h: float, stops: bool, state: np.ndarray) -> float:
     """Take a step of phase h, up to the stop if V may not fall below zero; the fraction taken."""
-    velocity = state[VELOCITY + j]
+    velocity = state[VELOCITY]
     fraction = 1.0
     after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
     if stops and (after < 0.0 or (after == 0.0 and velocity > 0.0)):
         fraction = stop(velocity, c0, c1, c2, h)
         after = 0.0
-        state[SLIDES + j] = 0.0
+        state[SLIDES] = 0.0
     if c0 > 0.0 and c0 + c1 + c2 < 0.0:
         # V is largest where the rate vanishes: the secant, then Newton
         turn = -c0 / (c1 + c2)
         for _ in range(3):
             turn -= (c0 + turn * (c1 + turn * c2)) / (c1 + 2.0 * turn * c2)
         turn = min(max(turn, 0.0), fraction)
-        state[PEAK + j] = max(state[PEAK + j], velocity + velocity_gain(c0, c1, c2, h, turn))
-    state[DISPLACEMENT + j] += velocity * h * fraction + displacement_gain(c0, c1, c2, h, fraction)
-    state[VELOCITY + j] = after
-    state[PEAK + j] = max(state[PEAK + j], after)
-    state[LEAST + j] = min(state[LEAST + j], after)
+        state[PEAK] = max(state[PEAK], velocity + velocity_gain(c0, c1, c2, h, turn))
+    state[DISPLACEMENT] += velocity * h * fraction + displacement_gain(c0, c1, c2, h, fraction)
+    state[VELOCITY] = after
+    state[PEAK] = max(state[PEAK], after)
+    state[LEAST] = min(state[LEAST], after)
     return fraction
 
 
 @scalar
-def plane(block: Block, psi: float) -> float:
-    """The plane's acceleration at phase ψ from the peak."""
-    if abs(psi) <= _HALF_PI:
-        return block.amplitude * (1.0 - versine(psi))
-    return block.amplitude * math.cos(psi)
+def rest(block: Block, state: np.ndarray) -> None:
+    """Fill the state of a block at rest that has not moved yet."""
+    state[:] = 0.0
+    state[REACH], state[TOUCH] = -math.inf, math.inf
+    if block.rise == NEWMARK:
+        return
+    if block.decay_rate * block.amplitude * _SHORTEST > _FOLDINGS * block.g:
+        state[LAYER] = _FOLDINGS * block.g / block.decay_rate
+    # D = x − E is concave only beyond the inflection of E: it has its maximum there, if at all
+    if response_and_slope(block, block.amplitude)[1] > 1.0:
+        low = max(inflection(block), _LEAST_STEP * block.amplitude)
+        if low < block.amplitude and response_and_slope(block, low)[1] < 1.0:
+            state[TOUCH] = slope_root(block, 1.0, low, block.amplitude)
 
 
 @scalar
-def rise_step(block: Block, rule: int, start: float, end: float, state: np.ndarray, j: int) -> None:
-    """From phase start to end on the rise, cut at t1, at switches to and from the hold, and at the stop."""
-    psi, x, x_end = start, plane(block, start), plane(block, end)
-    literal = block.rise == LITERAL
-    for _ in range(_MOST_EVENTS):
-        if state[SLIDES + j] == 0.0:
-            if block.rise != NEWMARK and slip(block, x) <= 0.0:
-                if slip(block, x_end) <= 0.0:
-                    break
-                x = held = slip_root(block, 0.0, x, x_end)  # where Eq. 4 meets Üg
-                psi = phase(block, x)
-            else:
-                held = starting_acceleration(block, x)
-            by_eq4 = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
-            state[HELD + j] = min(held, x)  # equal at an onset, but for rounding
-            state[SLIDES + j] = 1.0
-            state[FOLLOWS + j] = 1.0 if by_eq4 else 0.0
-        cut, x_cut, switches = end, x_end, False
-        if block.rise == MONOTONE:
-            asked, slope = response_and_slope(block, x)
-            asked_end = response(block, x_end)
-            if state[FOLLOWS + j] == 0.0 and asked_end > state[HELD + j]:
-                if asked < state[HELD + j] or slope <= 0.0:
-                    x_cut, switches = response_root(block, state[HELD + j], x, x_end), True
-                else:
-                    state[FOLLOWS + j] = 1.0
-            elif state[FOLLOWS + j] == 1.0 and asked_end < asked:
-                if slope > 0.0:
-                    x_cut, switches = slope_root(block, 0.0, x, x_end), True
-                else:
-                    state[FOLLOWS + j] = 0.0
-        if switches:
-            cut = phase(block, x_cut)
-        follows, held, h = state[FOLLOWS + j] == 1.0, state[HELD + j], cut - psi
-        x_middle = plane(block, psi + 0.5 * h)
-        rate = slip(block, x) if follows else x - held
-        c0, c1, c2 = coefficients(
-            rule,
-            rate if state[VELOCITY + j] > 0.0 else max(rate, 0.0),  # rounding may not stop what starts here
-            slip(block, x_middle) if follows else x_middle - held,
-            slip(block, x_cut) if follows else x_cut - held,
-        )
-        fraction = take(c0, c1, c2, h, True, state, j)
-        if state[SLIDES + j] == 0.0:
-            cut = psi + fraction * h
-            x_cut = plane(block, cut)
-        if follows:
-            state[HELD + j] = response(block, x_cut)
-        if switches:
-            state[FOLLOWS + j] = 1.0 - state[FOLLOWS + j]
-        psi, x = cut, x_cut
-        if psi >= end:
+def layer_of(block: Block, wave: Wave, p: int, state: np.ndarray) -> tuple[float, float]:
+    """τ at which the layer of friction on piece p ends (or begins, where |Üg| falls), and its length."""
+    outwards = wave.finish[p] == 0.0
+    near = wave.begin[p] if outwards else wave.finish[p]
+    if state[LAYER] <= block.amplitude * min(abs(wave.first[p]), abs(wave.last[p])):
+        return near, 0.0
+    end = offset_at(wave, p, block.amplitude, math.copysign(state[LAYER], wave.top[p]))
+    return end, abs(end - near)
+
+
+@scalar
+def longest_step(block: Block, options: Options, wave: Wave, p: int, tau: float, x: float, state: np.ndarray) -> float:
+    """The longest step from τ on that resolves a slide just begun and a layer of friction on the rise.
+
+    It grows with the time since the slide's onset.
+    """
+    share, longest = _SHARE_OF_CYCLE / options.steps_per_cycle, math.inf
+    phi = phase_at(wave, p, tau)
+    if phi < state[REACH]:
+        longest = share * max(state[LENGTH], phi - state[ONSET])
+    if x < state[LAYER]:
+        longest = min(longest, share * layer_of(block, wave, p, state)[1])
+    return max(longest, _LEAST_STEP)
+
+
+@scalar
+def begin_slide(
+    block: Block, wave: Wave, p: int, tau: float, x: float, held: float, turn: float, state: np.ndarray
+) -> None:
+    """The block begins to slide at τ on piece p, where Üg = x; its rate grows up to τ = `turn`."""
+    state[HELD] = min(held, x)  # equal at an onset, but for rounding
+    state[SLIDES] = 1.0
+    phi, length = phase_at(wave, p, tau), turn - tau
+    state[ONSET], state[LENGTH] = phi, length
+    state[REACH] = phi + _SHORTEST if length < _SHORTEST else -math.inf
+
+
+@scalar
+def hold_step(block: Block, rule: int, wave: Wave, p: int, start: float, end: float, state: np.ndarray) -> None:
+    """From τ = start to end on piece p with b held, cut at the stop."""
+    held, h, amplitude = state[HELD], end - start, block.amplitude
+    c0, c1, c2 = coefficients(
+        rule,
+        plane(wave, p, amplitude, start) - held,
+        plane(wave, p, amplitude, start + 0.5 * h) - held,
+        plane(wave, p, amplitude, end) - held,
+    )
+    take(c0, c1, c2, h, True, state)
+
+
+@scalar
+def fall_step(
+    block: Block, rule: int, options: Options, wave: Wave, p: int, tau: float, end: float, state: np.ndarray
+) -> None:
+    """From τ to end within a step of piece p with b held, in steps that a slide just begun asks for."""
+    for _ in range(_MOST_EVENTS + options.steps_per_cycle):
+        cut = end
+        if phase_at(wave, p, tau) < state[REACH]:
+            cut = min(end, tau + longest_step(block, options, wave, p, tau, math.inf, state))
+        hold_step(block, rule, wave, p, tau, cut, state)
+        tau = cut
+        if tau >= end or state[SLIDES] == 0.0:
             break
 
 
 @scalar
-def fall_step(block: Block, rule: int, start: float, end: float, state: np.ndarray, j: int) -> None:
-    """From phase start to end with b held, cut at the stop."""
-    held, h = state[HELD + j], end - start
-    c0, c1, c2 = coefficients(
-        rule, plane(block, start) - held, plane(block, 0.5 * (start + end)) - held, plane(block, end) - held
-    )
-    take(c0, c1, c2, h, True, state, j)
+def rise_step(
+    block: Block, rule: int, options: Options, steps: Steps, p: int, k: int, tau: float, x: float, state: np.ndarray
+) -> None:
+    """From τ on piece p, where Üg = x rises, to the end of step k.
+
+    Cut at Üg = Üy, at t1, at switches to and from the hold, and at the stop.
+    """
+    wave, amplitude, literal = steps.wave, block.amplitude, block.rise == LITERAL
+    end, x_end = node(steps, p, k + 1), amplitude * steps.nodes[steps.offset[p] + 2 * k + 2]
+    if state[SLIDES] == 0.0 and x < block.yield_acceleration:
+        if x_end <= block.yield_acceleration:
+            return
+        x = block.yield_acceleration
+        tau = offset_at(wave, p, amplitude, x)
+    for _ in range(_MOST_EVENTS + options.steps_per_cycle):
+        if state[SLIDES] == 0.0:
+            if block.rise == NEWMARK or slip(block, x) > 0.0:
+                held = starting_acceleration(block, x)
+            else:
+                top, touch = x_end, state[TOUCH]
+                if slip(block, x_end) <= 0.0:
+                    if not (x < touch < x_end and slip(block, touch) > 0.0):
+                        break
+                    top = touch
+                x = held = slip_root(block, 0.0, x, top)  # where Eq. 4 meets Üg
+                tau = offset_at(wave, p, amplitude, x)
+            follows = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
+            state[FOLLOWS] = 1.0 if follows else 0.0
+            turn = wave.finish[p]
+            if x < state[TOUCH] < amplitude * wave.last[p]:
+                turn = offset_at(wave, p, amplitude, state[TOUCH])
+            begin_slide(block, wave, p, tau, x, held, turn, state)
+        cut, x_cut, switches = end, x_end, False
+        longest = longest_step(block, options, wave, p, tau, x, state)
+        if longest < end - tau:
+            cut = tau + longest
+            x_cut = plane(wave, p, amplitude, cut)
+        if block.rise == MONOTONE:
+            asked, slope = response_and_slope(block, x)
+            asked_end = response(block, x_cut)
+            if state[FOLLOWS] == 0.0 and asked_end > state[HELD]:
+                if asked < state[HELD] or slope <= 0.0:
+                    x_cut, switches = response_root(block, state[HELD], x, x_cut), True
+                else:
+                    state[FOLLOWS] = 1.0
+            elif state[FOLLOWS] == 1.0 and asked_end < asked:
+                if slope > 0.0:
+                    x_cut, switches = slope_root(block, 0.0, x, x_cut), True
+                else:
+                    state[FOLLOWS] = 0.0
+        if switches:
+            cut = offset_at(wave, p, amplitude, x_cut)
+        follows, held, h = state[FOLLOWS] == 1.0, state[HELD], cut - tau
+        x_middle = plane(wave, p, amplitude, tau + 0.5 * h)
+        rate = slip(block, x) if follows else x - held
+        c0, c1, c2 = coefficients(
+            rule,
+            rate if state[VELOCITY] > 0.0 else max(rate, 0.0),  # rounding may not stop what starts here
+            slip(block, x_middle) if follows else x_middle - held,
+            slip(block, x_cut) if follows else x_cut - held,
+        )
+        fraction = take(c0, c1, c2, h, True, state)
+        if state[SLIDES] == 0.0:
+            cut = tau + fraction * h
+            x_cut = plane(wave, p, amplitude, cut)
+        if follows:
+            state[HELD] = response(block, x_cut)
+        if switches:
+            state[FOLLOWS] = 1.0 - state[FOLLOWS]
+        tau, x = cut, x_cut
+        if tau >= end:
+            break
 
 
 @scalar
-def begin(block: Block, velocity: float, state: np.ndarray, j: int) -> None:
-    """The state at Üg = Üy on the rise."""
-    state[VELOCITY + j] = state[PEAK + j] = state[LEAST + j] = velocity
-    state[DISPLACEMENT + j] = 0.0
-    state[HELD + j] = starting_acceleration(block, block.yield_acceleration)
-    state[SLIDES + j] = 1.0 if velocity > 0.0 else 0.0
-    state[FOLLOWS + j] = 1.0 if block.rise == LITERAL else 0.0
+def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
+    """What the beginning of piece p, after a jump upwards or a fall, asks of the block."""
+    x = block.amplitude * wave.first[p]
+    rises = kind_of(wave, p) == RISES
+    if state[SLIDES] > 0.0:
+        if block.rise == LITERAL:
+            state[HELD] = response(block, x)
+        elif block.rise == MONOTONE:
+            state[HELD] = max(state[HELD], response(block, x))
+            state[FOLLOWS] = 0.0
+    elif not rises and x >= block.yield_acceleration:
+        held = starting_acceleration(block, x)
+        if held < x:
+            state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
+            begin_slide(block, wave, p, wave.begin[p], x, held, offset_at(wave, p, block.amplitude, held), state)
 
 
 @scalar
-def pulse(block: Block, options: Options, table: np.ndarray, velocity: float, last: bool) -> Pulse:
-    """One cell's cycle, step by step, from one Üg = Üy to the next (see `train.Pulse`)."""
-    rule, state = options.rule, np.empty(_STATE_SIZE)
-    began = phase(block, block.yield_acceleration)
-    h = min(2.0 * math.pi, -began * _SHARE_OF_CYCLE) / options.steps_per_cycle
-    begin(block, velocity, state, 0)
-    start, node = began, math.ceil(began / h)
-    while node <= 0:
-        rise_step(block, rule, start, node * h, state, 0)
-        start = node * h
-        node += 1
-    end = _HALF_PI
-    if options.recoupling == INTEGRATE:
-        end = 1.5 * math.pi if last else _HALF_PI + pause(block)
-    start, node = 0.0, 1
-    while start < end and state[SLIDES + 0] == 1.0:
-        target = min(node * h, end)
-        fall_step(block, rule, start, target, state, 0)
-        start = target
-        node += 1
-    velocity, moved = state[VELOCITY + 0], state[DISPLACEMENT + 0]
-    if velocity > 0.0 and (options.recoupling != INTEGRATE or last):
-        velocity, slid = attenuate(state[HELD + 0], velocity, math.inf if last else pause(block))
-        moved += slid
-    return Pulse(velocity, moved, state[PEAK + 0], min(state[LEAST + 0], velocity))
+def asks_anew(wave: Wave, p: int) -> bool:
+    """Whether piece p, of Üg > 0, begins by a jump upwards or rises after a fall."""
+    if wave.jumps[p]:
+        return True
+    return kind_of(wave, p) == RISES and p > 0 and kind_of(wave, p - 1) == FALLS and wave.first[p] > 0.0
+
+
+@scalar
+def through_stretch(
+    block: Block, rule: int, options: Options, steps: Steps, k: int, p: int, tau: float, state: np.ndarray
+) -> int:
+    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of stretch k; flags, if there is no value."""
+    wave = steps.wave
+    for q in range(p, wave.stretch[k, 1]):
+        x = block.amplitude * wave.first[q]
+        first = 0
+        if q > p or x >= block.yield_acceleration:
+            tau = wave.begin[q]
+            if asks_anew(wave, q):
+                arrive(block, wave, q, state)
+        else:
+            x = block.yield_acceleration
+            first = min(
+                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.count[q]), 0),
+                steps.count[q] - 1,
+            )
+        at = steps.offset[q]
+        if kind_of(wave, q) == RISES:
+            for i in range(first, steps.count[q]):
+                if i > first:
+                    tau, x = node(steps, q, i), block.amplitude * steps.nodes[at + 2 * i]
+                rise_step(block, rule, options, steps, q, i, tau, x, state)
+        elif state[SLIDES] > 0.0:
+            if state[HELD] <= 0.0:
+                return KD_NOT_POSITIVE
+            for i in range(steps.count[q]):
+                fall_step(block, rule, options, wave, q, node(steps, q, i), node(steps, q, i + 1), state)
+                if state[SLIDES] == 0.0:
+                    break
+    return KD_NOT_POSITIVE if state[SLIDES] > 0.0 and state[HELD] <= 0.0 else 0
+
+
+@scalar
+def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, state: np.ndarray) -> None:
+    """From the beginning of piece q (t5) to τ on piece p, integrating on."""
+    wave = steps.wave
+    state[RESTED] = math.inf
+    for piece in range(q, min(p + 1, wave.first.size)):
+        last = tau if piece == p else wave.finish[piece]
+        for i in range(steps.count[piece]):
+            start, end = node(steps, piece, i), min(node(steps, piece, i + 1), last)
+            if end > start:
+                hold_step(block, rule, wave, piece, start, end, state)
+            if state[SLIDES] == 0.0:
+                state[RESTED] = wave.end[piece]
+                return
+
+
+@scalar
+def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
+    """One pulse, step by step, from Üg = Üy in stretch k to that in the `following` one (see `train.Pulse`)."""
+    rule, state = options.rule, np.empty((_STATE_SIZE, 1))[:, 0]
+    rest(block, state)
+    p, tau = beginning(block, wave, k)
+    if velocity > 0.0:
+        state[VELOCITY] = state[PEAK] = state[LEAST] = velocity
+        state[HELD] = starting_acceleration(block, max(block.amplitude * wave.first[p], block.yield_acceleration))
+        state[SLIDES], state[FOLLOWS] = 1.0, 1.0 if block.rise == LITERAL else 0.0
+    validity = through_stretch(block, rule, options, steps, k, p, tau, state)
+    if validity:
+        return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, validity)
+    if state[SLIDES] > 0.0:
+        q, last = wave.stretch[k, 1], following >= wave.height.size
+        p, tau = wave.first.size, 0.0
+        if not last:
+            p, tau = beginning(block, wave, following)
+        started = wave.start[q] if q < wave.start.size else wave.end[q - 1]
+        if options.recoupling == INTEGRATE:
+            recouple(block, rule, steps, q, p, tau, state)
+        else:
+            state[RESTED] = started  # Eq. 12 goes on beyond the shaking just the same
+        if state[SLIDES] > 0.0 and (last or options.recoupling != INTEGRATE):
+            duration = math.inf if last else phase_at(wave, p, tau) - started
+            state[VELOCITY], slid = attenuate(state[HELD], state[VELOCITY], duration)
+            state[DISPLACEMENT] += slid
+    least = min(state[LEAST], state[VELOCITY])
+    return Pulse(state[VELOCITY], state[DISPLACEMENT], state[PEAK], least, state[RESTED], 0)
 
 
 train = train_of(pulse)
 
 
-#: Rows of the lanes beside the block's: E (or D) at the last node, and whether something
-#: happens in the step.
-_ASKED, _HAPPENS = LANE_ROWS * TILE, (LANE_ROWS + 1) * TILE
-_LANE_SIZE = (LANE_ROWS + 2) * TILE
+@scalar
+def shared_rate(block: Block, x: float) -> float:
+    """|x| tan θ (μs − tan θ − μ): what of D both sides of Üg = 0 share; the rest, ±g (μs − μ), changes its sign.
+
+    Where the halves of a cycle mirror each other V keeps the former only, and on a plane nearly level that is
+    less than the rounding of the latter.
+    """
+    return abs(x) * block.tan_theta * (block.mu_s - block.tan_theta - friction(block, x))
+
+
+@scalar
+def continuous_step(
+    block: Block, rule: int, options: Options, wave: Wave, p: int, start: float, end: float, state: np.ndarray
+) -> None:
+    """From τ = start to end on piece p with Eq. 4 throughout, finer in a layer of friction."""
+    layer, length = layer_of(block, wave, p, state)
+    edge = min(max(layer, start), end)
+    outwards = wave.finish[p] == 0.0
+    finest = max(_SHARE_OF_CYCLE / options.steps_per_cycle * length, _LEAST_STEP)
+    for first, last, within in ((start, edge, outwards), (edge, end, not outwards)):
+        parts = 1 if last > first else 0
+        if parts and within and length > 0.0:
+            # rounding may not make the two sides of a zero differ
+            parts = max(1, math.ceil(min((last - first) / finest, float(options.steps_per_cycle)) - 1e-6))
+        h = (last - first) / max(parts, 1)
+        for part in range(parts):
+            tau = first + part * h
+            x, x_middle = plane(wave, p, block.amplitude, tau), plane(wave, p, block.amplitude, tau + 0.5 * h)
+            x_end = plane(wave, p, block.amplitude, tau + h)
+            c0, c1, c2 = coefficients(
+                rule,
+                sided_slip(block, wave, p, x),
+                sided_slip(block, wave, p, x_middle),
+                sided_slip(block, wave, p, x_end),
+            )
+            take(c0, c1, c2, h, False, state)
+            c0, c1, c2 = coefficients(
+                rule, shared_rate(block, x), shared_rate(block, x_middle), shared_rate(block, x_end)
+            )
+            state[SHARED] += velocity_gain(c0, c1, c2, h, 1.0)
+
+
+@scalar
+def sided_slip(block: Block, wave: Wave, p: int, x: float) -> float:
+    """D at Üg = x on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
+    return slip(block, math.copysign(x, wave.top[p]))
+
+
+#: The first rows of the lanes' states, and the rows of the lanes beside the block's: D (or E) at the last node,
+#: what of D both sides of Üg = 0 share there, whether something happens in the step, whether the cell
+#: goes on without the lanes, |w| up to which friction is a layer thinner than steps, and W at the beginning
+#: of the cycle.  Row + j is cell j.
+_VELOCITY, _DISPLACEMENT, _HELD, _PEAK, _LEAST, _SLIDES, _FOLLOWS = range(0, 7 * TILE, TILE)
+_SHARED = SHARED * TILE
+_ASKED, _SHARE, _HAPPENS, _ALONE, _THIN, _BEFORE = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
+_LANE_SIZE = (LANE_ROWS + 6) * TILE
+
+
+@scalar
+def set_aside(lanes: np.ndarray, states: np.ndarray, j: int) -> None:
+    """Leave lane j at rest for good: its cell is not for lanes."""
+    lanes[_ALONE + j], lanes[YIELD + j] = 1.0, math.inf
+    states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
 
 
 @scalar
 def lockstep_rise(
-    count: int, rule: int, options: Options, table: np.ndarray, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
-    state: np.ndarray,
+    count: int, rule: int, options: Options, steps: Steps, p: int, cells: np.ndarray, where: np.ndarray,
+    lanes: np.ndarray, states: np.ndarray,
 ) -> None:  # fmt: skip
-    """First pulses of `count` lanes, from rest to the peak."""
+    """Lanes along piece p, on which Üg > 0 does not fall."""
     literally(rule)
-    rise, g = options.rise, options.g
-    quarter = options.steps_per_cycle // 4
-    h = 2.0 * math.pi / options.steps_per_cycle
-    first = quarter
+    rise, g, wave, nodes, at = options.rise, options.g, steps.wave, steps.nodes, steps.offset[p]
+    h = (wave.finish[p] - wave.begin[p]) / steps.count[p]
+    first, least, going = 0, math.inf, 0
     for j in range(count):
-        first = min(first, quarter + math.floor(lanes[BEGAN + j] / h))
+        least = min(least, lanes[YIELD + j] / lanes[AMPLITUDE + j])
+        going += 1 if states[_SLIDES + j] > 0.0 else 0
+    if going == 0:
+        # at rest below Üy nothing happens
+        while first < steps.count[p] and nodes[at + 2 * first + 2] <= least * (1.0 - 1e-15):
+            first += 1
+        if first == steps.count[p]:
+            return
     for j in range(count):
-        lanes[_ASKED + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * table[2 * first], g)
-    for node in range(first, quarter):
-        s_start, s_middle, s_end = table[2 * node], table[2 * node + 1], table[2 * node + 2]
-        psi, psi_end = (node - quarter) * h, (node + 1 - quarter) * h
+        lanes[_ASKED + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * nodes[at + 2 * first], g)
+    for i in range(first, steps.count[p]):
+        w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events = 0
         for j in range(count):
-            x, x_end = lanes[AMPLITUDE + j] * s_start, lanes[AMPLITUDE + j] * s_end
-            slides, follows, held = state[SLIDES + j] > 0.0, state[FOLLOWS + j] > 0.0, state[HELD + j]
+            x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
+            slides, follows, held = states[_SLIDES + j] > 0.0, states[_FOLLOWS + j] > 0.0, states[_HELD + j]
             asked = lanes[_ASKED + j]
             asked_end = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_end, g)
             lanes[_ASKED + j] = asked_end
             held_end = asked_end if follows else held
             middle = 0.0
             if rule == SIMPSON:
-                x_middle = lanes[AMPLITUDE + j] * s_middle
+                x_middle = lanes[AMPLITUDE + j] * w_middle
                 asked_middle = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_middle, g)
                 middle = x_middle - (asked_middle if follows else held)
             c0, c1, c2 = coefficients(rule, x - held, middle, x_end - held_end)
-            velocity = state[VELOCITY + j]
+            velocity = states[_VELOCITY + j]
             after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
             moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
             switches = (rise == MONOTONE) & (follows & (asked_end < asked) | (not follows) & (asked_end > held))
             turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
             irregular = switches | turns | (after <= 0.0)
-            starts = (psi_end > lanes[BEGAN + j]) & (x_end > asked_end)
+            starts = (x_end > lanes[YIELD + j]) & (x_end > asked_end)
             happens = irregular if slides else starts
-            steps = slides & (not happens)
-            state[VELOCITY + j] = after if steps else velocity
-            state[DISPLACEMENT + j] += moved if steps else 0.0
-            state[HELD + j] = held_end if steps else held
-            state[PEAK + j] = max(state[PEAK + j], after if steps else 0.0)
+            goes = slides & (not happens)
+            states[_VELOCITY + j] = after if goes else velocity
+            states[_DISPLACEMENT + j] += moved if goes else 0.0
+            states[_HELD + j] = held_end if goes else held
+            states[_PEAK + j] = max(states[_PEAK + j], after if goes else 0.0)
             lanes[_HAPPENS + j] = 1.0 if happens else 0.0
             events += 1 if happens else 0
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    block = block_at(cells, where[j], options)
-                    rise_step(block, rule, max(psi, lanes[BEGAN + j]), psi_end, state, j)
+                    block, state = block_at(cells, where[j], options), state_of(states, j)
+                    rise_step(block, rule, options, steps, p, i, node(steps, p, i), block.amplitude * w_start, state)
+                    if state[REACH] > -math.inf:
+                        set_aside(lanes, states, j)
 
 
 @scalar
 def lockstep_fall(
-    count: int, rule: int, options: Options, table: np.ndarray, lanes: np.ndarray, state: np.ndarray, nodes: int
-) -> None:
-    """Lanes on with b held, for `nodes` steps after the peak or until all have stopped."""
+    count: int, rule: int, options: Options, steps: Steps, p: int, cells: np.ndarray, where: np.ndarray,
+    lanes: np.ndarray, states: np.ndarray,
+) -> None:  # fmt: skip
+    """Lanes along piece p with b held, or until all have stopped."""
     literally(rule)
-    steps_per_cycle = options.steps_per_cycle
-    h = 2.0 * math.pi / steps_per_cycle
-    for node in range(nodes):
-        at = 2 * node + steps_per_cycle // 2
-        s_start, s_middle, s_end = half_wave(table, at), half_wave(table, at + 1), half_wave(table, at + 2)
+    wave, nodes, at = steps.wave, steps.nodes, steps.offset[p]
+    h = (wave.finish[p] - wave.begin[p]) / steps.count[p]
+    for i in range(steps.count[p]):
+        w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events, going = 0, 0
         for j in range(count):
-            amplitude, held, velocity = lanes[AMPLITUDE + j], state[HELD + j], state[VELOCITY + j]
-            slides = state[SLIDES + j] > 0.0
+            amplitude, held, velocity = lanes[AMPLITUDE + j], states[_HELD + j], states[_VELOCITY + j]
+            slides = states[_SLIDES + j] > 0.0
             c0, c1, c2 = coefficients(
-                rule, amplitude * s_start - held, amplitude * s_middle - held, amplitude * s_end - held
+                rule, amplitude * w_start - held, amplitude * w_middle - held, amplitude * w_end - held
             )
             after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
             moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
             turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
             happens = slides & (turns | (after <= 0.0))
-            steps = slides & (not happens)
-            state[VELOCITY + j] = after if steps else velocity
-            state[DISPLACEMENT + j] += moved if steps else 0.0
-            state[PEAK + j] = max(state[PEAK + j], after if steps else velocity)
+            goes = slides & (not happens)
+            states[_VELOCITY + j] = after if goes else velocity
+            states[_DISPLACEMENT + j] += moved if goes else 0.0
+            states[_PEAK + j] = max(states[_PEAK + j], after if goes else velocity)
             lanes[_HAPPENS + j] = 1.0 if happens else 0.0
             events += 1 if happens else 0
             going += 1 if slides else 0
@@ -355,131 +678,99 @@ def lockstep_fall(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    amplitude, held = lanes[AMPLITUDE + j], state[HELD + j]
-                    c0, c1, c2 = coefficients(
-                        rule, amplitude * s_start - held, amplitude * s_middle - held, amplitude * s_end - held
-                    )
-                    take(c0, c1, c2, h, True, state, j)
+                    block, state = block_at(cells, where[j], options), state_of(states, j)
+                    hold_step(block, rule, wave, p, node(steps, p, i), node(steps, p, i + 1), state)
 
 
 @scalar
-def half_wave(table: np.ndarray, at: int) -> float:
-    """sin φ at half step `at` of the cycle, from the table of its first half."""
-    half = table.size - 1
-    return table[at] if at <= half else -table[at - half]
+def until_next(block: Block, wave: Wave, p: int) -> float:
+    """Phase from the beginning of piece p to where Üg next comes to Üy on the rise, or jumps past it."""
+    waited = 0.0
+    for q in range(p, wave.first.size):
+        if block.amplitude * max(wave.first[q], wave.last[q]) > block.yield_acceleration:
+            if block.amplitude * wave.first[q] >= block.yield_acceleration:
+                return waited
+            return waited + (offset_at(wave, q, block.amplitude, block.yield_acceleration) - wave.begin[q])
+        waited += wave.finish[q] - wave.begin[q]
+    return math.inf
 
 
 @scalar
-def continuous_step(block: Block, rule: int, side: float, start: float, end: float, state: np.ndarray, j: int) -> None:
-    """From phase start to end of a half cycle (side ±1, ψ from its peak) with Eq. 4 throughout."""
-    x = side * max(plane(block, start), 0.0)
-    x_middle = side * max(plane(block, 0.5 * (start + end)), 0.0)
-    x_end = side * max(plane(block, end), 0.0)
-    c0, c1, c2 = coefficients(rule, slip(block, x), slip(block, x_middle), slip(block, x_end))
-    take(c0, c1, c2, end - start, False, state, j)
-
-
-@scalar
-def lockstep_half_cycle(
-    count: int, rule: int, options: Options, table: np.ndarray, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
-    state: np.ndarray, side: float, starting: bool,
+def stick_slip_cycle(
+    count: int, rule: int, options: Options, steps: Steps, c: int, cells: np.ndarray, where: np.ndarray,
+    lanes: np.ndarray, states: np.ndarray,
 ) -> None:  # fmt: skip
-    """Continuous lanes through a half cycle; `starting`, from the first Üg = Üy on."""
+    """Stick-slip lanes through cycle c of the table; one that carries velocity into a new slide is set aside."""
     literally(rule)
-    g = options.g
-    h = 2.0 * math.pi / options.steps_per_cycle
-    for j in range(count):
-        x = side * lanes[AMPLITUDE + j] * table[0]
-        lanes[_ASKED + j] = x - lane_response(lanes, j, x, g)
-    for node in range(options.steps_per_cycle // 2):
-        s_middle, s_end = table[2 * node + 1], table[2 * node + 2]
-        psi, psi_end = node * h - _HALF_PI, (node + 1) * h - _HALF_PI
-        events = 0
-        for j in range(count):
-            x_end = side * lanes[AMPLITUDE + j] * s_end
-            rate, rate_end = lanes[_ASKED + j], x_end - lane_response(lanes, j, x_end, g)
-            lanes[_ASKED + j] = rate_end
-            middle = 0.0
-            if rule == SIMPSON:
-                x_middle = side * lanes[AMPLITUDE + j] * s_middle
-                middle = x_middle - lane_response(lanes, j, x_middle, g)
-            c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
-            velocity = state[VELOCITY + j]
-            after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
-            moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
-            began = (not starting) | (psi >= lanes[BEGAN + j])
-            begins = (not began) & (psi_end > lanes[BEGAN + j])
-            turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
-            steps = began & (not turns)
-            happens = (began & turns) | begins
-            state[VELOCITY + j] = after if steps else velocity
-            state[DISPLACEMENT + j] += moved if steps else 0.0
-            state[PEAK + j] = max(state[PEAK + j], after if steps else velocity)
-            lanes[_HAPPENS + j] = 1.0 if happens else 0.0
-            events += 1 if happens else 0
-        if events > 0:
+    wave = steps.wave
+    pieces = wave.first.size
+    for p in range(wave.cycle[c], wave.cycle[c + 1]):
+        kind = kind_of(wave, p)
+        before = BELOW if p == 0 else kind_of(wave, p - 1)
+        if kind != BELOW and asks_anew(wave, p):
             for j in range(count):
-                if lanes[_HAPPENS + j] > 0.0:
-                    block = block_at(cells, where[j], options)
-                    start = max(psi, lanes[BEGAN + j]) if starting else psi
-                    continuous_step(block, rule, side, start, psi_end, state, j)
+                if lanes[_ALONE + j] == 0.0:
+                    arrive(block_at(cells, where[j], options), wave, p, state_of(states, j))
+                    if states[REACH * TILE + j] > -math.inf:
+                        set_aside(lanes, states, j)
+        if options.rise == LITERAL and kind != RISES and before != kind:
+            for j in range(count):
+                if states[_SLIDES + j] > 0.0 and states[_HELD + j] <= 0.0:
+                    set_aside(lanes, states, j)
+        if kind == RISES:
+            lockstep_rise(count, rule, options, steps, p, cells, where, lanes, states)
+        elif kind == FALLS or options.recoupling == INTEGRATE:
+            lockstep_fall(count, rule, options, steps, p, cells, where, lanes, states)
+        elif before != BELOW:
+            for j in range(count):
+                if states[_SLIDES + j] > 0.0:
+                    wait = until_next(block_at(cells, where[j], options), wave, p)
+                    left, slid = attenuate(states[_HELD + j], states[_VELOCITY + j], wait)
+                    states[_DISPLACEMENT + j] += slid
+                    states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
+                    if left > 0.0:
+                        set_aside(lanes, states, j)
+        if kind == BELOW and p + 1 < pieces and wave.top[p + 1] > 0.0:
+            for j in range(count):
+                if states[_SLIDES + j] > 0.0:
+                    set_aside(lanes, states, j)
 
 
 @scalar
-def continuous_cells(
-    count: int, rule: int, options: Options, table: np.ndarray, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
-    state: np.ndarray, motion: np.ndarray,
+def stick_slip_lanes(
+    count: int, rule: int, options: Options, steps: Steps, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
+    states: np.ndarray, motion: np.ndarray, codes: np.ndarray,
 ) -> None:  # fmt: skip
-    """Continuous sliding: two cycles are stepped, the later ones follow from them (|Üg| repeats)."""
+    """Stick-slip: pulses from rest in lockstep; cells that do not come to rest in one go on pulse by pulse."""
     literally(rule)
-    whole = whole_lanes(count)
+    wave, whole = steps.wave, whole_lanes(count)
     for j in range(whole):
-        state[VELOCITY + j] = state[DISPLACEMENT + j] = state[PEAK + j] = 0.0
-    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, 1.0, True)
-    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, -1.0, False)
-    for j in range(count):
-        motion[0, where[j]], motion[1, where[j]] = state[DISPLACEMENT + j], state[PEAK + j]
-    if options.cycles == 1:
-        return
-    first = np.empty(whole)
-    for j in range(whole):
-        first[j] = state[PEAK + j] = state[VELOCITY + j]
-    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, 1.0, False)
-    lockstep_half_cycle(whole, rule, options, table, cells, where, lanes, state, -1.0, False)
-    later = options.cycles - 1.0
-    for j in range(count):
-        drift = state[VELOCITY + j] - first[j]
-        moved = state[DISPLACEMENT + j] - motion[0, where[j]]
-        motion[0, where[j]] += later * (moved + math.pi * drift * (later - 1.0))
-        motion[1, where[j]] = max(motion[1, where[j]], state[PEAK + j] + max(0.0, (later - 1.0) * drift))
-
-
-@scalar
-def stick_slip_cells(
-    count: int, rule: int, options: Options, table: np.ndarray, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
-    state: np.ndarray, motion: np.ndarray, codes: np.ndarray,
-) -> None:  # fmt: skip
-    """Stick-slip: the first pulse in lockstep; cells that do not come to rest in it go on one by one."""
-    literally(rule)
-    whole = whole_lanes(count)
-    for j in range(whole):
-        block = block_at(cells, where[j], options)
-        begin(block, 0.0, state, j)
-    lockstep_rise(whole, rule, options, table, cells, where, lanes, state)
-    shortest = 2.0 * math.pi / _SHARE_OF_CYCLE  # a slide so short needs steps of its own
-    quarters = 3 if options.recoupling == INTEGRATE else 1
-    lockstep_fall(whole, rule, options, table, lanes, state, quarters * (options.steps_per_cycle // 4))
+        state = state_of(states, j)
+        rest(block_at(cells, where[j], options), state)
+        lanes[_ALONE + j] = 0.0
+        if state[LAYER] > 0.0 or state[TOUCH] < math.inf:
+            set_aside(lanes, states, j)
+    for c in range(wave.shape.size):
+        times = 1.0
+        if c == wave.lead and wave.repeats > 0:
+            times = wave.repeats + (1.0 if wave.alike else 0.0)
+        for j in range(whole):
+            lanes[_BEFORE + j] = states[_DISPLACEMENT + j]
+        stick_slip_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
+        for j in range(whole):
+            before = lanes[_BEFORE + j]
+            states[_DISPLACEMENT + j] = before + times * (states[_DISPLACEMENT + j] - before)
+        if c == wave.lead and wave.alike:
+            break
     for j in range(count):
         block = block_at(cells, where[j], options)
-        velocity, moved = state[VELOCITY + j], state[DISPLACEMENT + j]
-        if velocity > 0.0 and options.recoupling != INTEGRATE:
-            velocity, slid = attenuate(state[HELD + j], velocity, math.inf if options.cycles == 1 else pause(block))
-            moved += slid
-        if velocity > 0.0 or block.rise == LITERAL or -lanes[BEGAN + j] < shortest:
-            answer = train(block, options, table)
+        if lanes[_ALONE + j] > 0.0:
+            answer = train(block, options, wave, steps)
         else:
-            validity = EQ4_BELOW_YIELD if yield_governs(block) else 0
-            answer = Motion(options.cycles * moved, state[PEAK + j], validity)
+            moved = states[_DISPLACEMENT + j]
+            if states[_SLIDES + j] > 0.0:
+                moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
+            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs(block, wave) else 0)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
         codes[1, where[j]] |= answer.validity
         if answer.validity & NO_VALUE:
@@ -487,8 +778,106 @@ def stick_slip_cells(
 
 
 @scalar
+def continuous_cycle(
+    count: int, rule: int, options: Options, steps: Steps, c: int, cells: np.ndarray, where: np.ndarray,
+    lanes: np.ndarray, states: np.ndarray,
+) -> None:  # fmt: skip
+    """Continuous lanes through cycle c of the table, from the first Üg ≥ Üy on."""
+    literally(rule)
+    g, wave, nodes = options.g, steps.wave, steps.nodes
+    for p in range(wave.cycle[c], wave.cycle[c + 1]):
+        at, side = steps.offset[p], math.copysign(1.0, wave.top[p])
+        h = (wave.finish[p] - wave.begin[p]) / steps.count[p]
+        for j in range(count):
+            x = lanes[AMPLITUDE + j] * nodes[at]
+            lag, shared = lane_slip(lanes, j, x, side, g)
+            lanes[_ASKED + j], lanes[_SHARE + j] = lag + shared, shared
+        for i in range(steps.count[p]):
+            w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
+            near = min(abs(w_start), abs(w_end))
+            events = 0
+            for j in range(count):
+                x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
+                lag, shared_end = lane_slip(lanes, j, x_end, side, g)
+                rate, rate_end, shared = lanes[_ASKED + j], lag + shared_end, lanes[_SHARE + j]
+                lanes[_ASKED + j], lanes[_SHARE + j] = rate_end, shared_end
+                middle, shared_middle = 0.0, 0.0
+                if rule == SIMPSON:
+                    lag, shared_middle = lane_slip(lanes, j, lanes[AMPLITUDE + j] * w_middle, side, g)
+                    middle = lag + shared_middle
+                c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
+                velocity, began = states[_VELOCITY + j], states[_SLIDES + j] > 0.0
+                after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
+                moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
+                turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
+                begins = max(x, x_end) > lanes[YIELD + j]
+                happens = (turns | (near < lanes[_THIN + j])) if began else begins
+                goes = began & (not happens)
+                c0, c1, c2 = coefficients(rule, shared, shared_middle, shared_end)
+                states[_SHARED + j] += velocity_gain(c0, c1, c2, h, 1.0) if goes else 0.0
+                states[_VELOCITY + j] = after if goes else velocity
+                states[_DISPLACEMENT + j] += moved if goes else 0.0
+                states[_PEAK + j] = max(states[_PEAK + j], after if goes else velocity)
+                lanes[_HAPPENS + j] = 1.0 if happens else 0.0
+                events += 1 if happens else 0
+            if events > 0:
+                for j in range(count):
+                    if lanes[_HAPPENS + j] > 0.0:
+                        block, state = block_at(cells, where[j], options), state_of(states, j)
+                        start = node(steps, p, i)
+                        if state[SLIDES] == 0.0 and block.amplitude * w_start < block.yield_acceleration:
+                            start = offset_at(wave, p, block.amplitude, block.yield_acceleration)
+                        state[SLIDES] = 1.0
+                        continuous_step(block, rule, options, wave, p, start, node(steps, p, i + 1), state)
+
+
+@in_lanes
+def lane_slip(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float]:
+    """D of a lane on one side of Üg = 0, in two: what changes its sign with Üg, and `shared_rate`."""
+    excess = lanes[MU_S + j] - lane_friction(lanes, j, x, g)
+    return side * g * excess, side * x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j])
+
+
+@scalar
+def continuous_lanes(
+    count: int, rule: int, options: Options, steps: Steps, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
+    states: np.ndarray, motion: np.ndarray,
+) -> None:  # fmt: skip
+    """Continuous sliding, cycle by cycle; repeated ones are stepped twice, and the later ones follow from the second."""
+    literally(rule)
+    wave, whole = steps.wave, whole_lanes(count)
+    for j in range(whole):
+        state = state_of(states, j)
+        rest(block_at(cells, where[j], options), state)
+        lanes[_THIN + j] = state[LAYER] / lanes[AMPLITUDE + j]
+    for c in range(wave.shape.size):
+        continuous_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
+        if c != wave.lead or wave.repeats == 0:
+            continue
+        times = wave.repeats - 1.0 + (1.0 if wave.alike else 0.0)
+        if times > 0.0:
+            before = states.copy()
+            for j in range(whole):
+                states[_PEAK + j], states[_SHARED + j] = states[_VELOCITY + j], 0.0
+            continuous_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
+            for j in range(whole):
+                gain = states[_VELOCITY + j] - before[_VELOCITY + j]
+                if steps.mirrored:
+                    gain = states[_SHARED + j]
+                moved = states[_DISPLACEMENT + j] - before[_DISPLACEMENT + j]
+                peak = states[_PEAK + j] + max(0.0, (times - 1.0) * gain)
+                states[_PEAK + j] = max(before[_PEAK + j], peak)
+                states[_VELOCITY + j] = before[_VELOCITY + j] + times * gain
+                states[_DISPLACEMENT + j] = before[_DISPLACEMENT + j] + times * (moved + math.pi * gain * (times - 1.0))
+        if wave.alike:
+            break
+    for j in range(count):
+        motion[0, where[j]], motion[1, where[j]] = states[_DISPLACEMENT + j], states[_PEAK + j]
+
+
+@scalar
 def solve_cells(
-    cells: np.ndarray, count: int, rule: int, options: Options, table: np.ndarray, motion: np.ndarray, codes: np.ndarray
+    cells: np.ndarray, count: int, rule: int, options: Options, steps: Steps, motion: np.ndarray, codes: np.ndarray
 ) -> None:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
 
@@ -497,8 +886,7 @@ def solve_cells(
     """
     literally(rule)
     where = np.empty(TILE, np.int64)
-    lanes = np.empty(_LANE_SIZE)
-    state = np.empty(_STATE_SIZE)
+    lanes, states = np.empty(_LANE_SIZE), np.empty(_STATE_SIZE * TILE)
     for wanted in (STICK_SLIP, CONTINUOUS):
         lane = 0
         for j in range(count):
@@ -515,6 +903,6 @@ def solve_cells(
             for row in range(LANE_ROWS):
                 lanes[row * TILE + spare] = lanes[row * TILE]
         if lane > 0 and wanted == STICK_SLIP:
-            stick_slip_cells(lane, rule, options, table, cells, where, lanes, state, motion, codes)
+            stick_slip_lanes(lane, rule, options, steps, cells, where, lanes, states, motion, codes)
         elif lane > 0:
-            continuous_cells(lane, rule, options, table, cells, where, lanes, state, motion)
+            continuous_lanes(lane, rule, options, steps, cells, where, lanes, states, motion)

@@ -1,7 +1,9 @@
-"""A train of pulses: what all cycles of a stick-slip block come to, given how one pulse goes.
+"""A train of pulses: what all of the shaking comes to, given how one pulse goes.
 
-Both solvers bring their own `pulse`, a map from the velocity carried into a cycle to the
-velocity carried into the next; what follows from that map over many cycles stands here.
+A pulse begins where the plane's acceleration comes to Üy, or jumps past it, after it was not positive:
+there b is reset, and the velocity carried over is all that the past has left.  Both solvers bring
+their own `pulse`, a map from the velocity carried into one to the velocity carried into the next;
+what follows from that map over many cycles stands here.
 """
 
 import math
@@ -12,33 +14,30 @@ import numpy as np
 
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
-    INTEGRATE,
-    KD_NOT_POSITIVE,
-    LITERAL,
+    NO_VALUE,
     NOT_RECOUPLED,
     Block,
     Motion,
     Options,
-    phase,
-    response,
-    yield_governs,
+    stays_below_yield,
 )
+from slipsweep.kernels.excitation import Wave, offset_at
 from slipsweep.kernels.jit import scalar
 
 
 class Pulse(NamedTuple):
-    """One cycle, from Üg = Üy to the next: V carried on, W gained, the largest and the least V."""
+    """From one Üg = Üy to the next: V carried on, W gained, the largest and the least V.
+
+    `rested` is the phase at which the block came to rest, infinite where only the end of the shaking
+    brought it to rest; `validity` says if there is no value.
+    """
 
     velocity: float
     displacement: float
     peak: float
     least: float
-
-
-@scalar
-def pause(block: Block) -> float:
-    """Phase from Üg = 0 (t5) to the next Üg = Üy."""
-    return 1.5 * math.pi + phase(block, block.yield_acceleration)
+    rested: float
+    validity: int
 
 
 @scalar
@@ -52,45 +51,98 @@ def attenuate(b: float, velocity: float, duration: float) -> tuple[float, float]
     return velocity - b * duration, (velocity - 0.5 * b * duration) * duration
 
 
+@scalar
+def first_pulse(block: Block, wave: Wave, k: int) -> int:
+    """The first stretch from k on in which the plane's acceleration exceeds Üy; past the last, if there is none."""
+    while k < wave.height.size and block.amplitude * wave.height[k] <= block.yield_acceleration:
+        k += 1
+    return k
+
+
+@scalar
+def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
+    """Where in stretch k the plane's acceleration comes to Üy or jumps past it: a piece, and τ on it."""
+    p = wave.stretch[k, 0]
+    while block.amplitude * max(wave.first[p], wave.last[p]) <= block.yield_acceleration:
+        p += 1
+    if block.amplitude * wave.first[p] >= block.yield_acceleration:
+        return p, wave.begin[p]
+    return p, offset_at(wave, p, block.amplitude, block.yield_acceleration)
+
+
+@scalar
+def yield_governs(block: Block, wave: Wave) -> bool:
+    """Whether Eq. 4 stays at or below the yield value over all that the plane rises through or jumps to."""
+    governs = True
+    for i in range(wave.rises.shape[0]):
+        high = block.amplitude * wave.rises[i, 1]
+        if governs and high > block.yield_acceleration:
+            low = max(block.amplitude * wave.rises[i, 0], block.yield_acceleration)
+            governs = stays_below_yield(block, low, high)
+    return governs
+
+
 def train_of(
-    pulse: Callable[[Block, Options, np.ndarray, float, bool], Pulse],
-) -> Callable[[Block, Options, np.ndarray], Motion]:
-    """The jitted train of a solver's pulses."""
+    pulse: Callable[[Block, Options, Wave, np.ndarray, int, int, float], Pulse],
+) -> Callable[[Block, Options, Wave, np.ndarray], Motion]:
+    """The jitted train of a solver's pulses.
+
+    A pulse is given block, options, wave, what the solver itself has tabulated, the stretch it begins in,
+    the one in which the next begins (past the last, if none does) and the velocity carried into it.
+    """
 
     @scalar
-    def train(block: Block, options: Options, table: np.ndarray) -> Motion:
+    def pulses(
+        block: Block, options: Options, wave: Wave, table: np.ndarray, k: int, until: int, velocity: float
+    ) -> tuple[Pulse, int]:
+        """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
+        displacement, peak, least, rested, validity = 0.0, velocity, velocity, 0.0, 0
+        while k < wave.height.size and wave.stretch[k, 0] < until:
+            following = first_pulse(block, wave, k + 1)
+            now = pulse(block, options, wave, table, k, following, velocity)
+            k, velocity, rested = following, now.velocity, now.rested
+            displacement += now.displacement
+            peak, least = max(peak, now.peak), min(least, now.least)
+            validity |= now.validity
+            if velocity > 0.0:
+                validity |= NOT_RECOUPLED
+            if validity & NO_VALUE:
+                break
+        return Pulse(velocity, displacement, peak, least, rested, validity), k
+
+    @scalar
+    def train(block: Block, options: Options, wave: Wave, table: np.ndarray) -> Motion:
         """All pulses of a stick-slip (or Newmark) block.
 
-        Where the map returns to a velocity seen before, the cycles in between repeat; where
-        the block never rests within a cycle, the velocity changes by the same amount each
-        cycle and W is an arithmetic series.
+        Where the map of the repeated cycle returns to a velocity seen before, the cycles in between
+        repeat; where the block never rests within it, the velocity changes by the same amount
+        each time and W is an arithmetic series.
         """
-        cycles = options.cycles
-        if block.rise == LITERAL and response(block, block.amplitude) <= 0.0:
-            below = EQ4_BELOW_YIELD if yield_governs(block) else 0
-            return Motion(math.nan, math.nan, KD_NOT_POSITIVE | below)
-        # integrated on, a literal block may run past the end of the shaking, the last time only
-        last_differs = block.rise == LITERAL and options.recoupling == INTEGRATE
-        velocity, displacement, peak = 0.0, 0.0, 0.0
-        validity = EQ4_BELOW_YIELD if yield_governs(block) else 0
+        k = first_pulse(block, wave, 0)
+        if k == wave.height.size:
+            return Motion(0.0, 0.0, 0)
+        validity = EQ4_BELOW_YIELD if yield_governs(block, wave) else 0
+        now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0)
+        velocity, displacement, peak = now.velocity, now.displacement, now.peak
+        validity |= now.validity
         seen_velocity, seen_displacement, seen_at, next_look = 0.0, 0.0, 0, 1
-        done = 0
-        while done < cycles:
-            last = done == cycles - 1
+        done, left = 0, wave.repeats
+        after = k
+        while left > 0 and validity & NO_VALUE == 0:
             before = velocity
-            now = pulse(block, options, table, before, last)
+            now, after = pulses(block, options, wave, table, k, wave.cycle[wave.lead + 1], before)
+            validity |= now.validity
             velocity = now.velocity
             displacement += now.displacement
             peak = max(peak, now.peak)
             done += 1
-            if last:
+            left -= 1
+            if before == 0.0 and velocity == 0.0:
+                displacement += left * now.displacement
+                # what follows is one more of the same, if the end of the shaking comes too late to matter
+                if wave.alike and now.rested <= wave.end[wave.cycle[wave.lead + 1] - 1]:
+                    return Motion(displacement + now.displacement, peak, validity)
                 break
-            if before == 0.0 and velocity == 0.0 and not last_differs:
-                displacement *= cycles
-                break
-            if velocity > 0.0:
-                validity |= NOT_RECOUPLED
-            left = cycles - 1 - done  # the last pulse, which runs out freely, is always followed
             if now.least > 0.0:
                 gain = velocity - before
                 alike = float(left)
@@ -98,17 +150,25 @@ def train_of(
                     alike = min(alike, math.floor(now.least / -gain))
                 displacement += alike * now.displacement + math.pi * gain * alike * (alike + 1.0)
                 velocity += alike * gain
+                left -= int(alike)
                 done += int(alike)
                 if gain > 0.0:
                     peak = max(peak, now.peak + alike * gain)
             elif velocity == seen_velocity:
                 period = done - seen_at
                 displacement += (left // period) * (displacement - seen_displacement)
-                done += left // period * period
+                left -= left // period * period
                 seen_velocity = -1.0  # no further period fits
             elif done == next_look:
                 seen_velocity, seen_displacement, seen_at = velocity, displacement, done
                 next_look *= 2
+        if validity & NO_VALUE == 0:
+            now, after = pulses(block, options, wave, table, after, wave.start.size, velocity)
+            validity |= now.validity
+            displacement += now.displacement
+            peak = max(peak, now.peak)
+        if validity & NO_VALUE:
+            return Motion(math.nan, math.nan, validity)
         return Motion(displacement, peak, validity)
 
     return train

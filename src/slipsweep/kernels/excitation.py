@@ -1,0 +1,175 @@
+"""The plane's motion in phase: a wave of peak 1 cut into monotone pieces, each a polynomial.
+
+On piece p the wave is w = top + c₁τ + c₂τ² + …, where τ is the phase counted from the piece's
+anchor: that end of it at which |w| is larger.  Differences from a peak thus come out of the sum,
+not out of a subtraction of two numbers near 1, and keep their digits however small they are
+(near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
+smooth waves are cut so short that the series are exact to rounding (`slipsweep.waveforms`, which
+fills the table): one form for all waveforms.  Times the amplitude A it is the plane's acceleration x.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.kernels.jit import scalar
+
+#: Relative size of the last Newton step of `offset_at`: its square is below rounding.
+_TOLERANCE = 1e-8
+
+
+class Wave(NamedTuple):
+    """Pieces of the shaking in the order of time, and what else the solvers ask of them.
+
+    The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike
+    (none where `repeats` is 0), then the remaining ones; phases are counted as if the plain cycle
+    came once.  Every array of floats has a row a piece but for the last five.
+
+    Attributes
+    ----------
+    start, end : ndarray
+        Phases at which pieces begin and end.
+    begin, finish : ndarray
+        The same counted from the anchor; one of the two is 0.
+    first, last, top : ndarray
+        w at the beginning, at the end and at the anchor.
+    degree : ndarray of int
+        Of the polynomial: 0 on a plateau, 1 on a straight line.
+    coefficients, once, twice : ndarray, shape (pieces, terms)
+        c₁, c₂, …; and those of the sum's first and second integral from the anchor, τ² and τ³ on.
+    jumps : ndarray of bool
+        Whether w jumps up at the beginning.
+    cycle : ndarray of int, shape (cycles in the table + 1,)
+        First piece of every cycle.
+    shape : ndarray of int, shape (cycles in the table,)
+        Cycles of one number have the same pieces.
+    stretch : ndarray of int, shape (stretches, 2)
+        Runs of pieces with w > 0: the first piece, and the first after it.
+    height : ndarray, shape (stretches,)
+        Largest w of each.
+    rises : ndarray, shape (ranges, 2)
+        Ranges of w > 0 that are passed through, or jumped to, without falling; they do not overlap.
+    lead, repeats : int
+        See above.
+    alike : bool
+        Whether what follows the plain cycle is one more of it.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    begin: np.ndarray
+    finish: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    top: np.ndarray
+    degree: np.ndarray
+    coefficients: np.ndarray
+    once: np.ndarray
+    twice: np.ndarray
+    jumps: np.ndarray
+    cycle: np.ndarray
+    shape: np.ndarray
+    stretch: np.ndarray
+    height: np.ndarray
+    rises: np.ndarray
+    lead: int
+    repeats: int
+    alike: bool
+
+
+@scalar
+def from_top(wave: Wave, p: int, tau: float) -> float:
+    """w − top on piece p, τ from its anchor."""
+    sum_ = 0.0
+    for k in range(wave.degree[p] - 1, -1, -1):
+        sum_ = (sum_ + wave.coefficients[p, k]) * tau
+    return sum_
+
+
+@scalar
+def slope(wave: Wave, p: int, tau: float) -> float:
+    """dw/dτ on piece p."""
+    sum_ = 0.0
+    for k in range(wave.degree[p] - 1, -1, -1):
+        sum_ = sum_ * tau + (k + 1.0) * wave.coefficients[p, k]
+    return sum_
+
+
+@scalar
+def integral(wave: Wave, p: int, start: float, end: float) -> float:
+    """∫ (w − top) dτ over a part of piece p."""
+    sum_start, sum_end = 0.0, 0.0
+    for k in range(wave.degree[p] - 1, -1, -1):
+        sum_start, sum_end = (sum_start + wave.once[p, k]) * start, (sum_end + wave.once[p, k]) * end
+    return sum_end * end - sum_start * start
+
+
+@scalar
+def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
+    """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
+    once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
+    for k in range(wave.degree[p] - 1, -1, -1):
+        once, twice = wave.once[p, k], wave.twice[p, k]
+        once_start, once_end = (once_start + once) * start, (once_end + once) * end
+        twice_start, twice_end = (twice_start + twice) * start, (twice_end + twice) * end
+    once_start *= start
+    return once_end * end - once_start, twice_end * end * end - twice_start * start * start - once_start * (end - start)
+
+
+@scalar
+def plane(wave: Wave, p: int, amplitude: float, tau: float) -> float:
+    """The plane's acceleration on piece p, τ from its anchor."""
+    return amplitude * (wave.top[p] + from_top(wave, p, tau))
+
+
+@scalar
+def held_gain(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> float:
+    """∫ (x − b) dτ for a held b on piece p: the gain of V."""
+    return (amplitude * wave.top[p] - held) * (end - start) + amplitude * integral(wave, p, start, end)
+
+
+@scalar
+def held_integrals(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+    """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on piece p: gains of V and W from rest."""
+    width = end - start
+    excess = amplitude * wave.top[p] - held
+    first, second = integrals(wave, p, start, end)
+    return excess * width + amplitude * first, 0.5 * excess * width * width + amplitude * second
+
+
+@scalar
+def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
+    """τ at which the plane's acceleration is x on piece p (the nearer end, if x lies beyond)."""
+    far = wave.begin[p] + wave.finish[p]  # one of them is 0
+    wanted = (x - amplitude * wave.top[p]) / amplitude
+    farthest = wave.first[p] + wave.last[p] - 2.0 * wave.top[p]
+    share = wanted / farthest if farthest != 0.0 else 0.0
+    if not share > 0.0:
+        return 0.0
+    if share >= 1.0:
+        return far
+    if wave.degree[p] == 1:
+        return far * share
+    tau = far * (math.sqrt(share) if wave.coefficients[p, 0] == 0.0 else share)
+    low, high = 0.0, far  # from the anchor on
+    for _ in range(100):
+        over = from_top(wave, p, tau) - wanted
+        if (over < 0.0) == (wanted < 0.0):
+            high = tau
+        else:
+            low = tau
+        new = tau - over / slope(wave, p, tau)
+        if not min(low, high) <= new <= max(low, high):
+            new = 0.5 * (low + high)
+        step = abs(new - tau)
+        tau = new
+        if step <= _TOLERANCE * abs(tau):
+            break
+    return tau
+
+
+@scalar
+def phase_at(wave: Wave, p: int, tau: float) -> float:
+    """The phase of τ on piece p, in the table's count."""
+    return wave.start[p] + (tau - wave.begin[p])
