@@ -12,6 +12,8 @@ WRITES = {
     "report": ["report.md"],
     "roofline": ["roofline.md"],
     "large_sweeps": ["large_sweeps.md", "scaling.md", "large_sweeps.json"],
+    "records": ["records.md"],
+    "paper_waveforms": ["paper_waveforms.md", "paper_waveforms.png"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
 }
@@ -33,6 +35,20 @@ def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     runpy.run_module(f"benchmarks.{name}", run_name="__main__")
     for file in WRITES[name]:
         assert (tmp_path / file).stat().st_size > 0, file
+
+
+def test_other_waves_of_the_papers_peaks() -> None:
+    """The table in benchmarks/results is what the program gives, and the tutorial quotes it."""
+    from benchmarks import machine, paper_waveforms
+
+    found = paper_waveforms.rows()
+    written = (ROOT / "benchmarks" / "results" / "paper_waveforms.md").read_text(encoding="utf-8")
+    assert machine.table(paper_waveforms.HEADER, found) in written
+    text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8").split("## Other waves of the same peaks")[1]
+    values = {name: cells for name, *cells in found}
+    for name in ("sine − 0.3 of the third harmonic", "triangle", "sine", "square"):
+        assert f"{values[name][0]} mm and {values[name][1]} m/s" in " ".join(text.split()), name
+    assert f"({values['sine, ramps of 1 cycle'][2]} mm with ramps of one cycle)" in text
 
 
 def test_the_sample_is_the_references() -> None:

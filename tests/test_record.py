@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from numba import njit
+from record_reference import Block
 from scipy.integrate import solve_ivp
 
 import slipsweep
-from slipsweep import InputError, Record, read_record, sweep_record
+from slipsweep import InputError, Record, sweep_record
 from slipsweep.kernels.block import MONOTONE, Cell, block_of
 from slipsweep.kernels.linear import follow_integrals, held_stop
 
@@ -187,6 +188,81 @@ def test_newmark_against_pyslammer_on_its_ground_motions(name: str) -> None:
     assert errors[0] < 5e-2
     assert errors[1] < errors[0] / 12
     assert errors[2] < errors[1] / 12
+
+
+#: Eq. 4 above the yield value for the smaller pulses: b follows it, jumps to it, is held.
+MEASURED = {"yield_acceleration": 0.59}
+#: The parameters that the paper prints for its stick-slip case.
+PRINTED = {"yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09}
+
+
+@pytest.mark.filterwarnings("ignore")  # pySLAMMER's own
+@pytest.mark.parametrize("options", [{}, {"recoupling": "integrate"}], ids=["eq12", "integrate"])
+@pytest.mark.parametrize(
+    ("name", "peak", "given", "modes"),
+    [
+        ("Northridge_1994_PAC-175", 3.0, MEASURED, (3, 0)),
+        ("Northridge_1994_PAC-175", 8.0, {}, (2, 1)),
+        ("Cape_Mendocino_1992_PET-090", 3.0, MEASURED, (5, 0)),
+        ("Cape_Mendocino_1992_PET-090", 8.0, MEASURED, (11, 2)),
+        ("Duzce_1999_375-090", 4.0, {}, (3, 0)),
+        ("Duzce_1999_375-090", 8.0, MEASURED, (16, 4)),
+        ("Kobe_1995_TAK-090", 3.0, MEASURED, (6, 0)),
+        ("Kobe_1995_TAK-090", 8.0, {}, (1, 4)),
+        ("Kobe_1995_TAK-090", 4.0, PRINTED, (6, 0)),
+        ("Kobe_1995_TAK-090", 6.0, PRINTED, (2, 5)),
+        ("Kobe_1995_TAK-090", 6.0, {**PRINTED, "rise": "literal"}, (2, 5)),
+        ("Northridge_1994_PAC-175", 5.0, {**PRINTED, "rise": "literal"}, (6, 0)),
+    ],
+)
+def test_mendez_against_scipy_on_recorded_motions(
+    name: str, peak: float, given: dict[str, Any], modes: tuple[int, int], options: dict[str, Any]
+) -> None:
+    """Five seconds about the largest acceleration, scaled to `peak`; seen: 5e-13 and better."""
+    motion = _pyslammer().load_sample_ground_motion(name)
+    largest, half = int(np.argmax(np.abs(motion.accel))), round(2.5 / motion.dt)
+    record = Record.sampled(motion.accel[max(largest - half, 0) : largest + half] * G, motion.dt)
+    scale = peak / float(np.abs(record.acceleration).max())
+    result = sweep_record(record, 5.0, 0.38, scale=scale, **given, **options)
+    expected = Block(5.0, 0.38, G, **given, **options).respond(record, scale)
+    assert (expected.stick_slip_pulses, expected.continuous_pulses) == modes
+    assert expected.permanent_displacement > 1e-6
+    for quantity, value in vars(expected).items():
+        assert result[quantity].item() == pytest.approx(value, rel=3e-12), quantity
+
+
+#: Accelerations that meet each other: plateaus, samples at zero, peaks of one height.
+LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mendez_against_scipy_on_made_up_records(seed: int) -> None:
+    """Plateaus, zeros touched, records that begin and end anywhere, under all options."""
+    rng = np.random.default_rng(seed)
+    compared = 0
+    for _ in range(12):
+        count = int(rng.integers(3, 25))
+        steps = np.clip(np.cumsum(rng.normal(0.0, 2.0, count)), -7.0, 7.0)
+        values = rng.choice(LEVELS, count) * rng.choice([1, 1, -1], count) if rng.random() < 0.6 else steps
+        record = Record.sampled(values, float(rng.choice([0.02, 0.05, 0.1])))
+        theta, mu_s = float(rng.choice([0.0, 5.0, 8.0])), float(rng.choice([0.3, 0.38, 0.5]))
+        given: dict[str, Any] = {
+            name: float(rng.choice(choices))
+            for name, choices in (
+                ("yield_acceleration", [0.59, 1.0, 2.0]),
+                ("decay_rate", [0.5, 2.7, 8.0]),
+                ("delta_mu", [0.0, 0.09, 0.3]),
+            )
+            if rng.random() < 0.5
+        }
+        given["recoupling"] = str(rng.choice(["eq12", "integrate"]))
+        given["rise"] = str(rng.choice(["monotone", "literal"]))
+        result = sweep_record(record, theta, mu_s, **given)
+        if not np.isnan(result.permanent_displacement):
+            compared += 1
+            for quantity, value in vars(Block(theta, mu_s, G, **given).respond(record, 1.0)).items():
+                assert result[quantity].item() == pytest.approx(value, rel=1e-9, abs=1e-12), (quantity, values, given)
+    assert compared >= 8
 
 
 class Stepped:
@@ -426,73 +502,7 @@ def test_where_there_is_no_value(shaking: Record) -> None:
     assert int(lifted.validity) == 2, "n = g + Üg tan θ < 0 on the way down"
 
 
-# ------------------------------------------------------------------------------------ files
-
-
-def write(folder: Path, name: str, text: str) -> Path:
-    path = folder / name
-    path.write_text(text)
-    return path
-
-
-@pytest.mark.parametrize(
-    ("text", "units", "factor"),
-    [
-        ("0,0.1\n0.01,0.2\n", "g", 9.80665),
-        ("time (s),acceleration (m/s2)\n0,0.1\n0.01,0.2\n", None, 1.0),
-        ("# a comment\n# Time (s),Acceleration (g's)\n0;0.1\n0.01;0.2\n", None, 9.80665),
-        ("t [s]\ta [cm/s^2]\n0\t0.1\n0.01\t0.2\n\n", None, 0.01),
-        ("0 0.1\n0.01 0.2\n", "gal", 0.01),
-    ],
-)
-def test_csv(tmp_path: Path, text: str, units: str | None, factor: float) -> None:
-    record = read_record(write(tmp_path, "a.csv", text), units=units)
-    np.testing.assert_array_equal(record.times, [0.0, 0.01])
-    np.testing.assert_allclose(record.acceleration, [0.1 * factor, 0.2 * factor], rtol=1e-15)
-
-
-AT2 = "PEER STRONG MOTION DATABASE RECORD\nA PLACE, 1/1/2000\nACCELERATION TIME HISTORY IN UNITS OF G\n"
-
-
-def test_at2_and_esm(tmp_path: Path) -> None:
-    at2 = write(tmp_path, "a.AT2", f"{AT2}NPTS=   3, DT=   .0050 SEC\n  .1E-01 -.2E-01\n  .3E-01\n")
-    esm = write(tmp_path, "a.ASC", "SAMPLING_INTERVAL_S: 0.005\nNDATA: 3\nUNITS: cm/s^2\n9.80665\n-19.6133\n29.41995\n")
-    for path in (at2, esm):
-        record = read_record(path)
-        np.testing.assert_allclose(record.times, [0.0, 0.005, 0.01], rtol=1e-15)
-        np.testing.assert_allclose(record.acceleration, np.array([1, -2, 3]) * 0.0980665, rtol=1e-14)
-
-
-def test_baseline() -> None:
-    times = np.linspace(0.0, 4.0, 401)
-    record = Record(times, np.cos(2 * pi * times) + 0.3 + 0.2 * times)
-    np.testing.assert_array_equal(record.corrected("none").acceleration, record.acceleration)
-    assert record.corrected("mean").acceleration.mean() == pytest.approx(0.0, abs=1e-15)
-    slope, offset = np.polyfit(times, record.corrected("linear").acceleration, 1)
-    assert (slope, offset) == pytest.approx((0.0, 0.0), abs=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "units", "message"),
-    [
-        ("a.csv", "0,1\n1,2\n", None, "units: must be given"),
-        ("a.csv", "t,a (g)\n0,1\n1,2\n", "gal", "the file itself says 'g'"),
-        ("a.csv", "0,1\n1,x\n", "g", "line 2: '1,x'"),
-        ("a.csv", "0,1\n1,nan\n", "g", "line 2"),
-        ("a.csv", "0,1\n1,1\n1,2\n", "g", "line 3: time 1: must be greater than 1"),
-        ("a.csv", "0,1\n1,2,3\n", "g", "line 2"),
-        ("a.csv", "no numbers\n", "g", "no line of a time and an acceleration"),
-        ("a.csv", "0,1\n", "g", "must be at least 2"),
-        ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n", None, "2 accelerations, where its header says 3"),
-        ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n oops\n", None, "line 6: ' oops'"),
-        ("a.AT2", f"{AT2}NPTS= 2, DT= .005 SEC\n 1 nan\n", None, "sample 2 = nan"),
-        ("a.VT2", f"{AT2}VELOCITY\nNPTS= 2, DT= .005 SEC\n 1 2\n", None, "velocity or displacement"),
-    ],
-)
-def test_files_that_are_refused(tmp_path: Path, name: str, text: str, units: str | None, message: str) -> None:
-    with pytest.raises(InputError, match=name.replace(".", "[.]")) as error:
-        read_record(write(tmp_path, name, text), units=units)
-    assert message in str(error.value)
+# ---------------------------------------------------------------------------------- arguments
 
 
 @pytest.mark.parametrize(

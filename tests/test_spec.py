@@ -82,8 +82,9 @@ def test_defaults() -> None:
 
 
 def test_every_parameter_may_be_an_axis_and_a_case() -> None:
-    assert set(spec.Axes.model_fields) == set(variables.PARAMETERS)
-    assert set(spec.Case.model_fields) == {*variables.PARAMETERS, "label"}
+    of_a_record = {"scale", "time_scale"}
+    assert set(spec.Axes.model_fields) == {*variables.PARAMETERS, *of_a_record}
+    assert set(spec.Case.model_fields) == {*variables.PARAMETERS, *of_a_record, "label"}
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from slipsweep.resources import size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table
 from slipsweep.variables import RESULT_DTYPES
+
+if TYPE_CHECKING:
+    from slipsweep.plans import Plan
 
 #: A part of a grid: where it lies along each dimension.
 Block: TypeAlias = dict[str, slice]
@@ -26,6 +29,10 @@ Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
 BLOCK_CELLS = 4_000_000
 
+#: The same of a record: a cell takes some thousands of times as long, and no more than seconds
+#: of work are to be lost with a block.
+RECORD_BLOCK_CELLS = 100_000
+
 #: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
 #: 469 MB, of which 96 MB were its blocks.
 _BASE_MEMORY = 400_000_000
@@ -37,7 +44,7 @@ _WORKER_MEMORY = 250_000_000
 #: that leaves blocks of this many cells at least: tens of milliseconds of work, against the
 #: two that a block takes on its way.
 _BLOCKS_A_WORKER = 16
-_LEAST_CELLS = {"step": 10_000, "cycle": 500_000}
+_LEAST_CELLS = {"record": 1_000, "step": 10_000, "cycle": 500_000}
 
 #: Processes reckoned with where a scheduler has them.
 _UNKNOWN_WORKERS = 64
@@ -61,6 +68,11 @@ def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
         lengths[dim] = math.ceil(shape[dim] / pieces)
         cells *= lengths[dim]
     return {dim: lengths[dim] for dim in shape}
+
+
+def default_cells(spec: SweepSpec) -> int:
+    """Return how many cells of a sweep are solved and written at a time if nothing else is asked for."""
+    return BLOCK_CELLS if spec.record is None else RECORD_BLOCK_CELLS
 
 
 def block_memory(spec: SweepSpec, most: int) -> int:
@@ -96,9 +108,9 @@ def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
 
 def cells_shared(spec: SweepSpec, workers: int | None) -> int:
     """Return how many cells a block should have for workers to share a sweep evenly (None: a number unknown)."""
-    least = _LEAST_CELLS["step" if spec.solver.method == "step" else "cycle"]
+    solver = "record" if spec.record is not None else "step" if spec.solver.method == "step" else "cycle"
     share = spec.cells // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
-    return min(BLOCK_CELLS, max(least, share))
+    return min(default_cells(spec), max(_LEAST_CELLS[solver], share))
 
 
 def _cell_memory(spec: SweepSpec, blocks: int = 2) -> int:
@@ -132,7 +144,17 @@ def solve_here(
     int, Table
         The number of a block, and its results with their coordinates.
     """
-    from slipsweep.plans import plan_sweep  # imports numba: not for `info`, and not to be counted as computing time
-
     for number, block in blocks.items():
-        yield number, plan_sweep(**spec.arguments(block)).solve(progress)
+        yield number, plan_of(spec.arguments(block)).solve(progress)
+
+
+def plan_of(arguments: Mapping[str, Any]) -> "Plan":
+    """Return the plan of a sweep, harmonic or under a record, from `SweepSpec.arguments`."""
+    # both import numba: not for `info`, and not to be counted as computing time
+    if "record" in arguments:
+        from slipsweep.record_sweeps import plan_record
+
+        return plan_record(**arguments)
+    from slipsweep.plans import plan_sweep
+
+    return plan_sweep(**arguments)

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from slipsweep.blocks import Block, Progress, Solved
+from slipsweep.blocks import Block, Progress, Solved, plan_of
 from slipsweep.errors import InputError, RunError
 from slipsweep.parts import installation
 from slipsweep.spec import SweepSpec
@@ -163,9 +163,7 @@ def _solve(client: dict[str, str], arguments: dict[str, Any]) -> Table:
         from distributed import get_worker
 
         raise RunError(_mismatch(get_worker().address, installation(), client))
-    from slipsweep.plans import plan_sweep
-
-    return plan_sweep(**arguments).solve()
+    return plan_of(arguments).solve()
 
 
 def _mismatch(worker: str, found: dict[str, str] | None, client: dict[str, str]) -> str:

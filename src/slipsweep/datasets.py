@@ -17,7 +17,7 @@ from slipsweep.history import history_table
 from slipsweep.limits import AMPLITUDE_STEPS, limit_table
 from slipsweep.parameters import STEPS_PER_CYCLE
 from slipsweep.plans import Plan, Task, plan_friction_parameters, plan_sweep
-from slipsweep.record_sweeps import record_table
+from slipsweep.record_sweeps import plan_record
 from slipsweep.records import Record
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import RESULT_DTYPES
@@ -281,7 +281,7 @@ def sweep_record(
     mu_s: Values,
     *,
     scale: Values = 1.0,
-    time_scale: float | Sequence[float] | np.ndarray = 1.0,
+    time_scale: Values = 1.0,
     polarity: int | Sequence[int] | str = 1,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
@@ -291,6 +291,7 @@ def sweep_record(
     rise: str = "monotone",
     recoupling: str = "eq12",
     g: float = 9.81,
+    variables: Sequence[str] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Response of a sliding block to a recorded motion, over a grid of parameters.
@@ -307,7 +308,7 @@ def sweep_record(
         Plane inclination, degrees, and static friction coefficient.
     scale : float, array or DataArray
         Factor on the recorded acceleration, > 0.
-    time_scale : float or array
+    time_scale : float, array or DataArray
         Factor on its time, > 0: 2 makes it last twice as long.
     polarity : {1, -1}, list of these, or "both"
         Factor on the record: 1 takes its positive accelerations for those that move the block
@@ -316,6 +317,8 @@ def sweep_record(
         What replaces its estimate; by default each pulse has those of its own peak.
     model, rise, recoupling, g
         As in `sweep`.
+    variables : sequence of str, optional
+        Which of the results below to return, by default all.
     progress : callable, optional
         Called with the number of cells just finished, from any thread.
 
@@ -342,11 +345,17 @@ def sweep_record(
         "scale": scale,
         "time_scale": time_scale,
     }
-    table = record_table(
-        record, **_plain(given), polarity=polarity, model=model, rise=rise, recoupling=recoupling, g=g,
-        progress=progress,
-    )  # fmt: skip
-    return _dataset(table, _brought(given, table.coords))
+    plan = plan_record(
+        record,
+        **_plain(given),
+        polarity=polarity,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        g=g,
+        variables=variables,
+    )
+    return _dataset(plan.solve(progress), _brought(given, plan.coords))
 
 
 def limit_amplitude(

@@ -157,7 +157,9 @@ def _columns(
     """Choose the columns, coordinates first, and the grid they span."""
     coordinates = store.coordinate_names(file)
     results = [name for name in file.variables if name not in coordinates]
-    chosen = list(dict.fromkeys(results if wanted is None else wanted))
+    # the samples of a record are no cells: they are exported if asked for
+    cells = [name for name in results if store.RECORD_DIM not in file[name].dimensions]
+    chosen = list(dict.fromkeys(cells if wanted is None else wanted))
     for name in chosen:
         if name not in results:
             raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, results)}')

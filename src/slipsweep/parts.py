@@ -47,6 +47,8 @@ _SOURCES = (
     "parameters.py",
     "plans.py",
     "engine.py",
+    "records.py",
+    "record_sweeps.py",
     "spec.py",
     "blocks.py",
     "kernels/*.py",
@@ -68,7 +70,14 @@ def numerics() -> str:
 
 def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
     """What two runs must have in common for one to go on with the blocks of the other."""
-    return {"sweep file": spec.text, "solver": spec.solver.method, "--split": split, **installation()}
+    record = spec.record
+    return {
+        "sweep file": spec.text,
+        **({} if record is None else {"record": checksum({"t": record.times, "a": record.acceleration})}),
+        "solver": spec.solver.method,
+        "--split": split,
+        **installation(),
+    }
 
 
 def installation() -> dict[str, str]:

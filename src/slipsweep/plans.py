@@ -38,6 +38,7 @@ from slipsweep.variables import (
     DIMENSION_ORDER,
     FRICTION_PARAMETERS,
     PARAMETERS,
+    RECORD_RESULTS,
     REFERENCE,
     RESULT_DTYPES,
     RESULTS,
@@ -58,7 +59,7 @@ class Task:
     Attributes
     ----------
     solver : callable
-        `engine.solve` or `engine.friction_parameters`.
+        `engine.solve`, `engine.friction_parameters`, or what solves a record (`record_sweeps`).
     problem : Problem
     names : tuple of str
         Results to compute.
@@ -138,8 +139,9 @@ class Plan:
 
     def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> Table:
         """The results, with `evaluate` giving a task's arrays."""
+        described = RESULTS | RECORD_RESULTS
         found = {
-            name: Variable(tuple(task.sizes), values, RESULTS[name])
+            name: Variable(tuple(task.sizes), values, described[name])
             for task in self.tasks
             for name, values in evaluate(task).items()
         }

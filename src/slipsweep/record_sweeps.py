@@ -1,4 +1,4 @@
-"""A recorded motion over a grid of blocks: parameters in, a table out.
+"""A recorded motion over a grid of blocks: parameters in, a plan, a table out.
 
 A sweep over θ × μs × (given parameters) × scale goes through one kernel for each polarity;
 the factor on time needs none: everything depends on time only through t / time_scale, so that
@@ -6,24 +6,30 @@ v ∝ time_scale and u ∝ time_scale², exactly.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from slipsweep import engine, threads
+from slipsweep.engine import Array, Problem
 from slipsweep.errors import InputError
 from slipsweep.kernels.record import RECORD_KERNEL, History
-from slipsweep.plans import aligned, check_memory, check_options, checked, grid_sizes, record_attributes
+from slipsweep.parameters import check_choice
+from slipsweep.plans import Plan, Task, aligned, check_options, checked, grid_sizes, record_attributes
 from slipsweep.records import Record
-from slipsweep.tables import Table, Variable
-from slipsweep.variables import PARAMETERS, RECORD_COUNTS, RECORD_PARAMETERS, RESULTS
-
-#: Parameters of the block that a record may be swept over, those of `sweep` but for amplitude and frequency.
-BLOCK_PARAMETERS = ("theta", "mu_s", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
+from slipsweep.tables import Variable
+from slipsweep.variables import PARAMETERS, RECORD_COUNTS, RECORD_PARAMETERS, RECORD_RESULTS, RESULT_DTYPES
 
 #: What a cell of a record takes, in cells of the cycle solver: some 2 µs against 0.1.
 _WORK_PER_CELL = 32
+
+#: Cells solved together, wanted results or not (30 bytes each).
+_SOLVED_CELLS = 65536
+
+#: How the results change with a factor on time: as its power.
+_POWERS = {"permanent_displacement": 2, "peak_relative_velocity": 1}
 
 
 def history_of(record: Record, polarity: float) -> History:
@@ -38,80 +44,110 @@ def history_of(record: Record, polarity: float) -> History:
     )
 
 
-def record_table(
+def plan_record(
     record: Record,
     *,
-    model: str,
-    rise: str,
-    recoupling: str,
-    g: float,
-    progress: Callable[[int], None] | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    g: float = 9.81,
+    variables: Sequence[str] | None = None,
     **given: Any,
-) -> Table:
-    """The response of every block of a grid to a record; keyword arguments, results and errors of `sweep_record`."""
+) -> Plan:
+    """Plan of the response of every block of a grid to a record.
+
+    Parameters
+    ----------
+    record, model, rise, recoupling, g, given
+        Arguments of `slipsweep.sweep_record`; arrays with dimensions of their own are `Variable`.
+    variables : sequence of str, optional
+        Names from `variables.RECORD_RESULTS`, by default all.
+
+    Raises
+    ------
+    InputError
+        As `slipsweep.sweep_record`.
+    """
     if not isinstance(record, Record):
         raise InputError(f"record = {record!r}: must be a Record (slipsweep.read_record, slipsweep.Record)")
     problem = check_options(model=model, rise=rise, recoupling=recoupling, g=g)
-    polarity = _polarity(given.pop("polarity"))
+    wanted = tuple(RECORD_RESULTS if variables is None else variables)
+    for name in wanted:
+        check_choice("variables", name, RECORD_RESULTS)
+    polarity = _polarity(given.pop("polarity", 1))
     known = PARAMETERS | RECORD_PARAMETERS
-    coords = checked({name: values for name, values in given.items() if values is not None}, known)
-    for name in ("scale", "time_scale"):
-        if coords[name].values.ndim > 1:
-            raise InputError(f"{name}: an array of {coords[name].values.ndim} dimensions; must be a scalar or 1-D")
+    given = {"scale": 1.0, "time_scale": 1.0} | {name: values for name, values in given.items() if values is not None}
+    coords = checked({name: given[name] for name in known if name in given}, known)
     if model == "newmark":
         for name in ("decay_rate", "delta_mu", "minimum_friction"):
             if name in coords:
                 raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
-    solved = {name: variable for name, variable in coords.items() if name != "time_scale"}
-    sizes = grid_sizes(solved)
-    all_sizes = grid_sizes(coords) | polarity.sizes
-    count = math.prod(all_sizes.values())
-    check_memory(all_sizes, count * (2 * 8 + len(RECORD_COUNTS) * 4 + 2))
+    coords["polarity"] = polarity
+    sizes = grid_sizes(coords)
+    task = Task(partial(_solve, record), problem, wanted, sizes, aligned(coords, sizes))
+    return Plan(sizes, coords, (task,), wanted, record_attributes(problem, record.name, record.attrs))
 
-    inputs = aligned(solved, sizes)
-    inputs["amplitude"] = inputs.pop("scale")
-    rows = engine.cell_inputs(inputs, len(sizes))
-    grid = engine.layout(tuple(sizes.values()), None, [*rows, np.ones((1,) * len(sizes))])
-    flat, options = tuple(map(engine.flat, rows)), problem.options(True)
 
-    def solve(side: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The record with a polarity: displacements and velocities, counts, flags."""
-        history = history_of(record, side)
-        cells = math.prod(sizes.values())
-        motion, counts = np.empty((2, cells)), np.empty((len(RECORD_COUNTS), cells), np.int32)
-        validity = np.empty(cells, np.int16)
+def _solve(
+    record: Record,
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, np.ndarray]:
+    """Solve a grid; parameters but for the record, and results, as those of `engine.solve`."""
+    factor, polarity = arrays["time_scale"], arrays["polarity"]
+    inputs = engine.cell_inputs({**arrays, "amplitude": arrays["scale"]}, len(shape))
+    results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    # the dimensions that the kernel sees: along time_scale the laws of scaling serve, along polarity another history
+    own = tuple(max(values.shape[axis] for values in inputs) for axis in range(len(shape)))
+    rows = {str(at): values for at, values in enumerate(inputs)}
+    for side in np.ndindex(polarity.shape):
+        history = history_of(record, float(polarity[side]))
+        sided = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
+        for slab in engine.slabs(own, _SOLVED_CELLS):
+            # what of the results the slab's cells give
+            where = tuple(part if n > 1 else one for part, n, one in zip(slab, own, sided, strict=True))
+            cells = tuple(part.stop - part.start for part in slab)
+            shares = results[wanted[0]][where].size // math.prod(cells)
+            part = list(engine.cut(rows, slab).values())
+            told = None if progress is None else partial(_in_shares, progress, shares)
+            found = _solve_slab(problem, cells, part, history, told)
+            factors = engine.cut({"time_scale": factor}, where)["time_scale"]
+            for name, target in results.items():
+                values = found[name].reshape(cells)
+                target[where] = values * factors ** _POWERS[name] if name in _POWERS else values
+    return results
 
-        def work(first: int, last: int) -> None:
-            RECORD_KERNEL(grid, first, last, flat, options, history, motion, counts, validity)
-            if progress is not None:
-                progress(last - first)
 
-        threads.spread(cells, work, _WORK_PER_CELL)
-        return motion, counts, validity
+def _in_shares(progress: Callable[[int], None], shares: int, cells: int) -> None:
+    """Tell of cells solved, each of which gives several of the results."""
+    progress(cells * shares)
 
-    parts = [solve(float(side)) for side in np.atleast_1d(polarity.values)]
-    factor = coords["time_scale"]
-    stretched = {
-        "permanent_displacement": (np.stack([p[0][0] for p in parts], -1), 2),
-        "peak_relative_velocity": (np.stack([p[0][1] for p in parts], -1), 1),
-    }
-    whole = {name: np.stack([p[1][at] for p in parts], -1) for at, name in enumerate(RECORD_COUNTS)}
-    whole["validity"] = np.stack([p[2] for p in parts], -1)
 
-    # the cells' own dimensions, then time_scale, then polarity
-    def laid_out(values: np.ndarray, power: int) -> np.ndarray:
-        values = values.reshape(*sizes.values(), 1, values.shape[-1])
-        values = values * np.atleast_1d(factor.values)[:, None] ** power if power else values
-        shape = (*sizes.values(), *factor.values.shape, *polarity.values.shape)
-        target = np.broadcast_to(values, (*sizes.values(), max(factor.values.size, 1), values.shape[-1]))
-        return np.ascontiguousarray(target).reshape(shape)
+def _solve_slab(
+    problem: Problem,
+    cells: tuple[int, ...],
+    inputs: list[Array],
+    history: History,
+    progress: Callable[[int], None] | None,
+) -> dict[str, np.ndarray]:
+    """All results of some cells, each a row."""
+    grid = engine.layout(cells, None, [*inputs, np.ones((1,) * len(cells))])
+    rows, options, count = tuple(map(engine.flat, inputs)), problem.options(True), math.prod(cells)
+    motion, counts = np.empty((len(_POWERS), count)), np.empty((len(RECORD_COUNTS), count), np.int32)
+    validity = np.empty(count, np.int16)
 
-    dims = (*sizes, *factor.dims, *polarity.dims)
-    attributes: Mapping[str, Mapping[str, Any]] = RESULTS | RECORD_COUNTS
-    results = {name: laid_out(values, power) for name, (values, power) in stretched.items()}
-    results |= {name: laid_out(values, 0) for name, values in whole.items()}
-    data = {name: Variable(dims, values, attributes[name]) for name, values in results.items()}
-    return Table(coords | {"polarity": polarity}, data, record_attributes(problem, record.name, record.attrs))
+    def work(first: int, last: int) -> None:
+        RECORD_KERNEL(grid, first, last, rows, options, history, motion, counts, validity)
+        if progress is not None:
+            progress(last - first)
+
+    threads.spread(count, work, _WORK_PER_CELL)
+    return (
+        dict(zip(_POWERS, motion, strict=True)) | dict(zip(RECORD_COUNTS, counts, strict=True)) | {"validity": validity}
+    )
 
 
 def _polarity(given: Any) -> Variable:

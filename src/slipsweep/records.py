@@ -1,6 +1,6 @@
 """Recorded motions: files of acceleration against time, read with their units, baseline and polarity explicit.
 
-Three formats, told apart by what stands in the file (or by `file_format`):
+Four formats, told apart by what stands in the file (or by `file_format`):
 
 * **CSV**: a column of times (s) and one of accelerations; separators comma, semicolon, tab or blanks;
   a first line of names, and lines that begin with ``#``, may stand before the numbers.  The
@@ -8,11 +8,19 @@ Three formats, told apart by what stands in the file (or by `file_format`):
 * **PEER AT2**: four lines of header, the fourth with NPTS and DT, then accelerations in g.
 * **ESM / ITACA ASCII** (the European and Italian databases' text format): lines ``KEY: VALUE``
   (``SAMPLING_INTERVAL_S``, ``NDATA``, ``UNITS``), then accelerations, one a line.
+* **COSMOS V1, V2** (Consortium of Organizations for Strong-Motion Observation Systems, Strong Motion
+  Data Format 1.20, 2001): lines of text, 100 integers, 100 reals, comments, then values in a Fortran
+  format; a file may hold several channels.  Integers 2 and 3 are the physical parameter (1:
+  acceleration) and the code of the unit, real 62 the sampling interval in milliseconds.
+
+The readers are our own: ObsPy reads none of the four, and gmprocess, which reads COSMOS, brings some
+hundred packages along.  Values in COSMOS files need no blanks between them: they are read by columns.
 """
 
+import hashlib
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,8 +37,15 @@ STANDARD_GRAVITY = 9.80665
 
 #: Units of a recorded acceleration, in m/s².
 UNITS: dict[str, float] = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "cm/s2": 0.01, "gal": 0.01}
+
+#: A day of acceleration at 100 samples a second; what is larger is no record.
+MOST_BYTES = 200_000_000
+
 BASELINES = ("none", "mean", "linear")
-FORMATS = ("auto", "csv", "at2", "esm")
+FORMATS = ("auto", "csv", "at2", "esm", "cosmos")
+
+#: Codes of units in COSMOS files that are accelerations (Table 2 of the format).
+_COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +115,12 @@ class Record:
 
 
 def read_record(
-    path: str | Path, *, units: str | None = None, baseline: str = "none", file_format: str = "auto"
+    path: str | Path,
+    *,
+    units: str | None = None,
+    baseline: str = "none",
+    file_format: str = "auto",
+    channel: int | None = None,
 ) -> Record:
     """Read a recorded acceleration from a file.
 
@@ -112,8 +132,10 @@ def read_record(
         that contradicts the file's own is refused.  "g" is standard gravity, 9.80665 m/s².
     baseline : {"none", "mean", "linear"}
         What is taken off the accelerations.
-    file_format : {"auto", "csv", "at2", "esm"}
+    file_format : {"auto", "csv", "at2", "esm", "cosmos"}
         "auto" looks into the file.
+    channel : int, optional
+        Which channel of acceleration in a COSMOS file, from 1; needed where it holds several.
 
     Returns
     -------
@@ -130,12 +152,20 @@ def read_record(
     if units is not None:
         check_choice("units", units, UNITS)
     try:
-        # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
-        lines = path.read_bytes().decode("utf-8-sig", errors="replace").splitlines()
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f"{path}: {path.stat().st_size} bytes: a record must have {MOST_BYTES} at most")
+        content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
+    lines = content.decode("utf-8-sig", errors="replace").splitlines()
     kind = _format_of(lines) if file_format == "auto" else file_format
-    times, values, own = {"csv": _read_csv, "at2": _read_at2, "esm": _read_esm}[kind](path, lines)
+    if kind == "cosmos":
+        times, values, own = _read_cosmos(path, lines, channel)
+    elif channel is not None:
+        raise InputError(f"{path}: channel = {channel}: only COSMOS files hold several; this one is read as {kind}")
+    else:
+        times, values, own = {"csv": _read_csv, "at2": _read_at2, "esm": _read_esm}[kind](path, lines)
     if own is not None and units is not None and UNITS[own] != UNITS[units]:
         raise InputError(f"{path}: units = {units!r}: the file itself says {own!r}; leave units out, or give that")
     unit = own or units
@@ -143,12 +173,21 @@ def read_record(
         raise InputError(
             f"{path}: units: must be given, one of {', '.join(map(repr, UNITS))}: the file does not name the unit"
         )
-    attrs = {"record": path.name, "record_format": kind, "record_units": unit}
-    return Record(times, values * UNITS[unit], str(path), attrs).corrected(baseline)
+    attrs = {
+        "record": path.name,
+        "record_format": kind,
+        "record_units": unit,
+        **({} if channel is None else {"record_channel": str(channel)}),
+        "record_sha256": hashlib.sha256(content).hexdigest(),
+    }
+    with np.errstate(over="ignore"):  # what is not finite then is refused
+        return Record(times, values * UNITS[unit], str(path), attrs).corrected(baseline)
 
 
 def _format_of(lines: list[str]) -> str:
     """The format of a file, from its header."""
+    if lines and _COSMOS_HEAD.search(lines[0]):
+        return "cosmos"
     if any(re.search(r"NPTS\s*=", line, re.IGNORECASE) for line in lines[:6]):
         return "at2"
     if any(line.startswith("SAMPLING_INTERVAL_S:") for line in lines[:100]):
@@ -220,7 +259,7 @@ def _read_at2(path: Path, lines: list[str]) -> tuple[Floats, Floats, str | None]
     at = next((i for i, line in enumerate(lines[:6]) if re.search(r"NPTS\s*=", line, re.IGNORECASE)), None)
     if at is None:
         raise InputError(f"{path}: no NPTS= and DT= in its first lines: not a PEER AT2 file")
-    points = re.search(r"NPTS\s*=\s*(\d+)", lines[at], re.IGNORECASE)
+    points = re.search(r"NPTS\s*=\s*(\d{1,9})\b", lines[at], re.IGNORECASE)
     interval = re.search(r"DT\s*=\s*([0-9.eE+-]+)", lines[at], re.IGNORECASE)
     if points is None or interval is None or not _is_number(interval[1]):
         raise InputError(f"{path}: line {at + 1}: {_shown(lines[at])}: must give NPTS= and DT=")
@@ -246,10 +285,85 @@ def _read_esm(path: Path, lines: list[str]) -> tuple[Floats, Floats, str | None]
     unit = keys["UNITS"].lower().replace("^", "")
     if unit not in UNITS:
         raise InputError(f"{path}: UNITS = {keys['UNITS']!r}: must be one of {', '.join(map(repr, UNITS))}")
-    if not keys["NDATA"].isdigit() or not _is_number(keys["SAMPLING_INTERVAL_S"]):
+    if not re.fullmatch(r"[0-9]{1,9}", keys["NDATA"]) or not _is_number(keys["SAMPLING_INTERVAL_S"]):
         raise InputError(f"{path}: NDATA = {keys['NDATA']!r}, SAMPLING_INTERVAL_S: must be numbers")
     values = _numbers(path, enumerate(lines[body:], body + 1))
     return _sampled(path, values, int(keys["NDATA"]), float(keys["SAMPLING_INTERVAL_S"])), values, unit
+
+
+_COSMOS_HEAD = re.compile(r"\(Format v\s*[\d.]+ with\s+(\d{1,4})\s+text lines\)", re.IGNORECASE)
+# of each section's first line: how many numbers (or lines) follow, and how many columns each of them has
+_COSMOS_HEADER = r"\s*(\d{1,9})\s+%s-header values follow on\s+\d+\s+lines\s*,\s*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
+_COSMOS_COMMENTS = r"\s*(\d{1,9})\s+Comment line"
+_COSMOS_DATA = r"\s*(\d{1,9})\s+\w+.*?\bpts?\b.*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
+
+
+def _read_cosmos(path: Path, lines: list[str], channel: int | None) -> tuple[Floats, Floats, str | None]:
+    channels = list(_cosmos_channels(path, lines))
+    if channel is None and len(channels) > 1:
+        raise InputError(f"{path}: holds {len(channels)} channels of acceleration: give channel, from 1 on")
+    if not channels or not 1 <= (channel or 1) <= len(channels):
+        raise InputError(f"{path}: channel = {channel or 1}: it holds {len(channels)} channels of acceleration")
+    interval, values, unit = channels[(channel or 1) - 1]
+    return _sampled(path, values, values.size, interval), values, unit
+
+
+def _cosmos_channels(path: Path, lines: list[str]) -> Iterator[tuple[float, Floats, str]]:
+    """Channels of acceleration in a file: sampling interval (s), values, unit."""
+    at = 0
+    while at < len(lines):
+        head = _COSMOS_HEAD.search(lines[at])
+        if head is None:
+            if lines[at].strip():
+                raise InputError(f"{path}: line {at + 1}: {_shown(lines[at])}: must begin a channel of COSMOS format")
+            at += 1
+            continue
+        start = at
+        at, whole = _cosmos_values(path, lines, at + int(head[1]), _COSMOS_HEADER % "Integer")
+        at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
+        if whole.size < 3 or reals.size < 62:
+            raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
+        at += 1 + int(_cosmos_line(path, lines, at, _COSMOS_COMMENTS)[1])
+        at, values = _cosmos_values(path, lines, at, _COSMOS_DATA)
+        # what a V2 file may have behind the acceleration is its velocity and displacement
+        while at < len(lines) and not lines[at].lstrip().lower().startswith("end-of-data"):
+            at += 1
+        if at == len(lines):
+            raise InputError(f"{path}: no line End-of-data after the values: cut off, or damaged")
+        at += 1
+        if whole[1] != 1:
+            continue
+        if whole[2] not in _COSMOS_UNITS:
+            known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
+            raise InputError(f"{path}: code {whole[2]:.0f} for the unit of its values: must be one of {known}")
+        yield reals[61] / 1000.0, values, _COSMOS_UNITS[int(whole[2])]
+
+
+def _cosmos_line(path: Path, lines: list[str], at: int, pattern: str) -> re.Match[str]:
+    found = re.match(pattern, lines[at], re.IGNORECASE) if at < len(lines) else None
+    if found is None:
+        shown = _shown(lines[at]) if at < len(lines) else "the end of the file"
+        raise InputError(f"{path}: line {at + 1}: {shown}: not what the COSMOS format has here: damaged?")
+    return found
+
+
+def _cosmos_values(path: Path, lines: list[str], at: int, pattern: str) -> tuple[int, Floats]:
+    """A section: a line that says how many values follow and in what columns, then these; and the line after it."""
+    head = _cosmos_line(path, lines, at, pattern)
+    count, width = int(head[1]), int(head[2])
+    values: list[float] = []
+    while len(values) < count:
+        at += 1
+        line = lines[at].rstrip() if at < len(lines) else ""
+        if not line or line.lower().startswith("end-of-data"):
+            raise InputError(f"{path}: line {at + 1}: {len(values)} values, where {count} are announced")
+        try:
+            values.extend(float(line[i : i + width]) for i in range(0, len(line), width))
+        except ValueError:
+            raise InputError(f"{path}: line {at + 1}: {_shown(line)}: must be numbers, {width} columns each") from None
+    if len(values) > count:
+        raise InputError(f"{path}: line {at + 1}: {len(values)} values, where {count} are announced")
+    return at + 1, np.array(values)
 
 
 def _sampled(path: Path, values: Floats, points: int, interval: float) -> Floats:
@@ -262,7 +376,8 @@ def _sampled(path: Path, values: Floats, points: int, interval: float) -> Floats
 
 
 def _even(points: int, interval: float) -> Floats:
-    return np.arange(points, dtype=np.float64) * interval
+    with np.errstate(over="ignore"):
+        return np.arange(points, dtype=np.float64) * interval
 
 
 def _shown(line: str) -> str:

@@ -65,6 +65,11 @@ class Result:
             self.attrs: dict[str, Any] = {name: self._file.getncattr(name) for name in self._file.ncattrs()}
             if not str(self.attrs.get("source", "")).startswith("slipsweep ") or "sweep" not in self.attrs:
                 raise InputError(f'{path}: not a result of "slipsweep run"')
+            if "record" in self.attrs:
+                raise InputError(
+                    f"{path}: is the response to a recorded motion; charts are drawn of harmonic sweeps only "
+                    "(slipsweep export makes a table of it)"
+                )
             self._file.set_auto_mask(False)
             dims = [dim for dim in self._file.dimensions if dim != "label_length"]
             self.axes: dict[str, Floats] = {

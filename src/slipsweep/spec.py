@@ -21,9 +21,19 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from slipsweep.errors import InputError
 from slipsweep.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
+from slipsweep.records import Record, read_record
 from slipsweep.suggest import did_you_mean
 from slipsweep.tables import Variable
-from slipsweep.variables import DEFAULT_RESULTS, DIMENSION_ORDER, PARAMETERS, RESULT_DTYPES, RESULTS
+from slipsweep.variables import (
+    DEFAULT_RESULTS,
+    DIMENSION_ORDER,
+    PARAMETERS,
+    RECORD_PARAMETERS,
+    RECORD_RESULTS,
+    RECORD_SAMPLES,
+    RESULT_DTYPES,
+    RESULTS,
+)
 from slipsweep.waveforms import check_waveform
 
 if TYPE_CHECKING:
@@ -33,6 +43,15 @@ Floats = NDArray[np.float64]
 
 #: Parameters that [model] may give as one number for the whole sweep.
 _MODEL_PARAMETERS = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency")
+
+#: What shakes the block without a record, which has neither; `structure_frequency` is compared with the second.
+_HARMONIC = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
+
+#: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
+_INPUTS = PARAMETERS | {name: attrs for name, attrs in RECORD_PARAMETERS.items() if name != "polarity"}
+
+#: Keys of [excitation] that go with a record, and no other.
+_RECORD_KEYS = ("record", "units", "baseline", "format", "channel", "polarity")
 
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
@@ -85,6 +104,8 @@ class Axes(_Table):
     delta_mu: Axis | None = None
     minimum_friction: Axis | None = None
     structure_frequency: Axis | None = None
+    scale: Axis | None = None
+    time_scale: Axis | None = None
 
 
 class Case(_Table):
@@ -101,6 +122,8 @@ class Case(_Table):
     delta_mu: Number | None = None
     minimum_friction: Number | None = None
     structure_frequency: Number | None = None
+    scale: Number | None = None
+    time_scale: Number | None = None
 
 
 class Model(_Table):
@@ -126,18 +149,24 @@ class Harmonics(_Table):
 
 
 class Excitation(_Table):
-    """The shaking, but for its amplitude and frequency, which are axes."""
+    """The shaking, but for its amplitude and frequency, or the scales of a record, which are axes."""
 
     waveform: Literal["sine", "cosine", "triangle", "square", "harmonics"] = "sine"
     cycles: Annotated[Whole, Field(ge=1, le=MOST_CYCLES)] = 10
     harmonics: Harmonics | None = None
     ramp_in: Number = 0.0
     ramp_out: Number = 0.0
+    record: Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None = None
+    units: Literal["m/s2", "g", "cm/s2", "gal"] | None = None
+    baseline: Literal["none", "mean", "linear"] = "none"
+    format: Literal["auto", "csv", "at2", "esm", "cosmos"] = "auto"
+    channel: Annotated[Whole, Field(ge=1)] | None = None
+    polarity: Literal[1, -1, "both"] = 1
 
     @property
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments of `slipsweep.sweep`."""
-        return {**self.model_dump(exclude={"harmonics"}), "harmonics": self._columns()}
+        return {**self.model_dump(exclude={"harmonics", *_RECORD_KEYS}), "harmonics": self._columns()}
 
     def _columns(self) -> dict[str, Any] | None:
         return None if self.harmonics is None else self.harmonics.model_dump(exclude_none=True)
@@ -240,6 +269,8 @@ class SweepSpec:
         The tables of the sweep file.
     sampling : Sampling or None
         What [uncertainty] says; such a sweep gives statistics of the displacement.
+    record : Record, optional
+        The motion of [excitation] record.
     """
 
     source: str
@@ -251,6 +282,7 @@ class SweepSpec:
     solver: Solver
     output: Output
     sampling: "Sampling | None" = None
+    record: Record | None = None
 
     @property
     def shape(self) -> dict[str, int]:
@@ -279,6 +311,8 @@ class SweepSpec:
     def arguments(self, block: Mapping[str, slice] | None = None) -> dict[str, Any]:
         """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.plans.plan_sweep`).
 
+        Those of a record are for `slipsweep.record_sweeps.plan_record`.
+
         Parameters
         ----------
         block : mapping of dimension to slice, optional
@@ -293,16 +327,16 @@ class SweepSpec:
                 arguments[name] = values[block.get(dim, slice(None))]
             else:
                 arguments[name] = Variable((dim,), values[block.get(dim, slice(None))])
-        arguments |= {
-            **self.excitation.arguments,
-            "model": self.model.friction,
-            "g": self.model.g,
-            "solver": self.solver.method,
-            "rule": self.solver.rule,
-            "variables": list(self.output.variables),
-        }
+        arguments |= {"model": self.model.friction, "g": self.model.g, "variables": list(self.output.variables)}
         if self.model.friction == "mendez":
             arguments |= {"rise": self.model.rise, "recoupling": self.model.recoupling}
+        if self.record is not None:
+            return {"record": self.record, **arguments}
+        arguments |= {
+            **self.excitation.arguments,
+            "solver": self.solver.method,
+            "rule": self.solver.rule,
+        }
         if self.solver.steps_per_cycle is not None:
             arguments["steps_per_cycle"] = self.solver.steps_per_cycle
         return arguments
@@ -334,7 +368,7 @@ def load(path: str | Path) -> SweepSpec:
             if not is_netcdf:
                 file.seek(0)
                 # utf-8-sig: some editors put a byte-order mark in front
-                return parse(file.read().decode("utf-8-sig"), str(path))
+                return parse(file.read().decode("utf-8-sig"), str(path), path.parent)
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a sweep file: it is not UTF-8 text") from None
     except OSError as error:
@@ -347,18 +381,36 @@ def _load_result(path: Path) -> SweepSpec:
 
     try:
         with netCDF4.Dataset(path) as file:
-            attributes = {name: file.getncattr(name) for name in file.ncattrs() if name in ("sweep", "solver")}
+            attributes = {name: str(file.getncattr(name)) for name in file.ncattrs()}
+            kept = RECORD_SAMPLES.keys() <= file.variables.keys()
+            times, acceleration = (np.asarray(file[name][...]) if kept else None for name in RECORD_SAMPLES)
     except OSError:
         raise InputError(f"{path}: not a netCDF file") from None
     if "sweep" not in attributes:
         raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
-    spec = parse(attributes["sweep"], str(path))
+    about = {name: text for name, text in attributes.items() if name == "baseline" or name.startswith("record")}
+    record = None
+    if times is not None and acceleration is not None:
+        record = Record(times, acceleration, about.get("record", str(path)), about)
+    spec = parse(attributes["sweep"], str(path), path.parent, record)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
-    return spec.with_solver(attributes.get("solver", spec.solver.method))
+    ran: Any = attributes.get("solver", spec.solver.method)
+    return spec.with_solver(ran)
 
 
-def parse(text: str, source: str) -> SweepSpec:
-    """Check the text of a sweep file; `source` names it in errors. See `load`."""
+def parse(text: str, source: str, folder: Path | None = None, record: Record | None = None) -> SweepSpec:
+    """Check the text of a sweep file. See `load`.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        What to call it in errors.
+    folder : Path, optional
+        Where its record is looked for; by default the folder that the command runs in.
+    record : Record, optional
+        That record, as a result has kept it: then no file is read.
+    """
     try:
         # tomllib raises ValueError for integers too long to convert, RecursionError for deep nesting
         content = tomllib.loads(text)
@@ -374,10 +426,15 @@ def parse(text: str, source: str) -> SweepSpec:
         _check_model(file)
         _check_excitation(file.excitation)
         _check_variables(file, parameters)
+        if file.excitation.record is not None and record is None:
+            record = _read(file.excitation, folder or Path())
     except InputError as error:
         raise InputError(f"{source}: {_one_line(str(error))}") from None
     labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
-    return SweepSpec(source, text, parameters, labels, file.model, file.excitation, file.solver, file.output, sampling)
+    excitation, output = file.excitation, file.output
+    if excitation.record is not None and "variables" not in output.model_fields_set:
+        output = output.model_copy(update={"variables": list(RECORD_RESULTS)})
+    return SweepSpec(source, text, parameters, labels, file.model, excitation, file.solver, output, sampling, record)
 
 
 # ------------------------------------------------------------- from tables to parameters
@@ -385,12 +442,13 @@ def parse(text: str, source: str) -> SweepSpec:
 
 def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Parameter]:
     """Gather the inputs from [axes], [[cases]] and [model]: each once, none missing that is not drawn."""
-    axes = {name: axis for name in PARAMETERS if (axis := getattr(file.axes, name)) is not None}
+    _check_shaking(file)
+    axes = {name: axis for name in _INPUTS if (axis := getattr(file.axes, name)) is not None}
     cases = _cases(file.cases or [])
     # yield_acceleration = "coulomb" is None here: it only says what holds by default
     numbers = {name: value for name in _MODEL_PARAMETERS if (value := getattr(file.model, name)) is not None}
 
-    for name in PARAMETERS:
+    for name in _INPUTS:
         tables = {"axes": axes, "cases": cases, "model": numbers}
         places = [f"{table}.{name}" for table, names in tables.items() if name in names]
         if len(places) > 1:
@@ -399,10 +457,11 @@ def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Param
     if sampling is not None:
         sampling.check_given(tuple(given))
         given |= {*sampling.absolute}
-    for name in ("theta", "mu_s", "frequency"):
+    harmonic = file.excitation.record is None
+    for name in ("theta", "mu_s", *(["frequency"] if harmonic else [])):
         if name not in given:
             raise InputError(f"axes.{name}: missing: give it in [axes.{name}] or in every row of [[cases]]")
-    if not given & {"amplitude", "displacement_amplitude"}:
+    if harmonic and not given & {"amplitude", "displacement_amplitude"}:
         raise InputError("axes.amplitude: missing: give amplitude or displacement_amplitude, in [axes] or [[cases]]")
     if given >= {"amplitude", "displacement_amplitude"}:
         raise InputError("axes.displacement_amplitude: not allowed beside amplitude: give one of them")
@@ -413,7 +472,60 @@ def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Param
         if _first_bad(name, np.array([value])) is not None:
             raise InputError(f"model.{name} = {value}: must be {BOUNDS[name].text}")
         parameters[name] = Parameter(None, np.array(value))
-    return {name: parameters[name] for name in PARAMETERS if name in parameters}
+    if not harmonic:
+        sign = file.excitation.polarity
+        parameters["polarity"] = (
+            Parameter("polarity", np.array([1, -1])) if sign == "both" else Parameter(None, np.array(sign))
+        )
+    return {name: parameters[name] for name in PARAMETERS | RECORD_PARAMETERS if name in parameters}
+
+
+def _check_shaking(file: SweepFile) -> None:
+    """Refuse keys of a harmonic motion beside a record, and keys of a record without one."""
+    given = file.excitation.model_fields_set
+    if file.excitation.record is None:
+        for key in sorted(given & {*_RECORD_KEYS}):
+            raise InputError(f"excitation.{key}: only beside excitation.record, the file of a recorded motion")
+        for name in ("scale", "time_scale"):
+            if place := _place(file, name):
+                raise InputError(f"{place}: only with excitation.record, the file of a recorded motion")
+        return
+    why = "not allowed with excitation.record"
+    for key in sorted(given - {*_RECORD_KEYS}):
+        raise InputError(f"excitation.{key}: {why}, which is the shaking itself")
+    for name in _HARMONIC:
+        if place := _place(file, name):
+            instead = "; give scale, a factor on the recorded acceleration" if "amplitude" in name else ""
+            raise InputError(f"{place}: {why}{instead}")
+    if file.uncertainty is not None:
+        raise InputError(f"uncertainty: {why}; draw the inputs of a harmonic motion")
+    for key in sorted(file.solver.model_fields_set):
+        raise InputError(f"solver.{key}: {why}, to which the response is exact")
+    for name in ("decay_rate", "delta_mu", "minimum_friction"):
+        if file.model.friction == "newmark" and (place := _place(file, name)):
+            raise InputError(f'{place}: not allowed with friction = "newmark", which has no friction law')
+
+
+def _place(file: SweepFile, name: str) -> str | None:
+    """Where an input is given first, as errors name it."""
+    rows = {f"cases[row {number}]": row for number, row in enumerate(file.cases or (), 1)}
+    tables: dict[str, BaseModel] = {"axes": file.axes, **rows, "model": file.model}
+    return next((f"{key}.{name}" for key, table in tables.items() if getattr(table, name, None) is not None), None)
+
+
+def _read(excitation: Excitation, folder: Path) -> Record:
+    """Read the record that a sweep file names relative to itself."""
+    assert excitation.record is not None
+    try:
+        return read_record(
+            folder / excitation.record,
+            units=excitation.units,
+            baseline=excitation.baseline,
+            file_format=excitation.format,
+            channel=excitation.channel,
+        )
+    except InputError as error:
+        raise InputError(f"excitation.record: {error}") from None
 
 
 def _cases(rows: list[Case]) -> dict[str, Floats]:
@@ -504,10 +616,13 @@ def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> No
     variables = file.output.variables
     if file.uncertainty is not None and "variables" in file.output.model_fields_set:
         raise InputError("output.variables: not allowed beside [uncertainty], which has statistics as its results")
+    known = RESULTS if file.excitation.record is None else RECORD_RESULTS
+    if "variables" not in file.output.model_fields_set:
+        return
     for number, name in enumerate(variables, 1):
         where = f"output.variables[entry {number}] = {_show(name)}"
-        if name not in RESULTS:
-            raise InputError(f"{where}: unknown variable; {did_you_mean(name, tuple(RESULTS))}")
+        if name not in known:
+            raise InputError(f"{where}: unknown variable; {did_you_mean(name, tuple(known))}")
         if name in parameters:
             raise InputError(f"{where}: it is an input of this sweep, hence a coordinate of the result already")
         if name in variables[: number - 1]:
@@ -537,7 +652,7 @@ def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
     "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
     meant against the gravity that the block feels.
     """
-    own = PARAMETERS[name]["units"]
+    own = _INPUTS[name]["units"]
     if units is None or units in _OWN_UNITS[own]:
         return 1.0
     if own == "m s-2" and units == "g":

@@ -35,18 +35,24 @@ from slipsweep.blocks import (
     Solved,
     block_lengths,
     block_memory,
+    default_cells,
     grid_blocks,
+    plan_of,
     solve_here,
 )
 from slipsweep.errors import InputError, RunError
 from slipsweep.parts import sync
+from slipsweep.records import Record
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table, Variable
-from slipsweep.variables import RECORD_COUNTS, SlidingMode, Validity
+from slipsweep.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode, Validity
 
 #: Results that are whole numbers, -1 where there is no value.
 _WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
+
+#: Dimension of the samples of a record.
+RECORD_DIM = "record_sample"
 
 #: Name of a block's file in a folder that `run` made.
 _BLOCK_FILE = re.compile(r"block-\d{6,}\.nc")
@@ -211,7 +217,7 @@ def run(
         Write a folder with a netCDF file for each block.
     block_cells : int, optional
         Most cells to solve and write at a time; two such blocks are in memory.  By default
-        `BLOCK_CELLS`, or what an interrupted run had.
+        `blocks.default_cells`, or what an interrupted run had.
     shared_cells : int, optional
         As many cells or fewer, so that those who solve blocks share them evenly; but what an
         interrupted run had goes before.
@@ -254,7 +260,7 @@ def run(
                 return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
         else:
             work.clear()
-            block_cells = min(filter(None, (block_cells, shared_cells)), default=BLOCK_CELLS)
+            block_cells = min(filter(None, (block_cells, shared_cells)), default=default_cells(spec))
         # once more: a run that was writing it may have ended before this one got hold of the lock
         check_output(path, overwrite, folder=split)
         data = work.data(split)
@@ -348,8 +354,7 @@ def _write_blocks(
         nonlocal syncing
         with _writing(work.output):
             arrays = {
-                name: _rounded(name, result.values, target.spec.dtype(name))
-                for name, result in table.data_vars.items()
+                name: _rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
             }
             digest = examiner.submit(examine, arrays)
             target.write(number, cut[number], table, arrays)
@@ -386,10 +391,8 @@ class _OneFile:
     """All blocks in one netCDF file, each in its place."""
 
     def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
-        from slipsweep.plans import plan_sweep  # imports numba: not for `info`
-
         self.spec, self.data, self.command = spec, data, command
-        self.table = plan_sweep(**spec.arguments()).empty()
+        self.table = plan_of(spec.arguments()).empty()
         self.file: netCDF4.Dataset | None = None
 
     def __enter__(self) -> Self:
@@ -537,6 +540,17 @@ def _head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[st
     file.set_auto_maskandscale(False)
     for name, coordinate in table.coords.items():
         file[name][...] = coordinate.values
+    if spec.record is not None:
+        _embed(file, spec.record)
+
+
+def _embed(file: netCDF4.Dataset, record: Record) -> None:
+    """Write the samples of a record, from which the run can be repeated when its file is gone."""
+    file.createDimension(RECORD_DIM, record.times.size)
+    for name, values in zip(RECORD_SAMPLES, (record.times, record.acceleration), strict=True):
+        variable = file.createVariable(name, "f8", (RECORD_DIM,))
+        _describe(variable, RECORD_SAMPLES[name])
+        variable[:] = values
 
 
 def _nbytes(path: Path) -> int:
@@ -546,8 +560,13 @@ def _nbytes(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
-def write_table(table: Table, path: Path, *, title: str, command: str, overwrite: bool = False) -> None:
-    """Write a table that is in memory (a time history) by the rules that sweeps are written by."""
+def write_table(
+    table: Table, path: Path, *, title: str, command: str, overwrite: bool = False, record: Record | None = None
+) -> None:
+    """Write a table that is in memory (a time history) by the rules that sweeps are written by.
+
+    The `record` that it is the response to is written with it.
+    """
     check_output(path, overwrite)
     with (
         complete_or_absent(path, overwrite) as temporary,
@@ -559,6 +578,8 @@ def write_table(table: Table, path: Path, *, title: str, command: str, overwrite
         file.set_auto_maskandscale(False)
         for name, array in {**table.coords, **table.data_vars}.items():
             file[name][...] = array.values
+        if record is not None:
+            _embed(file, record)
 
 
 def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str, overwrite: bool = False) -> None:
@@ -571,7 +592,7 @@ def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str,
     ):
         _head(file, spec, table, spec.labels, command)
         for name, array in table.data_vars.items():
-            file[name][...] = array.values
+            file[name][...] = _rounded(name, array.values, spec.dtype(name))
 
 
 def without_time_axis(table: Table) -> Table:

@@ -96,6 +96,9 @@ DIMENSION_ORDER = (
     "delta_mu",
     "minimum_friction",
     "structure_frequency",
+    "scale",
+    "time_scale",
+    "polarity",
 )
 
 #: Inputs: attributes of their coordinates.
@@ -174,9 +177,39 @@ RECORD_PARAMETERS: dict[str, dict[str, Any]] = {
 
 #: Results of a record, beside the displacement, the velocity and the validity: -1 where there is no value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
-    "number_of_slips": {"units": "1", "long_name": "number of slips that begin at rest"},
-    "stick_slip_pulses": {"units": "1", "long_name": "number of pulses in stick-slip mode"},
-    "continuous_pulses": {"units": "1", "long_name": "number of pulses in continuous mode"},
+    "number_of_slips": {
+        "units": "1",
+        "long_name": "number of slips that begin at rest",
+        "ancillary_variables": "validity",
+    },
+    "stick_slip_pulses": {
+        "units": "1",
+        "long_name": "number of pulses in stick-slip mode",
+        "ancillary_variables": "validity",
+    },
+    "continuous_pulses": {
+        "units": "1",
+        "long_name": "number of pulses in continuous mode",
+        "ancillary_variables": "validity",
+    },
+}
+
+#: All that a sweep under a record returns.
+RECORD_RESULTS: dict[str, dict[str, Any]] = {
+    "permanent_displacement": RESULTS["permanent_displacement"],
+    "peak_relative_velocity": RESULTS["peak_relative_velocity"],
+    **RECORD_COUNTS,
+    "validity": RESULTS["validity"],
+}
+
+#: The record itself, in the files of results: what is read back to repeat a run.
+RECORD_SAMPLES: dict[str, dict[str, Any]] = {
+    "record_time": {"units": "s", "long_name": "time of a sample of the record"},
+    "record_acceleration": {
+        "units": "m s-2",
+        "long_name": "recorded acceleration of the plane, at scale and polarity 1",
+        "coordinates": "record_time",
+    },
 }
 
 #: Coordinates of the statistics of `sample`, beside the parameters.
@@ -218,7 +251,12 @@ STATISTICS: dict[str, dict[str, Any]] = {
 }
 
 #: dtype of each result; everything else is float64.
-RESULT_DTYPES: dict[str, str] = {"sliding_mode": "int8", "validity": "int16", "limit_status": "int8"}
+RESULT_DTYPES: dict[str, str] = {
+    "sliding_mode": "int8",
+    "validity": "int16",
+    "limit_status": "int8",
+    **dict.fromkeys(RECORD_COUNTS, "int32"),
+}
 
 #: What `sweep` returns when nothing is asked for by name.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")

@@ -54,6 +54,11 @@ def limit(
     from slipsweep import spec, store
 
     checked = spec.load(sweep)
+    if checked.record is not None:
+        raise InputError(
+            f"{sweep}: excitation.record: limit looks for the amplitude of a harmonic motion; "
+            "of a record sweep the scale"
+        )
     for path in outputs:
         if path.exists() and path.samefile(sweep):
             raise InputError(f"{path}: is the sweep itself; give another name with -o")

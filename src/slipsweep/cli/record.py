@@ -2,13 +2,12 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, progress_bar, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, echo_tally, progress_bar, typed_command
 from slipsweep.errors import InputError
-from slipsweep.variables import VALIDITY_TEXT, Validity
 
 EXAMPLE = "Example: slipsweep record motion.AT2 --theta 5 --mu-s 0.3:0.6:4 --scale 0.5,1,2 -o motion.nc"
 
@@ -17,7 +16,9 @@ _MOST_POINTS = 1_000_000
 
 
 def record(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV (time, acceleration), PEER AT2 or ESM text file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV (time, acceleration), PEER AT2, COSMOS or ESM text.")
+    ],
     theta: Annotated[str, typer.Option(metavar="VALUES", help="Plane inclinations, degrees: 5 or 0,5,10 or 0:20:41.")],
     mu_s: Annotated[str, typer.Option(metavar="VALUES", help="Static friction coefficients.")],
     scale: Annotated[str, typer.Option(metavar="VALUES", help="Factors on the acceleration.")] = "1",
@@ -33,8 +34,11 @@ def record(
         Literal["none", "mean", "linear"], typer.Option(help="What is taken off the accelerations.")
     ] = "none",
     file_format: Annotated[
-        Literal["auto", "csv", "at2", "esm"], typer.Option("--format", help="Format of the file.")
+        Literal["auto", "csv", "at2", "esm", "cosmos"], typer.Option("--format", help="Format of the file.")
     ] = "auto",
+    channel: Annotated[
+        int | None, typer.Option(help="Channel of acceleration in a COSMOS file that holds several, from 1.")
+    ] = None,
     yield_acceleration: Annotated[
         str | None, typer.Option(metavar="VALUES", help="Yield accelerations, m/s² (default: Coulomb's).")
     ] = None,
@@ -51,7 +55,7 @@ def record(
     rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
     recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
     g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compute the response to a recorded motion, over a grid of blocks and scales."""
     texts = {
@@ -64,35 +68,35 @@ def record(
         "delta_mu": delta_mu,
         "minimum_friction": minimum_friction,
     }
-    given = {name: numbers(name, text) for name, text in texts.items() if text is not None}
+    given: dict[str, Any] = {name: numbers(name, text) for name, text in texts.items() if text is not None}
 
     from slipsweep import store
     from slipsweep.records import read_record
     from slipsweep.resources import size_text
 
-    motion = read_record(file, units=units, baseline=baseline, file_format=file_format)
+    motion = read_record(file, units=units, baseline=baseline, file_format=file_format, channel=channel)
     if output is not None:
         store.check_output(output, overwrite)
 
     import numpy as np
 
-    from slipsweep.record_sweeps import record_table
+    from slipsweep.record_sweeps import plan_record
 
-    sizes = [len(values) for name, values in given.items() if isinstance(values, list) and name != "time_scale"]
-    cells = math.prod(sizes) * (2 if polarity == "both" else 1)
-    with progress_bar(cells, quiet) as progress:
-        table = record_table(
-            motion,
-            **given,
-            polarity=polarity if polarity == "both" else int(polarity),
-            model=model,
-            rise=rise,
-            recoupling=recoupling,
-            g=g,
-            progress=progress,
-        )
+    plan = plan_record(
+        motion,
+        **given,
+        polarity=polarity if polarity == "both" else int(polarity),
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        g=g,
+    )
+    with progress_bar(math.prod(plan.sizes.values()), quiet) as progress:
+        table = plan.solve(progress)
     if output is not None:
-        store.write_table(table, output, title=table.attrs["title"], command=typed_command(), overwrite=overwrite)
+        store.write_table(
+            table, output, title=table.attrs["title"], command=typed_command(), overwrite=overwrite, record=motion
+        )
     if quiet:
         return
     peak = float(np.abs(motion.acceleration).max())
@@ -117,10 +121,9 @@ def record(
         if (values >= 0).any():
             low, high = values[values >= 0].min(), values.max()
             typer.echo(f"{name.replace('_', ' '):<24}{low}" + (f" to {high}" if high > low else ""))
-    for flag in Validity:
-        share = np.count_nonzero(validity & int(flag)) / count
-        if share:
-            typer.echo(f"flag {(flag.name or '').lower():<24}{share:7.2%}  {VALIDITY_TEXT[flag]}")
+    tally = store.Tally(count)
+    tally.add({"validity": validity})
+    echo_tally(tally)
     if output is not None:
         typer.echo(f"{output}  {size_text(output.stat().st_size)}")
 

@@ -64,6 +64,8 @@ def run(
     if resume and overwrite:
         raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
     checked = spec.load(sweep)
+    if solver is not None and checked.record is not None:
+        raise InputError(f"--solver {solver}: not allowed with excitation.record, to which the response is exact")
     if solver is not None:
         checked = checked.with_solver(solver)
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")

@@ -146,16 +146,13 @@ def rise_piece(block: Block, state: np.ndarray, x: float, top: float, slope: flo
     """On a piece along which the plane's acceleration does not fall, x to `top` in the time `left`."""
     literal = block.rise == LITERAL
     for _ in range(_MOST_LEGS):
-        if x < block.yield_acceleration:
-            # below Üy nothing begins, and b is held
-            end = min(block.yield_acceleration, top)
-            taken = left if end == top else (end - x) / slope
-            if state[SLIDES] > 0.0:
-                hold(state, x, slope, taken)
-            x, left = end, left - taken
-            state[FOLLOWS] = 1.0 if literal else 0.0
-            if end == top:
+        if state[SLIDES] == 0.0:
+            # at rest, below Üy, nothing begins
+            if top <= block.yield_acceleration:
                 break
+            if x < block.yield_acceleration:
+                left -= (block.yield_acceleration - x) / slope
+                x = block.yield_acceleration
         if slope == 0.0:
             _flat_piece(block, state, x, left)
             break
@@ -168,6 +165,9 @@ def rise_piece(block: Block, state: np.ndarray, x: float, top: float, slope: flo
             state[HELD] = min(starting_acceleration(block, x), x)  # equal at an onset, but for rounding
             state[SLIDES], state[FOLLOWS] = 1.0, 1.0 if literal else 0.0
             state[SLIPS] += 1.0
+        elif not literal:
+            # where a fall before it has left b below what Eq. 4 asks at the beginning of the rise
+            state[HELD] = max(state[HELD], response(block, x))
         end, follows, follows_on = rising_leg(block, x, top, state[HELD], state[FOLLOWS] > 0.0)
         duration = left if end == top else min((end - x) / slope, left)
         if follows:
