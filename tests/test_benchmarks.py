@@ -12,6 +12,7 @@ WRITES = {
     "report": ["report.md"],
     "roofline": ["roofline.md"],
     "large_sweeps": ["large_sweeps.md", "scaling.md", "large_sweeps.json"],
+    "faults": ["faults.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
 }
