@@ -14,6 +14,7 @@ WRITES = {
     "large_sweeps": ["large_sweeps.md", "scaling.md", "large_sweeps.json"],
     "records": ["records.md"],
     "paper_waveforms": ["paper_waveforms.md", "paper_waveforms.png"],
+    "faults": ["faults.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
 }

@@ -2,57 +2,22 @@
 
 import json
 import os
-import random
 import shutil
-import signal
-import subprocess
-import sys
-import time
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import fault_rounds
 import filelock
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from fault_rounds import SWEEP, run, stopped, values
 
 from slipsweep import blocks, parts, spec, store
 from slipsweep.errors import InputError, RunError
-
-SWEEP = """
-[axes.theta]
-start = 0
-stop = 20
-num = 30
-[axes.mu_s]
-start = 0.2
-stop = 0.9
-num = 20
-[axes.amplitude]
-start = 0.5
-stop = 14
-num = 40
-[axes.frequency]
-start = 0.1
-stop = 20
-num = 10
-[output]
-variables = ["permanent_displacement", "sliding_mode", "limiting_acceleration"]
-"""
-
-CELLS = 4000  # 60 blocks
-
-
-def run(path: Path, text: str = SWEEP, **options: Any) -> store.Report:
-    return store.run(spec.parse(text, "a.toml"), path, command="x", **{"block_cells": CELLS, **options})
-
-
-def values(path: Path) -> dict[str, bytes]:
-    """Return all variables of a file, bit for bit."""
-    with netCDF4.Dataset(path) as file:
-        file.set_auto_maskandscale(False)
-        return {name: np.asarray(variable[...]).tobytes() for name, variable in file.variables.items()}
 
 
 @pytest.fixture(scope="module")
@@ -60,25 +25,6 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     path = tmp_path_factory.mktemp("undisturbed") / "a.nc"
     run(path, block_cells=10**9)
     return values(path)
-
-
-class Stop(BaseException):
-    pass
-
-
-def stopped(path: Path, after: int = 30, **options: Any) -> Path:
-    """Stop a run after some blocks; return its work folder."""
-
-    def solved(*arguments: object) -> object:
-        for count, item in enumerate(blocks.solve_here(*arguments)):  # type: ignore[arg-type]
-            if count == after:
-                raise Stop
-            yield item
-
-    with pytest.raises(Stop) as caught:
-        run(path, solved=solved, **options)
-    assert caught.value.__notes__ == [f"{after} of 60 blocks are kept; go on with --resume"]
-    return path.with_name(f"{path.name}.parts")
 
 
 def solved_on_resume(path: Path, **options: Any) -> list[int]:
@@ -93,6 +39,14 @@ def solved_on_resume(path: Path, **options: Any) -> list[int]:
     run(path, resume=True, solved=solved, **options)
     assert not path.with_name(f"{path.name}.parts").exists()
     return numbers
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A folder that another user can reach, which those of pytest are not."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
 
 
 def test_nothing_is_computed_twice(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
@@ -207,61 +161,43 @@ def test_split_opens_as_one_dataset_and_resumes(tmp_path: Path, undisturbed: dic
             assert dataset[name].values.tobytes() == expected, name
 
 
-def kill_rounds(folder: Path, undisturbed: dict[str, bytes], rounds: int, number: signal.Signals) -> int:
-    """Start runs as processes and end each at a random moment, resuming until done; return how many were ended."""
-    (folder / "a.toml").write_text(SWEEP)
-    seed = random.Random(7)
-    code = (
-        "import sys; from slipsweep import blocks, store; store.BLOCK_CELLS = 400; "
-        "from slipsweep.cli import main; sys.exit(main(['run', 'a.toml', '--resume', '-q']))"
-    )
-    journal = folder / "a.nc.parts" / "journal"
-    ended = 0
-    for _ in range(rounds):
-        before = journal.stat().st_mtime_ns if journal.exists() else None
-        process = subprocess.Popen([sys.executable, "-c", code], cwd=folder, stderr=subprocess.PIPE, text=True)
-        end = time.monotonic() + 60
-        # Ctrl-C while Python still imports is not ours to answer; a kill may come at any moment
-        while process.poll() is None and (
-            not journal.exists() or (number == signal.SIGINT and journal.stat().st_mtime_ns == before)
-        ):
-            assert time.monotonic() < end
-            time.sleep(0.01)
-        time.sleep(seed.uniform(0, 0.4))
-        process.send_signal(number)
-        errors = process.communicate(timeout=60)[1]
-        assert not (folder / "a.nc").exists() or process.returncode in (0, -number, 128 + number)
-        if process.returncode == 0:
-            break
-        ended += 1
-        if number == signal.SIGINT:
-            assert errors.startswith("slipsweep: interrupted; ")
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode == 2:  # the last one was killed when all was done
-        assert "a.nc: exists already" in done.stderr
-    assert values(folder / "a.nc") == undisturbed
-    assert {entry.name for entry in folder.iterdir()} == {"a.toml", "a.nc"}
-    return ended
+def one_round(name: str, folder: Path, undisturbed: dict[str, bytes], count: int = 1) -> int:
+    """Do a kind of fault; how many of it were done, and survived."""
+    if reason := fault_rounds.can_be_done(name):
+        pytest.skip(reason)
+    return fault_rounds.rounds([name], folder, 7, count, undisturbed)[name]
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends signals")
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT] if os.name == "posix" else [])
-def test_killed_at_a_random_moment(tmp_path: Path, undisturbed: dict[str, bytes], number: signal.Signals) -> None:
-    assert kill_rounds(tmp_path, undisturbed, 2, number)
+#: Kinds of faults that are done once in every run of the tests, and what stands in where one cannot be.
+OFTEN = (
+    fault_rounds.killed,
+    fault_rounds.interrupted,
+    fault_rounds.worker_killed,
+    fault_rounds.full_file_system,
+    fault_rounds.revoked_rights,
+    fault_rounds.damaged,
+    fault_rounds.competitor,
+)
+STANDS_IN: dict[fault_rounds.Fault, fault_rounds.Fault] = {
+    fault_rounds.full_file_system: fault_rounds.limited_file_size
+}
+
+
+@pytest.mark.parametrize("fault", OFTEN, ids=lambda fault: fault.__name__)
+def test_a_fault_is_survived(folder: Path, undisturbed: dict[str, bytes], fault: fault_rounds.Fault) -> None:
+    names = {other: name for name, other in fault_rounds.FAULTS.items()}
+    if fault_rounds.can_be_done(names[fault]):
+        fault = STANDS_IN.get(fault, fault)
+    assert one_round(names[fault], folder, undisturbed)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix", reason="sends signals")
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT] if os.name == "posix" else [])
-def test_killed_many_times(tmp_path: Path, undisturbed: dict[str, bytes], number: signal.Signals) -> None:
-    survived = 0
-    for attempt in range(10):
-        (tmp_path / str(attempt)).mkdir()
-        survived += kill_rounds(tmp_path / str(attempt), undisturbed, 5, number)
-    print(f"{survived} times ended by {number.name}, {survived} survived")
+@pytest.mark.parametrize("name", fault_rounds.FAULTS)
+def test_many_faults_are_survived(folder: Path, undisturbed: dict[str, bytes], name: str) -> None:
+    count = 100 if fault_rounds.FAULTS[name] is fault_rounds.damaged else 10
+    print(f"{one_round(name, folder, undisturbed, count)} times {name}: all survived")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="limits the size of files the POSIX way")
 def test_a_disk_that_fills_up_keeps_the_finished_blocks(
     tmp_path: Path, undisturbed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -131,7 +131,7 @@ def test_the_two_commands_of_the_readme() -> None:
 
 
 def test_figures_are_those_of_the_report() -> None:
-    """.ci/include-report copies benchmarks/results/report.md into README.md and docs/speed.md."""
+    """.ci/include-report copies the files of benchmarks/results into the pages that quote them."""
     done = subprocess.run([sys.executable, ROOT / ".ci" / "include-report", "--check"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 

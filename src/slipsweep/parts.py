@@ -158,6 +158,7 @@ class Folder:
         self.manifest: Manifest | None = None
         self.finished: dict[int, str] = {}  # number of a block: checksum
         self.complete = False
+        self.known = False  # whether `finished` and `complete` are what the folder holds
         self.done = False
 
     def data(self, split: bool) -> Path:
@@ -179,6 +180,7 @@ class Folder:
                     self.complete = True
                 elif number.isdecimal() and len(digest) == 64:  # not the torn line of a run that was killed
                     self.finished[int(number)] = digest
+        self.known = True
         try:
             head, _, content = (self.path / "manifest.json").read_text().partition("\n")
             if hashlib.sha256(content.encode()).hexdigest() != head:
@@ -193,12 +195,12 @@ class Folder:
 
     def clear(self) -> None:
         """Remove all that an earlier run left."""
-        self.manifest, self.finished, self.complete = None, {}, False
         for entry in self.path.iterdir():
             if entry.is_dir():
                 shutil.rmtree(entry)
             elif entry.name != "lock":
                 entry.unlink()
+        self.manifest, self.finished, self.complete, self.known = None, {}, False, True
 
     def begin(self, manifest: Manifest) -> None:
         """Write the manifest, after which blocks may be added."""
@@ -257,7 +259,7 @@ def opened(path: Path) -> Iterator[Folder]:
     try:
         yield folder
     finally:
-        if folder.done or not (folder.path / "journal").exists() or not (folder.finished or folder.complete):
+        if folder.done or (folder.known and not (folder.finished or folder.complete)):
             shutil.rmtree(folder.path, ignore_errors=True)
         lock.release()
 

@@ -418,8 +418,13 @@ class _OneFile:
     def open(self, nbytes: int) -> bool:
         """Open the file of an earlier run; whether all but its blocks is as it should be."""
         try:
-            if self.data.stat().st_size < nbytes:
-                os.truncate(self.data, nbytes)  # what was cut off is zeros: the blocks that are whole can be read
+            # what the system refuses (rights, a disk that does not answer) is no damage: blocks are not thrown away
+            with self.data.open("r+b") as file:
+                if file.seek(0, os.SEEK_END) < nbytes:
+                    file.truncate(nbytes)  # what was cut off is zeros: the blocks that are whole can be read
+        except FileNotFoundError:
+            return False
+        try:
             self.file = netCDF4.Dataset(self.data, "r+")
             self.file.set_auto_maskandscale(False)
             return all(
