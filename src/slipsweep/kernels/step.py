@@ -59,7 +59,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.excitation import Wave, offset_at, phase_at, plane
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
+from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of, yield_governs
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -344,12 +344,12 @@ def rise_step(
     wave, amplitude, literal = steps.wave, block.amplitude, block.rise == LITERAL
     begin, end, at = node(steps, p, k), node(steps, p, k + 1), steps.offset[p] + 2 * k
     x_end, located = amplitude * steps.nodes[at + 2], True
-    if state[SLIDES] == 0.0 and x < block.yield_acceleration:
-        if x_end <= block.yield_acceleration:
-            return
-        x, located = block.yield_acceleration, False
     for _ in range(_MOST_EVENTS + options.steps_per_cycle):
         if state[SLIDES] == 0.0:
+            if x < block.yield_acceleration:
+                if x_end <= block.yield_acceleration:
+                    break
+                x, located = block.yield_acceleration, False
             if block.rise == NEWMARK or slip(block, x) > 0.0:
                 held = starting_acceleration(block, x)
             else:
@@ -779,7 +779,9 @@ def stick_slip_lanes(
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
                 moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
-            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs(block, wave) else 0)
+            slides = first_pulse(block, wave, 0) < wave.height.size
+            validity = EQ4_BELOW_YIELD if slides and yield_governs(block, wave) else 0
+            answer = Motion(moved, states[_PEAK + j], validity)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
         codes[1, where[j]] |= answer.validity
         if answer.validity & NO_VALUE:
