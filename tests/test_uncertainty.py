@@ -439,24 +439,6 @@ def test_a_result_is_repeated_from_itself(folder: Path) -> None:
     assert (refused.returncode, "exists already" in refused.stderr) == (2, True)
 
 
-def test_the_file_follows_the_conventions(folder: Path) -> None:
-    with netCDF4.Dataset(folder / "fragile.nc") as file:
-        assert file.Conventions == "CF-1.11"
-        assert list(file["flag"].flag_values) == [1, 2, 4, 8, 16, 32, 64, 128]
-        assert file["threshold"].units == "m"
-    checker = pytest.importorskip("compliance_checker.runner")
-    checker.CheckSuite.load_all_available_checkers()
-    report = folder / "report.json"
-    checker.ComplianceChecker.run_checker(
-        str(folder / "fragile.nc"), ["cf:1.11"], verbose=0, criteria="strict", output_filename=str(report),
-        output_format="json",
-    )  # fmt: skip
-    found = json.loads(report.read_text())["cf:1.11"]
-    assert [
-        entry["msgs"] for group in ("high_priorities", "medium_priorities") for entry in found[group] if entry["msgs"]
-    ] == []
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
