@@ -147,6 +147,20 @@ def test_of_a_displacement_amplitude() -> None:
     assert found.mode_share.dims == ("displacement_amplitude", "frequency", "mode")
 
 
+def test_of_a_frequency_without_an_axis() -> None:
+    """A drawn frequency enters u = W/ω², and with a displacement amplitude A = ω²d as well."""
+    uncertain = {"frequency": {"distribution": "uniform", "loc": 1.0, "scale": 2.0}}
+    frequency = drawn(uncertain, samples=64)["frequency"]
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
+    drives: list[dict[str, Any]] = [{"amplitude": 4.0}, {"displacement_amplitude": 0.03}]
+    for drive in drives:
+        found = slipsweep.sample(**block, **drive, uncertain=uncertain, samples=64)
+        swept = slipsweep.sweep(**block, **drive, frequency=np.sort(frequency)).permanent_displacement
+        np.testing.assert_allclose(found.displacement_quantile.sel(quantile=0.5), swept.median(), rtol=1e-12)
+        assert found.mean_displacement.dims == ()
+        assert ("amplitude" in found.coords) == ("amplitude" in drive)
+
+
 def test_the_scaling_law() -> None:
     """u = W/ω²: twice the frequency, a quarter of every quantile, and P(u > d/4) what P(u > d) was."""
     options: dict[str, Any] = {"uncertain": {"amplitude": FACTOR}, "samples": 512}
