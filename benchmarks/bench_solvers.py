@@ -70,3 +70,33 @@ class History:
 
     def time_simulate(self) -> None:
         slipsweep.simulate(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59)
+
+
+class Sampling:
+    """Uncertain inputs: a million samples at one grid point, and 4096 at each of many."""
+
+    params = ("sobol", "latin_hypercube", "random")
+    param_names = ("method",)
+
+    def setup(self, method: str) -> None:
+        self.options: dict[str, Any] = {
+            "theta": 5.0,
+            "method": method,
+            "uncertain": {
+                "mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.38},
+                "amplitude": {"distribution": "lognorm", "s": 0.3, "kind": "factor"},
+                "theta": {"distribution": "norm", "scale": 0.5, "kind": "offset"},
+            },
+        }
+        self.time_million(method)
+
+    def time_million(self, method: str) -> None:
+        slipsweep.sample(**self.options, amplitude=4.0, frequency=1.0, samples=2**20)
+
+    def time_grid(self, method: str) -> None:
+        slipsweep.sample(
+            **self.options, amplitude=np.linspace(0.5, 12.0, 500), frequency=np.geomspace(0.1, 10.0, 50), samples=4096
+        )
+
+    def peakmem_grid(self, method: str) -> None:
+        self.time_grid(method)

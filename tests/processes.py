@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import pytest
+
 SLIPSWEEP = (sys.executable, "-m", "slipsweep")
 
 #: Long enough for kernels to be compiled on a busy machine.
@@ -30,3 +32,21 @@ def slipsweep(
         check=False,
         preexec_fn=preexec_fn,
     )
+
+
+def on_a_terminal(folder: Path, *arguments: str, environment: Mapping[str, str] | None = None) -> str:
+    """What a command writes to a terminal, by either stream."""
+    pty = pytest.importorskip("pty", reason="opens a pseudo-terminal")
+    reader, writer = pty.openpty()
+    seen = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "100", "PYTHONUTF8": "1", **(environment or {})}
+    with subprocess.Popen([*SLIPSWEEP, *arguments], cwd=folder, env=seen, stdout=writer, stderr=writer) as process:
+        os.close(writer)
+        read = b""
+        try:
+            while part := os.read(reader, 10_000):
+                read += part
+        except OSError:  # how Linux says that the other end is closed
+            pass
+        process.wait(TIMEOUT)
+    os.close(reader)
+    return read.decode()

@@ -60,12 +60,28 @@ values = [0.3, 0.4]
 values = [1, 2]
 """
 
-NAMES = ("grid", "cases", "displacements", "history", "record")
+#: Statistics, with samples that have no value and a slope on which none has.
+STATISTICS = """
+[axes.theta]
+values = [0, 15, 60]
+[axes.amplitude]
+values = [2, 4]
+[axes.frequency]
+values = [1, 2]
+[uncertainty]
+samples = 64
+[uncertainty.mu_s]
+distribution = "lognorm"
+s = 0.2
+scale = 0.3
+"""
+
+NAMES = ("grid", "cases", "displacements", "statistics", "history", "record")
 
 
 def run(*arguments: str | Path, folder: Path) -> str:
     done = subprocess.run(
-        [*map(str, arguments)], cwd=folder, capture_output=True, encoding="utf-8", timeout=120, check=False
+        [*map(str, arguments)], cwd=folder, capture_output=True, encoding="utf-8", timeout=300, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -76,7 +92,13 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one file of every kind."""
     folder = tmp_path_factory.mktemp("files")
     slipsweep = (sys.executable, "-m", "slipsweep")
-    for name, text in (("grid", GRID), ("cases", CASES), ("displacements", DISPLACEMENTS), ("record", RECORD)):
+    for name, text in (
+        ("grid", GRID),
+        ("cases", CASES),
+        ("displacements", DISPLACEMENTS),
+        ("statistics", STATISTICS),
+        ("record", RECORD),
+    ):
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
         run(*slipsweep, "run", f"{name}.toml", "--quiet", folder=folder)
     run(
@@ -110,6 +132,7 @@ def test_the_files_hold_what_is_to_be_read(files: Path) -> None:
     stored = numbers(files / "grid.nc")
     assert {*stored["sliding_mode"].flat} == {-1, 0, 1, 2}
     assert np.isnan(stored["permanent_displacement"]).any()
+    assert np.isnan(numbers(files / "statistics.nc")["displacement_quantile"]).any()
     assert np.bitwise_or.reduce(stored["validity"], axis=None) & (1 | 16 | 64 | 128) == (1 | 16 | 64 | 128)
 
 
@@ -196,10 +219,12 @@ def test_cdo_reads_every_variable(files: Path, name: str) -> None:
     cdo, ncks, ncwa = program("cdo"), program("ncks"), program("ncwa")
     with netCDF4.Dataset(files / f"{name}.nc") as file:
         coordinates = coordinate_names(file)
-        cut = list(file.dimensions)[:-3]
+        widest = max((variable.dimensions for variable in file.variables.values()), key=len)
+        cut = list(widest)[:-3]
         dims = {variable: file[variable].dimensions for variable in file.variables}
     stored = numbers(files / f"{name}.nc")
     for place in ([1, 0], [2, 0]) if cut else ([],):
+        place = place[: len(cut)]
         path = f"{name}.nc"
         where = dict(zip(cut, place, strict=True))
         if cut:
@@ -223,11 +248,12 @@ def test_octave_reads_every_variable(files: Path, name: str) -> None:
         f"fprintf(f, '%.17g\\n', double(x)); fclose(f);\n"
         for key in stored
     )
-    script += f"m = ncreadatt('{name}.nc', 'validity', 'flag_masks'); printf('%d ', m); "
-    script += f"printf('\\n%s\\n', ncreadatt('{name}.nc', 'validity', 'flag_meanings'));\n"
+    flags, bits = ("flag", "flag_values") if name == "statistics" else ("validity", "flag_masks")
+    script += f"m = ncreadatt('{name}.nc', '{flags}', '{bits}'); printf('%d ', m); "
+    script += f"printf('\\n%s\\n', ncreadatt('{name}.nc', '{flags}', 'flag_meanings'));\n"
     done = subprocess.run(
         [octave, "--no-gui", "--norc", "--quiet", "--eval", script],
-        cwd=files, env={**os.environ, "HOME": str(folder)}, capture_output=True, text=True, timeout=120, check=False,
+        cwd=files, env={**os.environ, "HOME": str(folder)}, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     if "package netcdf" in done.stderr:
         pytest.skip("Octave has no package netcdf")

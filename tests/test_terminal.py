@@ -1,38 +1,16 @@
 """Terminal manners: help, completion, plain output where nobody looks, suggestions."""
 
-import os
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
-from processes import SLIPSWEEP, slipsweep
+from processes import on_a_terminal, slipsweep
 
 COMMANDS = ("run", "info", "export", "simulate")
 SWEEP = "".join(
     f"[axes.{name}]\nvalues = [{value}]\n"
     for name, value in (("theta", 5), ("mu_s", 0.4), ("amplitude", 3), ("frequency", 1))
 )
-
-
-def on_a_terminal(folder: Path, *arguments: str, **environment: str) -> str:
-    """What a command writes to a terminal, by either stream."""
-    pty = pytest.importorskip("pty", reason="opens a pseudo-terminal")
-    reader, writer = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "100", "PYTHONUTF8": "1"} | environment
-    with subprocess.Popen(
-        [*SLIPSWEEP, *arguments], cwd=folder, env=environment, stdout=writer, stderr=writer
-    ) as process:
-        os.close(writer)
-        read = b""
-        try:
-            while part := os.read(reader, 10_000):
-                read += part
-        except OSError:  # how Linux says that the other end is closed
-            pass
-        process.wait(60)
-    os.close(reader)
-    return read.decode()
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -51,7 +29,7 @@ def test_help_on_a_terminal(tmp_path: Path) -> None:
     assert "\x1b[" in text
     assert "╭" in text
     assert "Examples:" in text
-    plain = on_a_terminal(tmp_path, "export", "--help", NO_COLOR="1")
+    plain = on_a_terminal(tmp_path, "export", "--help", environment={"NO_COLOR": "1"})
     assert "Examples:" in plain
     assert "\x1b" not in plain
 
@@ -68,7 +46,7 @@ def test_the_examples_are_good_commands(tmp_path: Path) -> None:
 def test_progress_has_no_colour_when_none_is_wanted(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(SWEEP)
     coloured = on_a_terminal(tmp_path, "run", "a.toml", "-o", "a.nc")
-    plain = on_a_terminal(tmp_path, "run", "a.toml", "-o", "b.nc", NO_COLOR="1")
+    plain = on_a_terminal(tmp_path, "run", "a.toml", "-o", "b.nc", environment={"NO_COLOR": "1"})
     colour = r"\x1b\[[\d;]*3[0-9](;[\d;]+)?m"
     assert re.search(colour, coloured)
     assert "100%" in plain

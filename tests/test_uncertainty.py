@@ -147,6 +147,20 @@ def test_of_a_displacement_amplitude() -> None:
     assert found.mode_share.dims == ("displacement_amplitude", "frequency", "mode")
 
 
+def test_of_a_frequency_without_an_axis() -> None:
+    """A drawn frequency enters u = W/ω², and with a displacement amplitude A = ω²d as well."""
+    uncertain = {"frequency": {"distribution": "uniform", "loc": 1.0, "scale": 2.0}}
+    frequency = drawn(uncertain, samples=64)["frequency"]
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
+    drives: list[dict[str, Any]] = [{"amplitude": 4.0}, {"displacement_amplitude": 0.03}]
+    for drive in drives:
+        found = slipsweep.sample(**block, **drive, uncertain=uncertain, samples=64)
+        swept = slipsweep.sweep(**block, **drive, frequency=np.sort(frequency)).permanent_displacement
+        np.testing.assert_allclose(found.displacement_quantile.sel(quantile=0.5), swept.median(), rtol=1e-12)
+        assert found.mean_displacement.dims == ()
+        assert ("amplitude" in found.coords) == ("amplitude" in drive)
+
+
 def test_the_scaling_law() -> None:
     """u = W/ω²: twice the frequency, a quarter of every quantile, and P(u > d/4) what P(u > d) was."""
     options: dict[str, Any] = {"uncertain": {"amplitude": FACTOR}, "samples": 512}
@@ -439,24 +453,6 @@ def test_a_result_is_repeated_from_itself(folder: Path) -> None:
     assert (refused.returncode, "exists already" in refused.stderr) == (2, True)
 
 
-def test_the_file_follows_the_conventions(folder: Path) -> None:
-    with netCDF4.Dataset(folder / "fragile.nc") as file:
-        assert file.Conventions == "CF-1.11"
-        assert list(file["flag"].flag_values) == [1, 2, 4, 8, 16, 32, 64, 128]
-        assert file["threshold"].units == "m"
-    checker = pytest.importorskip("compliance_checker.runner")
-    checker.CheckSuite.load_all_available_checkers()
-    report = folder / "report.json"
-    checker.ComplianceChecker.run_checker(
-        str(folder / "fragile.nc"), ["cf:1.11"], verbose=0, criteria="strict", output_filename=str(report),
-        output_format="json",
-    )  # fmt: skip
-    found = json.loads(report.read_text())["cf:1.11"]
-    assert [
-        entry["msgs"] for group in ("high_priorities", "medium_priorities") for entry in found[group] if entry["msgs"]
-    ] == []
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -508,6 +504,8 @@ def test_other_commands_say_what_they_want(folder: Path, capsys: pytest.CaptureF
     assert "limits are those of a sweep without [uncertainty]" in capsys.readouterr().err
     assert main(["chart", path, "--kind", "contours"]) == 2
     assert "permanent_displacement: no such variable" in capsys.readouterr().err
+    assert main(["explore", path]) == 2
+    assert "which slipsweep chart draws" in capsys.readouterr().err
     assert main(["info", path]) == 0
     assert "exceedance_probability" in capsys.readouterr().out
 

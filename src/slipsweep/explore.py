@@ -130,6 +130,8 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     """
     with store.open_result(path) as file:
         file.set_auto_mask(False)
+        if "exceedance_probability" in file.variables:
+            raise InputError(f"{path}: holds statistics of uncertain inputs, which slipsweep chart draws")
         if "permanent_displacement" not in file.variables:
             raise InputError(
                 f"{path}: holds no permanent_displacement to draw; add it to output.variables and run the sweep again"

@@ -447,8 +447,9 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     # what has no value of its own is planned for with one of its draws
     stand_ins = {name: float(draws[name][0]) for name in sampling.absolute}
     plan = plan_sweep(**{**given, **stand_ins}, variables=["permanent_displacement"])
-    # A = ω²d of the stand-ins is nobody's amplitude
-    dropped = {*stand_ins} | ({"amplitude"} if {"displacement_amplitude", "frequency"} & {*stand_ins} else set())
+    dropped = {*stand_ins}
+    if "displacement_amplitude" in plan.coords and {"displacement_amplitude", "frequency"} & dropped:
+        dropped.add("amplitude")  # A = ω²d of the stand-ins is nobody's amplitude
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     _check_draws(sampling, draws, [name for name in sampling.distributions if name not in stand_ins], coords)
     attrs = {**plan.attrs, "title": TITLE, **sampling.attributes}
