@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, versine
+from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, sine_after, versine
 from slipsweep.equations import CONTINUOUS, STUCK
 from slipsweep.kernels.block import (
     EVENT_TOLERANCE,
@@ -75,7 +75,7 @@ def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple
         width = right - left
         rate, moment = 0.0, 0.0
         for node in range(_NODES.size):
-            weighted = _WEIGHTS[node] * slip(block, amplitude * (1.0 - versine(left + width * _NODES[node])))
+            weighted = _WEIGHTS[node] * slip(block, amplitude * sine_after(left, width * _NODES[node]))
             rate += weighted
             moment += (1.0 - _NODES[node]) * weighted
         second += (first + moment * width) * width
@@ -410,9 +410,15 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     return Motion(displacement, peak, 0)
 
 
+@scalar
+def drift_rate(block: Block, x: float) -> float:
+    """tan θ x (μs − tan θ − μ), half of what V gains at x and at −x together; where μ is huge, tan θ x is not."""
+    return block.tan_theta * x * (block.mu_s - block.tan_theta - friction(block, x))
+
+
 @summed
 def drift_integral(block: Block) -> float:
-    """Gain of V over a whole cycle, 4 tan θ ∫ x (μs − tan θ − μ) dψ over a quarter.
+    """Gain of V over a whole cycle, 4 ∫ tan θ x (μs − tan θ − μ) dψ over a quarter.
 
     The sum of the two half cycles with g cancelled by hand: over 10⁶ cycles the rounding
     of that cancellation would show.
@@ -426,13 +432,13 @@ def drift_integral(block: Block) -> float:
         width = right - left
         part = 0.0
         for node in range(_NODES.size):
-            x = block.amplitude * (1.0 - versine(left + width * _NODES[node]))
-            part += _WEIGHTS[node] * x * (block.mu_s - block.tan_theta - friction(block, x))
+            x = block.amplitude * sine_after(left, width * _NODES[node])
+            part += _WEIGHTS[node] * drift_rate(block, x)
         total += part * width
         left = right
         if e_foldings <= bound:
             break
-    return 4.0 * block.tan_theta * total
+    return 4.0 * total
 
 
 @scalar

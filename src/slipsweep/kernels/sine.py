@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from slipsweep import equations as eq
-from slipsweep.elementary import angle_minus_sine, inverse_versine, versine
+from slipsweep.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     AMPLITUDE,
@@ -38,6 +38,7 @@ from slipsweep.kernels.block import (
     lane_friction,
     lane_of,
     lane_response,
+    lane_slip,
     whole_lanes,
 )
 from slipsweep.kernels.cycle import continuous_displacement, held_motion, solve
@@ -131,7 +132,7 @@ def lane_onset(count: int, way: int, g: float, lanes: np.ndarray) -> None:
             lanes[_LEVEL + j] = x + step
             lanes[_CONVERGED + j] = 1.0 if abs(step) <= _LANE_TOLERANCE * x else 0.0
     for j in range(count):
-        lanes[_START + j] = -inverse_versine((lanes[AMPLITUDE + j] - lanes[_LEVEL + j]) / lanes[AMPLITUDE + j])
+        lanes[_START + j] = rising_phase(lanes[_LEVEL + j], lanes[AMPLITUDE + j])
 
 
 @scalar
@@ -157,7 +158,7 @@ def lane_rise(count: int, way: int, g: float, lanes: np.ndarray) -> None:
     for j in range(count):
         amplitude, x = lanes[AMPLITUDE + j], lanes[_X + j]
         # no earlier than the start, from which it may differ by the roundings of two roots
-        psi = max(-inverse_versine((amplitude - x) / amplitude), lanes[_START + j])
+        psi = max(rising_phase(x, amplitude), lanes[_START + j])
         lanes[_PSI + j] = psi
         lanes[_V + j], lanes[_W + j] = held_motion(amplitude, lanes[_LEVEL + j], lanes[_START + j], psi)
         lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
@@ -168,7 +169,7 @@ def lane_rise(count: int, way: int, g: float, lanes: np.ndarray) -> None:
         left, weight = 1.0 - _LANE_NODES[node], _LANE_WEIGHTS[node]
         for j in range(count):
             x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[_PSI + j] * left))
-            weighted = weight * (x - lane_response(lanes, j, x, g))
+            weighted = weight * lane_slip(lanes, j, x, g)
             lanes[_RATE + j] += weighted
             lanes[_MOMENT + j] += left * weighted
     for j in range(count):
@@ -183,7 +184,7 @@ def lane_fall(count: int, lanes: np.ndarray) -> None:
     for j in range(count):
         # V is largest where x = b; a parabola from there overestimates the stop
         amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_V + j]
-        top = inverse_versine((amplitude - held) / amplitude)
+        top = -rising_phase(held, amplitude)
         lanes[_PEAK + j] = velocity + held_motion(amplitude, held, 0.0, top)[0]
         lanes[_LEFT + j] = velocity + held_motion(amplitude, held, 0.0, _HALF_PI)[0]
         onward = math.sqrt(2.0 * lanes[_PEAK + j] / (amplitude * (top - angle_minus_sine(top))))
@@ -203,6 +204,23 @@ def lane_fall(count: int, lanes: np.ndarray) -> None:
         lanes[_LEFT + j] = max(left, 0.0)
 
 
+@in_lanes
+def slid(velocity: float, after: float, held: float) -> float:
+    """W while Eq. 12 brings V down: (V² − V'²) / 2b, the squares of which need be no doubles."""
+    return 0.5 * (velocity - after) * ((velocity + after) / held)
+
+
+@in_lanes
+def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: float) -> float:
+    """W of the pulse that a lane has followed and of `later` more, each entered with V greater by `gain`.
+
+    All but the last slide `braked` and π · gain · (2n − 1) more between two pulses, the last to its stop.
+    """
+    moved, left = lanes[_W + j], lanes[_LEFT + j] + later * gain
+    last = moved + later * gain * (_HALF_PI - lanes[BEGAN + j]) + slid(left, 0.0, lanes[_HELD + j])
+    return later * (moved + braked + math.pi * gain * (later - 1.0)) + last
+
+
 @scalar
 def lane_attenuation(count: int, way: int, cycles: int, lanes: np.ndarray) -> None:
     """Eq. 12, and all cycles: W in _W, the largest V in _PEAK.
@@ -215,13 +233,12 @@ def lane_attenuation(count: int, way: int, cycles: int, lanes: np.ndarray) -> No
         held, left, moved = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j]
         duration = 1.5 * math.pi + lanes[BEGAN + j]  # from Üg = 0 to the next Üg = Üy
         carried = max(left - held * duration, 0.0)
-        braked = 0.5 * (left - carried) * (left + carried) / held
+        braked = slid(left, carried, held)
         later = cycles - 1.0
-        last = moved + later * carried * (_HALF_PI - lanes[BEGAN + j]) + 0.5 * (left + later * carried) ** 2 / held
         lanes[_CARRIED + j], lanes[_MOVED + j] = carried, moved + braked
-        lanes[_LAST + j] = moved + 0.5 * left * left / held
+        lanes[_LAST + j] = moved + slid(left, 0.0, held)
         lanes[_HIGHEST + j], lanes[_ONSET + j] = lanes[_PEAK + j], lanes[_START + j]
-        lanes[_W + j] = later * (moved + braked + math.pi * carried * (later - 1.0)) + last
+        lanes[_W + j] = lane_series(lanes, j, braked, carried, later)
         lanes[_PEAK + j] += later * carried
         still = (carried > 0.0) & (cycles > 1)
         lanes[_CODE + j] = NOT_RECOUPLED if still else 0
@@ -279,7 +296,7 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
     lane_rise(count, _FOLLOWS, g, lanes)
     for j in range(count):
         amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
-        slowest = -inverse_versine((amplitude - held) / amplitude)
+        slowest = rising_phase(held, amplitude)
         lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
         # held until past its slowest, or else Eq. 4 itself slows it
         through = (held < amplitude) & (lanes[_X + j] >= held) & (lanes[_SLOWEST + j] > 0.0)
@@ -290,11 +307,10 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
     for j in range(count):
         held, left, moved, began = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j], lanes[BEGAN + j]
         after = max(left - held * (1.5 * math.pi + began), 0.0)
-        braked = 0.5 * (left - after) * (left + after) / held
+        braked = slid(left, after, held)
         gain = after - lanes[_CARRIED + j]
         most = later - 1.0  # pulses after the second
-        series = lanes[_MOVED + j] + most * (moved + braked + math.pi * gain * (most - 1.0))
-        series += moved + most * gain * (_HALF_PI - began) + 0.5 * (left + most * gain) ** 2 / held
+        series = lanes[_MOVED + j] + lane_series(lanes, j, braked, gain, most)
         # after == 0: pairs of pulses, and of an odd number the last is a first one
         pairs = math.floor(0.5 * cycles)
         paired = pairs * (lanes[_MOVED + j] + moved + braked) + (lanes[_LAST + j] if cycles > 2.0 * pairs else 0.0)
@@ -317,7 +333,8 @@ def lane_recoupling(count: int, cycles: int, lanes: np.ndarray) -> None:
         # vers χ ≥ 2 χ²/π²: this start lies beyond the stop
         b, left = lanes[_HELD + j], lanes[_LEFT + j]
         curvature = 4.0 * lanes[AMPLITUDE + j] / (math.pi * math.pi)
-        lanes[_PSI + j] = min(2.0 * left / (b + math.sqrt(b * b + 2.0 * curvature * left)), math.pi)
+        longest = left / b
+        lanes[_PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
     for iteration in range(_LANE_ITERATIONS):
         for j in range(count):
             amplitude, b, chi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
@@ -347,7 +364,7 @@ def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
         for j in range(count):
             mu_s, tan_theta, x = lanes[MU_S + j], lanes[TAN_THETA + j], lanes[AMPLITUDE + j] * sine
             mu = lane_friction(lanes, j, x, g)
-            lanes[_V + j] += weight * (x - eq.block_acceleration(x, mu, mu_s, tan_theta, g))
+            lanes[_V + j] += weight * eq.relative_acceleration(x, mu, mu_s, tan_theta, g)
             lanes[_X + j] += weight * x * (mu_s - tan_theta - mu)
     for node in range(_SHORT_NODES.size):
         at, left, weight = _SHORT_NODES[node], 1.0 - _SHORT_NODES[node], _SHORT_WEIGHTS[node]
@@ -355,7 +372,7 @@ def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
             # sin φ on the way from Üg = 0 to Üg = Üy
             phi = (_HALF_PI + lanes[BEGAN + j]) * at
             x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-            weighted = weight * (x - lane_response(lanes, j, x, g))
+            weighted = weight * lane_slip(lanes, j, x, g)
             lanes[_RATE + j] += weighted
             lanes[_MOMENT + j] += left * weighted
     for j in range(count):
