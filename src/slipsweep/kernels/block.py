@@ -272,15 +272,16 @@ def yield_governs(block: Block) -> bool:
 AMPLITUDE, YIELD, MU_S, TAN_THETA, DELTA_MU, DECAY_RATE, BEGAN = range(0, 7 * TILE, TILE)
 LANE_ROWS = 7
 
-#: Lanes are filled up to a multiple of this, so that no loop over them has a scalar remainder:
+#: Lanes that are solved together, until the last of their iterations has settled: neighbours take as many.
+#: Lanes are filled up to a multiple, so that no loop over them has a scalar remainder:
 #: its roundings would differ, and a cell's last digits depend on how many stand beside it.
-_LANE_MULTIPLE = 32
+STRIP = 32
 
 
 @scalar
 def whole_lanes(count: int) -> int:
     """`count` up to the next multiple that leaves no remainder."""
-    return -(-count // _LANE_MULTIPLE) * _LANE_MULTIPLE
+    return -(-count // STRIP) * STRIP
 
 
 @in_lanes

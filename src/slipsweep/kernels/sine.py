@@ -28,6 +28,7 @@ from slipsweep.kernels.block import (
     NEWMARK,
     NO_VALUE,
     NOT_RECOUPLED,
+    STRIP,
     TAN_THETA,
     TILE,
     YIELD,
@@ -83,12 +84,10 @@ _SINES = np.sin(_PANEL_WIDTH * (np.arange(8)[:, np.newaxis] + _SHORT_NODES))
 _WEIGHTED = _PANEL_WIDTH * _SHORT_WEIGHTS * np.exp(-_CENTRE * _SINES)
 _QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) for n in range(30, -1, -1)])
 
-#: Newton iterations of the lanes, and the relative size of the last that counts as converged
-#: (the error left is its square, and enters the result squared again).
-_LANE_ITERATIONS = 5
-#: For lanes that stick first, few, whose curves start flat.
-_STICKS_ITERATIONS = 9
-_LANE_TOLERANCE = 1e-5
+#: Relative size of a Newton step that is the last (the error left is its square, and enters the
+#: result squared again).  A lane that has taken it stays where it is, whatever its neighbours do.
+_LANE_TOLERANCE = 1e-7
+_MOST_ITERATIONS = 16
 
 
 @in_lanes
@@ -125,92 +124,130 @@ def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tu
 
 
 @scalar
-def lane_onset(count: int, way: int, g: float, lanes: np.ndarray) -> None:
+def lane_onset(way: int, g: float, lanes: np.ndarray) -> None:
     """t1: where each lane begins to slide (ψ in _START) and the value it then holds (_LEVEL)."""
-    for j in range(count):
+    for j in range(STRIP):
         lanes[_CONVERGED + j] = 1.0
         lanes[_LEVEL + j], lanes[_START + j] = lanes[YIELD + j], lanes[BEGAN + j]
     if way != _STICKS:
         return
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = 0.0
     # D = 0, from the left, where a concave D converges, slowly where it starts flat
-    for _ in range(_STICKS_ITERATIONS):
-        for j in range(count):
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
             x = lanes[_LEVEL + j]
             asked, slope = lane_response_and_slope(lanes, j, x, g)
             step = (asked - x) / (1.0 - slope)
-            lanes[_LEVEL + j] = x + step
-            lanes[_CONVERGED + j] = 1.0 if abs(step) <= _LANE_TOLERANCE * x else 0.0
-    for j in range(count):
+            settled = lanes[_CONVERGED + j] > 0.0
+            lanes[_LEVEL + j] = x if settled else x + step
+            settled |= abs(step) <= _LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[_CONVERGED + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
         lanes[_START + j] = rising_phase(lanes[_LEVEL + j], lanes[AMPLITUDE + j])
 
 
 @scalar
-def lane_rise(count: int, way: int, g: float, lanes: np.ndarray) -> None:
+def lane_switch(g: float, lanes: np.ndarray) -> None:
+    """x at which each lane ceases to hold its level and follows Eq. 4 (_X), and b at the peak (_HELD)."""
+    for j in range(STRIP):
+        amplitude, level = lanes[AMPLITUDE + j], lanes[_LEVEL + j]
+        asked, slope = lane_response_and_slope(lanes, j, amplitude, g)
+        follows = asked > level
+        lanes[_HELD + j] = asked if follows else level
+        lanes[_X + j] = amplitude - (asked - level) / slope if follows else amplitude
+        lanes[_PSI + j] = 0.0 if follows else 1.0
+    # E = b, from the right, where a convex E converges
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            x = lanes[_X + j]
+            asked, slope = lane_response_and_slope(lanes, j, x, g)
+            step = (asked - lanes[_LEVEL + j]) / slope
+            settled = lanes[_PSI + j] > 0.0
+            lanes[_X + j] = x if settled else x - step
+            settled |= abs(step) <= _LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[_PSI + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_PSI + j])
+
+
+@scalar
+def lane_rise(way: int, g: float, lanes: np.ndarray) -> None:
     """From t1 to the peak: b in _HELD, V and W gained from rest in _V and _W."""
-    for j in range(count):
-        lanes[_X + j], lanes[_HELD + j] = lanes[AMPLITUDE + j], lanes[_LEVEL + j]
-    if way != _YIELD_GOVERNS:
-        for j in range(count):
-            lanes[_HELD + j] = max(lane_response(lanes, j, lanes[AMPLITUDE + j], g), lanes[_LEVEL + j])
-        # the switch from the hold to Eq. 4: E = b, from the right, where a convex E converges
-        for _ in range(_STICKS_ITERATIONS if way == _STICKS else _LANE_ITERATIONS):
-            for j in range(count):
-                x = lanes[_X + j]
-                asked, slope = lane_response_and_slope(lanes, j, x, g)
-                step = (asked - lanes[_LEVEL + j]) / slope
-                follows = lanes[_HELD + j] > lanes[_LEVEL + j]
-                lanes[_X + j] = x - step if follows else x
-                lanes[_PSI + j] = 1.0 if (abs(step) <= _LANE_TOLERANCE * x) | (not follows) else 0.0
-        for j in range(count):
-            lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_PSI + j])
+    if way == _YIELD_GOVERNS:
+        for j in range(STRIP):
+            lanes[_X + j], lanes[_HELD + j] = lanes[AMPLITUDE + j], lanes[_LEVEL + j]
+            lanes[_V + j], lanes[_W + j] = held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_START + j], 0.0)
+        return
+    lane_switch(g, lanes)
     # the hold
-    for j in range(count):
-        amplitude, x = lanes[AMPLITUDE + j], lanes[_X + j]
+    for j in range(STRIP):
+        amplitude = lanes[AMPLITUDE + j]
         # no earlier than the start, from which it may differ by the roundings of two roots
-        psi = max(rising_phase(x, amplitude), lanes[_START + j])
+        psi = max(rising_phase(lanes[_X + j], amplitude), lanes[_START + j])
         lanes[_PSI + j] = psi
         lanes[_V + j], lanes[_W + j] = held_motion(amplitude, lanes[_LEVEL + j], lanes[_START + j], psi)
         lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
-    if way == _YIELD_GOVERNS:
-        return
     # Eq. 4
     for node in range(_LANE_NODES.size):
         left, weight = 1.0 - _LANE_NODES[node], _LANE_WEIGHTS[node]
-        for j in range(count):
+        for j in range(STRIP):
             x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[_PSI + j] * left))
             weighted = weight * lane_slip(lanes, j, x, g)
             lanes[_RATE + j] += weighted
             lanes[_MOMENT + j] += left * weighted
-    for j in range(count):
+    for j in range(STRIP):
         width = -lanes[_PSI + j]
         lanes[_W + j] += (lanes[_V + j] + lanes[_MOMENT + j] * width) * width
         lanes[_V + j] += lanes[_RATE + j] * width
 
 
 @scalar
-def lane_fall(count: int, lanes: np.ndarray) -> None:
-    """The hold from the peak to the stop or to Üg = 0 (t5): V left in _LEFT, the largest V in _PEAK."""
-    for j in range(count):
-        # V is largest where x = b; a parabola from there overestimates the stop
-        amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_V + j]
-        top = -rising_phase(held, amplitude)
-        lanes[_PEAK + j] = velocity + held_motion(amplitude, held, 0.0, top)[0]
-        lanes[_LEFT + j] = velocity + held_motion(amplitude, held, 0.0, _HALF_PI)[0]
-        onward = math.sqrt(2.0 * lanes[_PEAK + j] / (amplitude * (top - angle_minus_sine(top))))
-        lanes[_PSI + j] = min(top + onward, _HALF_PI)
-    for iteration in range(_LANE_ITERATIONS):
-        for j in range(count):
-            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
-            over = lanes[_V + j] + held_motion(amplitude, held, 0.0, psi)[0]
-            step = over / (amplitude - held - amplitude * versine(psi))
-            lanes[_PSI + j] = min(max(psi - step, 0.0), _HALF_PI)
-            settled = (abs(step) <= _LANE_TOLERANCE * psi) | (lanes[_LEFT + j] > 0.0)
-            lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if settled | (iteration < _LANE_ITERATIONS - 1) else 0.0
-    for j in range(count):
-        amplitude, held, left = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_LEFT + j]
-        end = _HALF_PI if left > 0.0 else lanes[_PSI + j]
-        lanes[_W + j] += lanes[_V + j] * end + held_motion(amplitude, held, 0.0, end)[1]
+def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
+    """The hold from the peak to the stop or to Üg = 0 (t5): V left in _LEFT, if wanted the largest V in _PEAK."""
+    unsettled = 0
+    for j in range(STRIP):
+        left = lanes[_V + j] + held_motion(lanes[AMPLITUDE + j], lanes[_HELD + j], 0.0, _HALF_PI)[0]
         lanes[_LEFT + j] = max(left, 0.0)
+        lanes[_PSI + j] = _HALF_PI
+        lanes[_PEAK + j] = math.nan
+        unsettled += 0 if left > 0.0 else 1
+    if wants_peak or unsettled > 0:
+        for j in range(STRIP):
+            # V is largest where x = b; a parabola from there overestimates the stop
+            amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_V + j]
+            top = -rising_phase(held, amplitude)
+            peak = velocity + held_motion(amplitude, held, 0.0, top)[0]
+            onward = math.sqrt(2.0 * peak / (amplitude * (top - angle_minus_sine(top))))
+            lanes[_PSI + j] = _HALF_PI if lanes[_LEFT + j] > 0.0 else min(top + onward, _HALF_PI)
+            lanes[_PEAK + j] = peak if wants_peak else math.nan
+            lanes[_X + j] = 1.0 if lanes[_LEFT + j] > 0.0 else 0.0
+        for _ in range(_MOST_ITERATIONS):
+            if unsettled == 0:
+                break
+            unsettled = 0
+            for j in range(STRIP):
+                amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
+                over = lanes[_V + j] + held_motion(amplitude, held, 0.0, psi)[0]
+                step = over / (amplitude - held - amplitude * versine(psi))
+                settled = lanes[_X + j] > 0.0
+                lanes[_PSI + j] = psi if settled else min(max(psi - step, 0.0), _HALF_PI)
+                settled |= abs(step) <= _LANE_TOLERANCE * psi
+                lanes[_X + j] = 1.0 if settled else 0.0
+                unsettled += 0 if settled else 1
+        for j in range(STRIP):
+            lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_X + j])
+    for j in range(STRIP):
+        end = lanes[_PSI + j]
+        lanes[_W + j] += lanes[_V + j] * end + held_motion(lanes[AMPLITUDE + j], lanes[_HELD + j], 0.0, end)[1]
 
 
 @in_lanes
@@ -231,14 +268,14 @@ def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: fl
 
 
 @scalar
-def lane_attenuation(count: int, way: int, cycles: int, lanes: np.ndarray) -> None:
+def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
     """Eq. 12, and all cycles: W in _W, the largest V in _PEAK.
 
     Where a block still slides at the next Üg = Üy, Eq. 4 and the hold act on it as in the
     pulse before, so that each cycle adds the same velocity v: an arithmetic series.  But what
     sticks at Üg = Üy when at rest does not when it slides: `lane_carried` goes on with it.
     """
-    for j in range(count):
+    for j in range(STRIP):
         held, left, moved = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j]
         duration = 1.5 * math.pi + lanes[BEGAN + j]  # from Üg = 0 to the next Üg = Üy
         carried = max(left - held * duration, 0.0)
@@ -272,7 +309,7 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
 
 
 @scalar
-def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
+def lane_carried(options: Options, lanes: np.ndarray) -> None:
     """All cycles of lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
 
     Then they hold E(Üy) ≥ Üg from Üy on, and one of three things happens.  They stop before t1 of
@@ -282,28 +319,35 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
     g, cycles = options.g, options.cycles
     later = cycles - 1.0
     # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
-    for j in range(count):
+    for j in range(STRIP):
         lanes[_LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], g)
         lanes[_START + j] = lanes[_PSI + j] = lanes[BEGAN + j]
-    for _ in range(_LANE_ITERATIONS):
-        for j in range(count):
+        lanes[_X + j] = 0.0
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
             amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_PSI + j]
             velocity = lanes[_CARRIED + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
             step = velocity / (amplitude - held - amplitude * versine(psi))
-            lanes[_PSI + j] = min(max(psi - step, lanes[BEGAN + j]), lanes[_ONSET + j])
-            settled = abs(step) <= _LANE_TOLERANCE * abs(lanes[_PSI + j] - lanes[BEGAN + j])
-            lanes[_X + j] = 1.0 if settled & (lanes[_PSI + j] < lanes[_ONSET + j]) else 0.0
-    for j in range(count):
+            settled = lanes[_X + j] > 0.0
+            lanes[_PSI + j] = psi if settled else min(max(psi - step, lanes[BEGAN + j]), lanes[_ONSET + j])
+            settled |= abs(step) <= _LANE_TOLERANCE * abs(lanes[_PSI + j] - lanes[BEGAN + j])
+            lanes[_X + j] = 1.0 if settled else 0.0
+            # one that reaches t1 does not stop before
+            unsettled += 0 if settled | (lanes[_PSI + j] >= lanes[_ONSET + j]) else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
         began, psi = lanes[BEGAN + j], lanes[_PSI + j]
         again = (
             lanes[_CARRIED + j] * (psi - began) + held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], began, psi)[1]
         )
-        stops = lanes[_X + j] > 0.0
+        stops = (lanes[_X + j] > 0.0) & (psi < lanes[_ONSET + j])
         lanes[_CODE + j] = later * (lanes[_MOVED + j] + again) + lanes[_LAST + j] if stops else math.nan
         lanes[_CONVERGED + j] = 1.0
     # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
-    lane_rise(count, _FOLLOWS, g, lanes)
-    for j in range(count):
+    lane_rise(_FOLLOWS, g, lanes)
+    for j in range(STRIP):
         amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
         slowest = rising_phase(held, amplitude)
         lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
@@ -312,8 +356,8 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if through else 0.0
         lanes[_W + j] += -carried * began
         lanes[_V + j] += carried
-    lane_fall(count, lanes)
-    for j in range(count):
+    lane_fall(options.wants_peak, lanes)
+    for j in range(STRIP):
         held, left, moved, began = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j], lanes[BEGAN + j]
         after = max(left - held * (1.5 * math.pi + began), 0.0)
         braked = slid(left, after, held)
@@ -336,24 +380,32 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
 
 
 @scalar
-def lane_recoupling(count: int, cycles: int, lanes: np.ndarray) -> None:
+def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
     """From Üg = 0 on by integration, χ = φ − π to the stop, which comes before 2π for b ≥ Üy; and all cycles."""
-    for j in range(count):
+    for j in range(STRIP):
         # vers χ ≥ 2 χ²/π²: this start lies beyond the stop
         b, left = lanes[_HELD + j], lanes[_LEFT + j]
         curvature = 4.0 * lanes[AMPLITUDE + j] / (math.pi * math.pi)
         longest = left / b
         lanes[_PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
-    for iteration in range(_LANE_ITERATIONS):
-        for j in range(count):
+        lanes[_X + j] = 0.0
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
             amplitude, b, chi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
             half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
             over = lanes[_LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
-            step = -over / (b + 2.0 * amplitude * half_sine * half_cosine)
-            lanes[_PSI + j] = min(max(chi - step, 0.0), math.pi)
-            settled = (abs(step) <= _LANE_TOLERANCE * chi) | (iteration < _LANE_ITERATIONS - 1)
-            lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if settled else 0.0
-    for j in range(count):
+            step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
+            settled = lanes[_X + j] > 0.0
+            lanes[_PSI + j] = chi if settled else min(max(chi + step, 0.0), math.pi)
+            settled |= abs(step) <= _LANE_TOLERANCE * chi
+            lanes[_X + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_X + j])
+    for j in range(STRIP):
         amplitude, b, chi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
         sine = 2.0 * (0.5 * chi - angle_minus_sine(0.5 * chi)) * (1.0 - versine(0.5 * chi))
         lanes[_W + j] += (lanes[_LEFT + j] - 0.5 * b * chi) * chi - amplitude * (chi - sine)
@@ -377,10 +429,10 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 
 @scalar
-def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
+def lane_continuous(options: Options, lanes: np.ndarray) -> None:
     """Continuous sliding, all cycles: W in row _W."""
     g = options.g
-    for j in range(count):
+    for j in range(STRIP):
         # the whole quarter: ∫ D in _V, a quarter of the drift in _X; up to Üg = Üy: _RATE, _MOMENT
         amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
         most = mu_s + lanes[DELTA_MU + j]
@@ -390,14 +442,14 @@ def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
     for node in range(_SHORT_NODES.size):
         at, left, weight = _SHORT_NODES[node], 1.0 - _SHORT_NODES[node], _SHORT_WEIGHTS[node]
-        for j in range(count):
+        for j in range(STRIP):
             # sin φ on the way from Üg = 0 to Üg = Üy
             phi = (_HALF_PI + lanes[BEGAN + j]) * at
             x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
             weighted = weight * lane_slip(lanes, j, x, g)
             lanes[_RATE + j] += weighted
             lanes[_MOMENT + j] += left * weighted
-    for j in range(count):
+    for j in range(STRIP):
         began = lanes[BEGAN + j]
         width = _HALF_PI + began
         lanes[_W + j] = continuous_displacement(
@@ -412,18 +464,18 @@ def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
 
 
 @scalar
-def solve_lanes(count: int, way: int, options: Options, lanes: np.ndarray) -> None:
+def solve_strip(way: int, options: Options, lanes: np.ndarray) -> None:
     """Lanes that all go one way, from the onset to the end of all cycles."""
     if way == _CONTINUOUS:
-        lane_continuous(count, options, lanes)
+        lane_continuous(options, lanes)
         return
-    lane_onset(count, way, options.g, lanes)
-    lane_rise(count, way, options.g, lanes)
-    lane_fall(count, lanes)
+    lane_onset(way, options.g, lanes)
+    lane_rise(way, options.g, lanes)
+    lane_fall(options.wants_peak, lanes)
     if options.recoupling == INTEGRATE:
-        lane_recoupling(count, options.cycles, lanes)
+        lane_recoupling(options.cycles, lanes)
     else:
-        lane_attenuation(count, way, options.cycles, lanes)
+        lane_attenuation(way, options.cycles, lanes)
 
 
 @scalar
@@ -486,12 +538,14 @@ def solve_cells(
         used = fill_lanes(blocks, count, way, lanes, where)
         if used == 0:
             continue
-        solve_lanes(whole_lanes(used), way, options, lanes)
+        for first in range(0, used, STRIP):
+            solve_strip(way, options, lanes[first:])
         collect(used, way, lanes, where, blocks, motion, codes)
         if way == _STICKS:
             used = fill_carried(used, lanes, where)
             if used > 0:
-                lane_carried(whole_lanes(used), options, lanes)
+                for first in range(0, used, STRIP):
+                    lane_carried(options, lanes[first:])
                 collect(used, way, lanes, where, blocks, motion, codes)
     for j in range(count):
         if blocks[_WAY + j] == _OTHER and codes[0, j] > STUCK:
