@@ -61,9 +61,9 @@ _LANES_SIZE = (LANE_ROWS + 19) * TILE
 _MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
 _BLOCKS_SIZE = (LANE_ROWS + 3) * TILE
 
-#: The ways a cell can go: held at the yield value to the peak; held, then by Eq. 4; stuck at
-#: Üg = Üy until Eq. 4 falls below Üg; sliding continuously.
-_OTHER, _YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS = range(5)
+#: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak; held, then by Eq. 4; stuck at
+#: Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other, by `cycle.solve`.
+_STAYS, _YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS, _OTHER = range(6)
 
 #: 12 nodes reach 1e-14 where friction falls by no more than e^6 (at 8 e-foldings, 2e-14).
 _LANE_NODES, _LANE_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
@@ -110,7 +110,8 @@ def way_of(block: Block, options: Options, at_start: float, at_end: float) -> in
     way = _YIELD_GOVERNS if options.rise == NEWMARK else way
     way = way if block.sliding_mode == STICK_SLIP else _OTHER
     early = gentle & (start <= _SHORT_SINE * end) & (not options.wants_peak)
-    return _CONTINUOUS if (block.sliding_mode == CONTINUOUS) & early else way
+    way = _CONTINUOUS if (block.sliding_mode == CONTINUOUS) & early else way
+    return way if block.sliding_mode > STUCK else _STAYS
 
 
 @in_lanes
@@ -302,9 +303,7 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
             for row in range(0, _LANES_SIZE, TILE):
                 lanes[row + used] = lanes[row + lane]
             used += 1
-    for lane in range(used, whole_lanes(used)):
-        for row in range(0, _LANES_SIZE, TILE):
-            lanes[row + lane] = lanes[row]
+    fill_up(used, LANE_ROWS + 19, lanes)
     return used
 
 
@@ -491,30 +490,56 @@ def sort_cells(cells: np.ndarray, count: int, options: Options, blocks: np.ndarr
 
 
 @scalar
-def fill_lanes(blocks: np.ndarray, count: int, way: int, lanes: np.ndarray, where: np.ndarray) -> int:
-    """Lay out the blocks that go one way; the number of them.  Lanes to the next multiple repeat the first."""
-    used = 0
-    for j in range(count):
-        if blocks[_WAY + j] == way:
-            where[used] = j
-            used += 1
-    for row in range(LANE_ROWS):
-        for lane in range(used):
-            lanes[row * TILE + lane] = blocks[row * TILE + where[lane]]
+def runs_of(blocks: np.ndarray, count: int, runs: np.ndarray) -> int:
+    """Where runs of cells that go the same way start (and the last ends); the number of them.
+
+    Along an axis of a sweep neighbours mostly go the same way: cells are laid out and collected
+    run by run.
+    """
+    runs[0], found = 0, 1
+    for j in range(1, count):
+        if blocks[_WAY + j] != blocks[_WAY + j - 1]:
+            runs[found] = j
+            found += 1
+    runs[found] = count
+    return found
+
+
+@scalar
+def fill_lanes(blocks: np.ndarray, first: int, last: int, used: int, lanes: np.ndarray) -> int:
+    """Lay out a run of blocks behind the `used` lanes; the number of lanes with them."""
+    if last - first < 8:  # a loop for each row would cost more than it does
+        for j in range(first, last):
+            for row in range(0, LANE_ROWS * TILE, TILE):
+                lanes[row + used + j - first] = blocks[row + j]
+    else:
+        for row in range(0, LANE_ROWS * TILE, TILE):
+            source, target = blocks[row + first : row + last], lanes[row + used : row + TILE]
+            for j in range(source.size):
+                target[j] = source[j]
+    return used + last - first
+
+
+@scalar
+def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
+    """Repeat the first lane up to the next whole number of strips."""
+    for row in range(0, rows * TILE, TILE):
         for lane in range(used, whole_lanes(used)):
-            lanes[row * TILE + lane] = lanes[row * TILE]
-    return used
+            lanes[row + lane] = lanes[row]
 
 
 @scalar
 def collect(
-    used: int, way: int, lanes: np.ndarray, where: np.ndarray, blocks: np.ndarray, motion: np.ndarray, codes: np.ndarray
-) -> None:
+    used: int, way: int, options: Options, lanes: np.ndarray, where: np.ndarray, blocks: np.ndarray,
+    motion: np.ndarray, codes: np.ndarray,
+) -> None:  # fmt: skip
     """Results of the lanes that have converged; the other cells are to go the long way."""
     for lane in range(used):
         j = where[lane]
         if lanes[_CONVERGED + lane] > 0.0:
-            motion[0, j], motion[1, j] = lanes[_W + lane], lanes[_PEAK + lane]
+            motion[0, j] = lanes[_W + lane]
+            if options.wants_peak:
+                motion[1, j] = lanes[_PEAK + lane]
             codes[1, j] |= int(lanes[_CODE + lane]) | (EQ4_BELOW_YIELD if way == _YIELD_GOVERNS else 0)
             blocks[_WAY + j] = way
         else:
@@ -522,33 +547,50 @@ def collect(
 
 
 @scalar
+def solve_way(
+    way: int, runs: np.ndarray, count: int, options: Options, blocks: np.ndarray, lanes: np.ndarray,
+    motion: np.ndarray, codes: np.ndarray,
+) -> None:  # fmt: skip
+    """Solve the cells of a tile that go one way."""
+    used = 0
+    for run in range(count):
+        if blocks[_WAY + runs[run]] == way:
+            used = fill_lanes(blocks, runs[run], runs[run + 1], used, lanes)
+    if used == 0:
+        return
+    fill_up(used, LANE_ROWS, lanes)
+    for first in range(0, used, STRIP):
+        solve_strip(way, options, lanes[first:])
+    where, lane = np.empty(used, np.int64), 0
+    for run in range(count):
+        if blocks[_WAY + runs[run]] == way:
+            for j in range(runs[run], runs[run + 1]):
+                where[lane] = j
+                lane += 1
+    collect(used, way, options, lanes, where, blocks, motion, codes)
+    if way == _STICKS:
+        used = fill_carried(used, lanes, where)
+        for first in range(0, used, STRIP):
+            lane_carried(options, lanes[first:])
+        collect(used, way, options, lanes, where, blocks, motion, codes)
+
+
+@scalar
 def solve_cells(
     cells: np.ndarray, count: int, options: Options, table: np.ndarray, motion: np.ndarray, codes: np.ndarray
 ) -> None:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
-    blocks, lanes, where = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE, np.int64)
-    for row in range(7):
-        for j in range(count, whole_lanes(count)):
-            cells[row * TILE + j] = cells[row * TILE]
+    blocks, lanes, runs = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE + 1, np.int64)
+    fill_up(count, 7, cells)
     sort_cells(cells, whole_lanes(count), options, blocks)
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[_MODE + j]), int(blocks[_VALIDITY + j])
-        motion[0, j] = motion[1, j] = 0.0 if codes[0, j] == STUCK else math.nan
+        motion[0, j] = motion[1, j] = 0.0 if blocks[_MODE + j] == STUCK else math.nan
+    found = runs_of(blocks, count, runs)
     for way in (_YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS):
-        used = fill_lanes(blocks, count, way, lanes, where)
-        if used == 0:
-            continue
-        for first in range(0, used, STRIP):
-            solve_strip(way, options, lanes[first:])
-        collect(used, way, lanes, where, blocks, motion, codes)
-        if way == _STICKS:
-            used = fill_carried(used, lanes, where)
-            if used > 0:
-                for first in range(0, used, STRIP):
-                    lane_carried(options, lanes[first:])
-                collect(used, way, lanes, where, blocks, motion, codes)
+        solve_way(way, runs, found, options, blocks, lanes, motion, codes)
     for j in range(count):
-        if blocks[_WAY + j] == _OTHER and codes[0, j] > STUCK:
+        if blocks[_WAY + j] == _OTHER:
             answer = solve(block_at(cells, j, options), options, table)
             motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
             codes[1, j] |= answer.validity
