@@ -53,9 +53,12 @@ _X, _LEVEL, _START, _V, _W, _HELD, _RATE, _MOMENT, _PSI, _LEFT, _PEAK, _CONVERGE
     LANE_ROWS * TILE, (LANE_ROWS + 13) * TILE, TILE
 )
 #: What a first pulse leaves to the pulses after it: V carried on, W up to then, W if it were the
-#: last, t1 and the largest V; and, of a pulse entered in motion, V as it is slowest.
-_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _SLOWEST = range((LANE_ROWS + 13) * TILE, (LANE_ROWS + 19) * TILE, TILE)
-_LANES_SIZE = (LANE_ROWS + 19) * TILE
+#: last, t1 and the largest V; and, of a pulse
+#: entered in motion, V as it is slowest, what V gains, and how many such pulses follow each other.
+_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _SLOWEST, _GAIN, _MOST = range(
+    (LANE_ROWS + 13) * TILE, (LANE_ROWS + 21) * TILE, TILE
+)
+_LANES_SIZE = (LANE_ROWS + 21) * TILE
 
 #: Rows of a tile's blocks beside the lanes': the codes, and the way a cell goes.
 _MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
@@ -252,6 +255,12 @@ def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
 
 
 @in_lanes
+def pause_of(began: float) -> float:
+    """Phase from Üg = 0 (t5) to the next Üg = Üy."""
+    return 1.5 * math.pi + began
+
+
+@in_lanes
 def slid(velocity: float, after: float, held: float) -> float:
     """W while Eq. 12 brings V down: (V² − V'²) / 2b, the squares of which need be no doubles."""
     return 0.5 * (velocity - after) * ((velocity + after) / held)
@@ -278,8 +287,7 @@ def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
     """
     for j in range(STRIP):
         held, left, moved = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j]
-        duration = 1.5 * math.pi + lanes[BEGAN + j]  # from Üg = 0 to the next Üg = Üy
-        carried = max(left - held * duration, 0.0)
+        carried = max(left - held * pause_of(lanes[BEGAN + j]), 0.0)
         braked = slid(left, carried, held)
         later = cycles - 1.0
         lanes[_CARRIED + j], lanes[_MOVED + j] = carried, moved + braked
@@ -303,7 +311,7 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
             for row in range(0, _LANES_SIZE, TILE):
                 lanes[row + used] = lanes[row + lane]
             used += 1
-    fill_up(used, LANE_ROWS + 19, lanes)
+    fill_up(used, LANE_ROWS + 21, lanes)
     return used
 
 
@@ -311,22 +319,45 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
 def lane_carried(options: Options, lanes: np.ndarray) -> None:
     """All cycles of lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
 
-    Then they hold E(Üy) ≥ Üg from Üy on, and one of three things happens.  They stop before t1 of
-    the first pulse, and go on like it; they slide through and stop before the third pulse, which
-    is the first again; or they never stop, and each cycle adds the same velocity.
+    Then they hold E(Üy) ≥ Üg from Üy on and slide through, and each pulse is entered with V greater by
+    the same gain.  Where that is a loss, one of two things ends it, and the motion repeats: a pulse that
+    recouples, or one that stops before t1 of the first pulse and goes on like it.
     """
-    g, cycles = options.g, options.cycles
-    later = cycles - 1.0
-    # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
+    later = options.cycles - 1.0
     for j in range(STRIP):
-        lanes[_LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], g)
-        lanes[_START + j] = lanes[_PSI + j] = lanes[BEGAN + j]
-        lanes[_X + j] = 0.0
+        lanes[_LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
+        lanes[_START + j], lanes[_CONVERGED + j] = lanes[BEGAN + j], 1.0
+    # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
+    lane_rise(_FOLLOWS, options.g, lanes)
+    for j in range(STRIP):
+        amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
+        slowest = rising_phase(held, amplitude)
+        lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
+        # held until past its slowest, or else Eq. 4 itself slows it
+        through = (held < amplitude) & (lanes[_X + j] >= held)
+        lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if through else 0.0
+        lanes[_W + j] += -carried * began
+        lanes[_V + j] += carried
+    lane_fall(options.wants_peak, lanes)
+    for j in range(STRIP):
+        # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
+        carried, slowest = lanes[_CARRIED + j], lanes[_SLOWEST + j]
+        gain = lanes[_LEFT + j] - lanes[_HELD + j] * pause_of(lanes[BEGAN + j]) - carried
+        after = carried + gain
+        through = (np.ceil(slowest / -gain) if gain < 0.0 else later) if slowest > 0.0 else 0.0
+        sliding = (np.ceil(after / -gain) if gain < 0.0 else later) if after > 0.0 else 0.0
+        most = min(min(through, sliding + 1.0), later)
+        stops = (through <= sliding) & (most < later)
+        lanes[_GAIN + j], lanes[_MOST + j] = gain, most
+        # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
+        lanes[_V + j] = carried + (most * gain if most > 0.0 else 0.0)
+        lanes[_PSI + j] = lanes[BEGAN + j]
+        lanes[_X + j] = 0.0 if stops else 1.0
     for _ in range(_MOST_ITERATIONS):
         unsettled = 0
         for j in range(STRIP):
             amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_PSI + j]
-            velocity = lanes[_CARRIED + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
+            velocity = lanes[_V + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
             step = velocity / (amplitude - held - amplitude * versine(psi))
             settled = lanes[_X + j] > 0.0
             lanes[_PSI + j] = psi if settled else min(max(psi - step, lanes[BEGAN + j]), lanes[_ONSET + j])
@@ -337,44 +368,30 @@ def lane_carried(options: Options, lanes: np.ndarray) -> None:
         if unsettled == 0:
             break
     for j in range(STRIP):
-        began, psi = lanes[BEGAN + j], lanes[_PSI + j]
-        again = (
-            lanes[_CARRIED + j] * (psi - began) + held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], began, psi)[1]
+        began, psi, left, gain, most = (
+            lanes[BEGAN + j],
+            lanes[_PSI + j],
+            lanes[_LEFT + j],
+            lanes[_GAIN + j],
+            lanes[_MOST + j],
         )
-        stops = (lanes[_X + j] > 0.0) & (psi < lanes[_ONSET + j])
-        lanes[_CODE + j] = later * (lanes[_MOVED + j] + again) + lanes[_LAST + j] if stops else math.nan
-        lanes[_CONVERGED + j] = 1.0
-    # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
-    lane_rise(_FOLLOWS, g, lanes)
-    for j in range(STRIP):
-        amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
-        slowest = rising_phase(held, amplitude)
-        lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
-        # held until past its slowest, or else Eq. 4 itself slows it
-        through = (held < amplitude) & (lanes[_X + j] >= held) & (lanes[_SLOWEST + j] > 0.0)
-        lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if through else 0.0
-        lanes[_W + j] += -carried * began
-        lanes[_V + j] += carried
-    lane_fall(options.wants_peak, lanes)
-    for j in range(STRIP):
-        held, left, moved, began = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j], lanes[BEGAN + j]
-        after = max(left - held * (1.5 * math.pi + began), 0.0)
-        braked = slid(left, after, held)
-        gain = after - lanes[_CARRIED + j]
-        most = later - 1.0  # pulses after the second
-        series = lanes[_MOVED + j] + lane_series(lanes, j, braked, gain, most)
-        # after == 0: pairs of pulses, and of an odd number the last is a first one
-        pairs = math.floor(0.5 * cycles)
-        paired = pairs * (lanes[_MOVED + j] + moved + braked) + (lanes[_LAST + j] if cycles > 2.0 * pairs else 0.0)
-        lasts = min(lanes[_SLOWEST + j], after) + most * min(gain, 0.0) > 0.0
-        slides = lanes[_CONVERGED + j] > 0.0
-        stopped = lanes[_CODE + j]
-        through = paired if after == 0.0 else series
-        lanes[_W + j] = through if slides else stopped
-        slides &= (after == 0.0) | lasts
-        lanes[_CONVERGED + j] = 1.0 if slides | (stopped == stopped) else 0.0
-        highest = lanes[_PEAK + j] + (most * max(gain, 0.0) if after > 0.0 else 0.0)
-        lanes[_PEAK + j] = max(lanes[_HIGHEST + j], highest if slides else 0.0)
+        held_on = held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], began, psi)[1]
+        again = lanes[_V + j] * (psi - began) + held_on if psi > began else 0.0
+        stops = psi > began
+        braked = slid(left, lanes[_CARRIED + j] + gain, lanes[_HELD + j])
+        periods = np.floor(later / (most + 1.0))
+        rest = later - periods * (most + 1.0)
+        sliding_on = most * (lanes[_W + j] + braked + math.pi * gain * (most - 1.0))
+        slides = sliding_on if stops else lane_series(lanes, j, braked, gain, most - 1.0)
+        period = lanes[_MOVED + j] + again + (slides if most > 0.0 else 0.0)
+        tail = lanes[_MOVED + j] + lane_series(lanes, j, braked, gain, rest - 1.0)
+        lanes[_W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if rest > 0.0 else lanes[_LAST + j])
+        # the slides through all reach t5, as the first does
+        alike = (lanes[_CONVERGED + j] > 0.0) & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
+        solved = ((most == 0.0) | alike) & (lanes[_X + j] > 0.0) & ((not stops) | (psi < lanes[_ONSET + j]))
+        lanes[_CONVERGED + j] = 1.0 if solved else 0.0
+        highest = lanes[_PEAK + j] + max(gain, 0.0) * max(rest - 1.0, 0.0)
+        lanes[_PEAK + j] = max(lanes[_HIGHEST + j], highest if most > 0.0 else 0.0)
         lanes[_CODE + j] = NOT_RECOUPLED
 
 
