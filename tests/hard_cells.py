@@ -302,7 +302,7 @@ CATEGORIES = (
     Category("magnitudes", "subnormal and huge accelerations", _magnitudes),
     Category(
         "beyond_squares",
-        "V²/b and the like where V² is no double: the cycle solver fails here, and is not repaired (below)",
+        "V²/b and the like where V² is no double; D = Üg − Ü where Üg is 10¹⁹⁹ times as large",
         _beyond_squares,
     ),
     Category("float32", "results kept in single precision: subnormal there, or near its greatest", _float32, "float32"),

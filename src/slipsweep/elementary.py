@@ -22,6 +22,8 @@ _LN2_LOW = 1.90821492927058770002e-10
 # beyond these the result is flushed to 2^-1022 or held at 2^1023: never Inf, never subnormal
 _EXP_MIN = -708.0
 _EXP_MAX = 709.0
+_HALF_PI = 0.5 * math.pi
+_QUARTER_PI = 0.25 * math.pi
 #: Bit pattern of √½.
 _SQRT_HALF_BITS = 4604544271217802189
 
@@ -150,7 +152,23 @@ def inverse_versine(q: float) -> float:
     p = p * z + 0.07499999999921603
     p = p * z + 0.16666666666666963
     p = p * z + 1.0
-    return 2.0 * p * math.sqrt(z)
+    return min(2.0 * p * math.sqrt(z), _HALF_PI)
+
+
+@elementary
+def rising_phase(x: float, amplitude: float) -> float:
+    """ψ in [−π/2, 0] at which a sine of this amplitude, counted from its peak, rises through x.
+
+    The quotient is taken here, where it is not turned into a product: 1/amplitude may overflow.
+    """
+    return -inverse_versine((amplitude - x) / amplitude)
+
+
+@elementary
+def sine_after(start: float, offset: float) -> float:
+    """1 − vers(start + offset) for a start and an end in [−π/2, 0], without cancellation at −π/2."""
+    phi, psi = (_HALF_PI + start) + offset, start + offset
+    return phi - angle_minus_sine(phi) if psi < -_QUARTER_PI else 1.0 - versine(psi)
 
 
 @elementary

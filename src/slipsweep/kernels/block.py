@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep import equations as eq
-from slipsweep.elementary import inverse_versine
+from slipsweep.elementary import rising_phase
 from slipsweep.kernels.jit import in_lanes, scalar
 from slipsweep.variables import VALUELESS, Validity
 
@@ -191,7 +191,7 @@ def inflection(block: Block) -> float:
 @scalar
 def slip(block: Block, x: float) -> float:
     """D(x) = x − E(x): rate of the relative velocity where the block obeys Eq. 4."""
-    return x - response(block, x)
+    return eq.relative_acceleration(x, friction(block, x), block.mu_s, block.tan_theta, block.g)
 
 
 @scalar
@@ -204,7 +204,7 @@ def slip_and_slope(block: Block, x: float) -> tuple[float, float]:
 @scalar
 def phase(block: Block, x: float) -> float:
     """ψ ≤ 0 at which the plane's acceleration reaches x on its rise."""
-    return -inverse_versine((block.amplitude - x) / block.amplitude)
+    return rising_phase(x, block.amplitude)
 
 
 @scalar
@@ -271,15 +271,16 @@ def stays_below_yield(block: Block, start: float, end: float) -> bool:
 AMPLITUDE, YIELD, MU_S, TAN_THETA, DELTA_MU, DECAY_RATE, BEGAN = range(0, 7 * TILE, TILE)
 LANE_ROWS = 7
 
-#: Lanes are filled up to a multiple of this, so that no loop over them has a scalar remainder:
+#: Lanes that are solved together, until the last of their iterations has settled: neighbours take as many.
+#: Lanes are filled up to a multiple, so that no loop over them has a scalar remainder:
 #: its roundings would differ, and a cell's last digits depend on how many stand beside it.
-_LANE_MULTIPLE = 32
+STRIP = 32
 
 
 @scalar
 def whole_lanes(count: int) -> int:
     """`count` up to the next multiple that leaves no remainder."""
-    return -(-count // _LANE_MULTIPLE) * _LANE_MULTIPLE
+    return -(-count // STRIP) * STRIP
 
 
 @in_lanes
@@ -288,7 +289,7 @@ def lane_of(block: Block, lanes: np.ndarray, j: int) -> None:
     lanes[AMPLITUDE + j], lanes[YIELD + j] = block.amplitude, block.yield_acceleration
     lanes[MU_S + j], lanes[TAN_THETA + j] = block.mu_s, block.tan_theta
     lanes[DELTA_MU + j], lanes[DECAY_RATE + j] = block.delta_mu, block.decay_rate
-    lanes[BEGAN + j] = -inverse_versine((block.amplitude - block.yield_acceleration) / block.amplitude)
+    lanes[BEGAN + j] = rising_phase(block.yield_acceleration, block.amplitude)
 
 
 @in_lanes
@@ -301,3 +302,10 @@ def lane_friction(lanes: np.ndarray, j: int, x: float, g: float) -> float:
 def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
     """E(x) of a lane."""
     return eq.block_acceleration(x, lane_friction(lanes, j, x, g), lanes[MU_S + j], lanes[TAN_THETA + j], g)
+
+
+@in_lanes
+def lane_slip(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """D(x) of a lane."""
+    mu_s, tan_theta = lanes[MU_S + j], lanes[TAN_THETA + j]
+    return eq.relative_acceleration(x, lane_friction(lanes, j, x, g), mu_s, tan_theta, g)

@@ -99,7 +99,11 @@ def scatter(
 ) -> None:
     """Spread the solved cells over their frequencies: u = W/ω², v = V/ω (the scaling law)."""
     step, stride = grid.frequency_stride, grid.result_stride
-    if results.displacement.size:
+    if results.displacement.size and grid.frequencies == 1:
+        for j in range(count):
+            period = periods[offsets[0, j]]
+            results.displacement[offsets[1, j]] = motion[0, j] * (period * period)
+    elif results.displacement.size:
         for j in range(count):
             at_period, at, w = offsets[0, j], offsets[1, j], motion[0, j]
             for k in range(grid.frequencies):

@@ -14,12 +14,13 @@ import math
 import numpy as np
 
 from slipsweep import equations as eq
-from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
+from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, rising_phase, sine_after, versine
 from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
     DECAY_RATE,
+    DELTA_MU,
     EQ4_BELOW_YIELD,
     INTEGRATE,
     LANE_ROWS,
@@ -27,6 +28,7 @@ from slipsweep.kernels.block import (
     MU_S,
     NEWMARK,
     NOT_RECOUPLED,
+    STRIP,
     TAN_THETA,
     TILE,
     YIELD,
@@ -40,6 +42,7 @@ from slipsweep.kernels.block import (
     lane_friction,
     lane_of,
     lane_response,
+    lane_slip,
     phase,
     slip,
     slip_root,
@@ -56,22 +59,25 @@ _X, _LEVEL, _START, _V, _W, _HELD, _RATE, _MOMENT, _PSI, _LEFT, _PEAK, _CONVERGE
     LANE_ROWS * TILE, (LANE_ROWS + 13) * TILE, TILE
 )
 #: What a first pulse leaves to the pulses after it: V carried on, W up to then, W if it were the
-#: last, t1 and the largest V; and, of a pulse entered in motion, V as it is slowest.
-_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _SLOWEST = range((LANE_ROWS + 13) * TILE, (LANE_ROWS + 19) * TILE, TILE)
-_LANES_SIZE = (LANE_ROWS + 19) * TILE
+#: last, t1 and the largest V; and, of a pulse
+#: entered in motion, V as it is slowest, what V gains, and how many such pulses follow each other.
+_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _SLOWEST, _GAIN, _MOST = range(
+    (LANE_ROWS + 13) * TILE, (LANE_ROWS + 21) * TILE, TILE
+)
+_LANES_SIZE = (LANE_ROWS + 21) * TILE
 
 #: Rows of a tile's blocks beside the lanes': the codes, and the way a cell goes.
 _MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
 _BLOCKS_SIZE = (LANE_ROWS + 3) * TILE
 
-#: The ways a cell can go: held at the yield value to the peak; held, then by Eq. 4; stuck at
-#: Üg = Üy until Eq. 4 falls below Üg; sliding continuously.
-_OTHER, _YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS = range(5)
+#: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak;
+#: held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other,
+#: event by event.
+_STAYS, _YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS, _OTHER = range(6)
 
 #: 12 nodes reach 1e-14 where friction falls by no more than e^6 (at 8 e-foldings, 2e-14).
 _LANE_NODES, _LANE_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
 _LANE_E_FOLDINGS = 6.0
-_LANE_SINES = np.sin(_HALF_PI * _LANE_NODES)
 
 #: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes reach 1e-14.
 _SHORT_NODES, _SHORT_WEIGHTS = (
@@ -79,12 +85,19 @@ _SHORT_NODES, _SHORT_WEIGHTS = (
 )
 _SHORT_SINE = math.sin(0.6)
 
-#: Newton iterations of the lanes, and the relative size of the last that counts as converged
-#: (the error left is its square, and enters the result squared again).
-_LANE_ITERATIONS = 5
-#: For lanes that stick first, few, whose curves start flat.
-_STICKS_ITERATIONS = 9
-_LANE_TOLERANCE = 1e-5
+#: Coefficients, highest first, of ∫ e^(−k sin φ) dφ over [0, π/2] in powers of 4 − k: integrals of
+#: sinⁿ e^(−4 sin) / n!, all positive, on 8 panels of 8 nodes (more on fewer panels have weights that
+#: are wrong by 3e-15).  31 terms give 4e-16 for k from 0 to 6; about 4, no digits cancel where k is large.
+_CENTRE = 4.0
+_PANEL_WIDTH = _HALF_PI / 8
+_SINES = np.sin(_PANEL_WIDTH * (np.arange(8)[:, np.newaxis] + _SHORT_NODES))
+_WEIGHTED = _PANEL_WIDTH * _SHORT_WEIGHTS * np.exp(-_CENTRE * _SINES)
+_QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) for n in range(30, -1, -1)])
+
+#: Relative size of a Newton step that is the last (the error left is its square, and enters the
+#: result squared again).  A lane that has taken it stays where it is, whatever its neighbours do.
+_LANE_TOLERANCE = 1e-7
+_MOST_ITERATIONS = 16
 
 
 @in_lanes
@@ -117,7 +130,7 @@ def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple
         width = right - left
         rate, moment = 0.0, 0.0
         for node in range(NODES.size):
-            weighted = WEIGHTS[node] * slip(block, amplitude * (1.0 - versine(left + width * NODES[node])))
+            weighted = WEIGHTS[node] * slip(block, amplitude * sine_after(left, width * NODES[node]))
             rate += weighted
             moment += (1.0 - NODES[node]) * weighted
         second += (first + moment * width) * width
@@ -194,9 +207,15 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     return Motion(displacement, peak, 0)
 
 
+@scalar
+def drift_rate(block: Block, x: float) -> float:
+    """tan θ x (μs − tan θ − μ), half of what V gains at x and at −x together; where μ is huge, tan θ x is not."""
+    return block.tan_theta * x * (block.mu_s - block.tan_theta - friction(block, x))
+
+
 @summed
 def drift_integral(block: Block) -> float:
-    """Gain of V over a whole cycle, 4 tan θ ∫ x (μs − tan θ − μ) dψ over a quarter.
+    """Gain of V over a whole cycle, 4 ∫ tan θ x (μs − tan θ − μ) dψ over a quarter.
 
     The sum of the two half cycles with g cancelled by hand: over 10⁶ cycles the rounding
     of that cancellation would show.
@@ -210,13 +229,13 @@ def drift_integral(block: Block) -> float:
         width = right - left
         part = 0.0
         for node in range(NODES.size):
-            x = block.amplitude * (1.0 - versine(left + width * NODES[node]))
-            part += WEIGHTS[node] * x * (block.mu_s - block.tan_theta - friction(block, x))
+            x = block.amplitude * sine_after(left, width * NODES[node])
+            part += WEIGHTS[node] * drift_rate(block, x)
         total += part * width
         left = right
         if e_foldings <= bound:
             break
-    return 4.0 * block.tan_theta * total
+    return 4.0 * total
 
 
 @in_lanes
@@ -239,7 +258,8 @@ def way_of(block: Block, options: Options, at_start: float, at_end: float) -> in
     way = _YIELD_GOVERNS if options.rise == NEWMARK else way
     way = way if block.sliding_mode == STICK_SLIP else _OTHER
     early = gentle & (start <= _SHORT_SINE * end) & (not options.wants_peak)
-    return _CONTINUOUS if (block.sliding_mode == CONTINUOUS) & early else way
+    way = _CONTINUOUS if (block.sliding_mode == CONTINUOUS) & early else way
+    return way if block.sliding_mode > STUCK else _STAYS
 
 
 @in_lanes
@@ -253,113 +273,172 @@ def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tu
 
 
 @scalar
-def lane_onset(count: int, way: int, g: float, lanes: np.ndarray) -> None:
+def lane_onset(way: int, g: float, lanes: np.ndarray) -> None:
     """t1: where each lane begins to slide (ψ in _START) and the value it then holds (_LEVEL)."""
-    for j in range(count):
+    for j in range(STRIP):
         lanes[_CONVERGED + j] = 1.0
         lanes[_LEVEL + j], lanes[_START + j] = lanes[YIELD + j], lanes[BEGAN + j]
     if way != _STICKS:
         return
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = 0.0
     # D = 0, from the left, where a concave D converges, slowly where it starts flat
-    for _ in range(_STICKS_ITERATIONS):
-        for j in range(count):
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
             x = lanes[_LEVEL + j]
             asked, slope = lane_response_and_slope(lanes, j, x, g)
             step = (asked - x) / (1.0 - slope)
-            lanes[_LEVEL + j] = x + step
-            lanes[_CONVERGED + j] = 1.0 if abs(step) <= _LANE_TOLERANCE * x else 0.0
-    for j in range(count):
-        lanes[_START + j] = -inverse_versine((lanes[AMPLITUDE + j] - lanes[_LEVEL + j]) / lanes[AMPLITUDE + j])
+            settled = lanes[_CONVERGED + j] > 0.0
+            lanes[_LEVEL + j] = x if settled else x + step
+            settled |= abs(step) <= _LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[_CONVERGED + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[_START + j] = rising_phase(lanes[_LEVEL + j], lanes[AMPLITUDE + j])
 
 
 @scalar
-def lane_rise(count: int, way: int, g: float, lanes: np.ndarray) -> None:
+def lane_switch(g: float, lanes: np.ndarray) -> None:
+    """x at which each lane ceases to hold its level and follows Eq. 4 (_X), and b at the peak (_HELD)."""
+    for j in range(STRIP):
+        amplitude, level = lanes[AMPLITUDE + j], lanes[_LEVEL + j]
+        asked, slope = lane_response_and_slope(lanes, j, amplitude, g)
+        follows = asked > level
+        lanes[_HELD + j] = asked if follows else level
+        lanes[_X + j] = amplitude - (asked - level) / slope if follows else amplitude
+        lanes[_PSI + j] = 0.0 if follows else 1.0
+    # E = b, from the right, where a convex E converges
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            x = lanes[_X + j]
+            asked, slope = lane_response_and_slope(lanes, j, x, g)
+            step = (asked - lanes[_LEVEL + j]) / slope
+            settled = lanes[_PSI + j] > 0.0
+            lanes[_X + j] = x if settled else x - step
+            settled |= abs(step) <= _LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[_PSI + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_PSI + j])
+
+
+@scalar
+def lane_rise(way: int, g: float, lanes: np.ndarray) -> None:
     """From t1 to the peak: b in _HELD, V and W gained from rest in _V and _W."""
-    for j in range(count):
-        lanes[_X + j], lanes[_HELD + j] = lanes[AMPLITUDE + j], lanes[_LEVEL + j]
-    if way != _YIELD_GOVERNS:
-        for j in range(count):
-            lanes[_HELD + j] = max(lane_response(lanes, j, lanes[AMPLITUDE + j], g), lanes[_LEVEL + j])
-        # the switch from the hold to Eq. 4: E = b, from the right, where a convex E converges
-        for _ in range(_STICKS_ITERATIONS if way == _STICKS else _LANE_ITERATIONS):
-            for j in range(count):
-                x = lanes[_X + j]
-                asked, slope = lane_response_and_slope(lanes, j, x, g)
-                step = (asked - lanes[_LEVEL + j]) / slope
-                follows = lanes[_HELD + j] > lanes[_LEVEL + j]
-                lanes[_X + j] = x - step if follows else x
-                lanes[_PSI + j] = 1.0 if (abs(step) <= _LANE_TOLERANCE * x) | (not follows) else 0.0
-        for j in range(count):
-            lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_PSI + j])
+    if way == _YIELD_GOVERNS:
+        for j in range(STRIP):
+            lanes[_X + j], lanes[_HELD + j] = lanes[AMPLITUDE + j], lanes[_LEVEL + j]
+            lanes[_V + j], lanes[_W + j] = held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_START + j], 0.0)
+        return
+    lane_switch(g, lanes)
     # the hold
-    for j in range(count):
-        amplitude, x = lanes[AMPLITUDE + j], lanes[_X + j]
+    for j in range(STRIP):
+        amplitude = lanes[AMPLITUDE + j]
         # no earlier than the start, from which it may differ by the roundings of two roots
-        psi = max(-inverse_versine((amplitude - x) / amplitude), lanes[_START + j])
+        psi = max(rising_phase(lanes[_X + j], amplitude), lanes[_START + j])
         lanes[_PSI + j] = psi
         lanes[_V + j], lanes[_W + j] = held_motion(amplitude, lanes[_LEVEL + j], lanes[_START + j], psi)
         lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
-    if way == _YIELD_GOVERNS:
-        return
     # Eq. 4
     for node in range(_LANE_NODES.size):
         left, weight = 1.0 - _LANE_NODES[node], _LANE_WEIGHTS[node]
-        for j in range(count):
+        for j in range(STRIP):
             x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[_PSI + j] * left))
-            weighted = weight * (x - lane_response(lanes, j, x, g))
+            weighted = weight * lane_slip(lanes, j, x, g)
             lanes[_RATE + j] += weighted
             lanes[_MOMENT + j] += left * weighted
-    for j in range(count):
+    for j in range(STRIP):
         width = -lanes[_PSI + j]
         lanes[_W + j] += (lanes[_V + j] + lanes[_MOMENT + j] * width) * width
         lanes[_V + j] += lanes[_RATE + j] * width
 
 
 @scalar
-def lane_fall(count: int, lanes: np.ndarray) -> None:
-    """The hold from the peak to the stop or to Üg = 0 (t5): V left in _LEFT, the largest V in _PEAK."""
-    for j in range(count):
-        # V is largest where x = b; a parabola from there overestimates the stop
-        amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_V + j]
-        top = inverse_versine((amplitude - held) / amplitude)
-        lanes[_PEAK + j] = velocity + held_motion(amplitude, held, 0.0, top)[0]
-        lanes[_LEFT + j] = velocity + held_motion(amplitude, held, 0.0, _HALF_PI)[0]
-        onward = math.sqrt(2.0 * lanes[_PEAK + j] / (amplitude * (top - angle_minus_sine(top))))
-        lanes[_PSI + j] = min(top + onward, _HALF_PI)
-    for iteration in range(_LANE_ITERATIONS):
-        for j in range(count):
-            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
-            over = lanes[_V + j] + held_motion(amplitude, held, 0.0, psi)[0]
-            step = over / (amplitude - held - amplitude * versine(psi))
-            lanes[_PSI + j] = min(max(psi - step, 0.0), _HALF_PI)
-            settled = (abs(step) <= _LANE_TOLERANCE * psi) | (lanes[_LEFT + j] > 0.0)
-            lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if settled | (iteration < _LANE_ITERATIONS - 1) else 0.0
-    for j in range(count):
-        amplitude, held, left = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_LEFT + j]
-        end = _HALF_PI if left > 0.0 else lanes[_PSI + j]
-        lanes[_W + j] += lanes[_V + j] * end + held_motion(amplitude, held, 0.0, end)[1]
+def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
+    """The hold from the peak to the stop or to Üg = 0 (t5): V left in _LEFT, if wanted the largest V in _PEAK."""
+    unsettled = 0
+    for j in range(STRIP):
+        left = lanes[_V + j] + held_motion(lanes[AMPLITUDE + j], lanes[_HELD + j], 0.0, _HALF_PI)[0]
         lanes[_LEFT + j] = max(left, 0.0)
+        lanes[_PSI + j] = _HALF_PI
+        lanes[_PEAK + j] = math.nan
+        unsettled += 0 if left > 0.0 else 1
+    if wants_peak or unsettled > 0:
+        for j in range(STRIP):
+            # V is largest where x = b; a parabola from there overestimates the stop
+            amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_V + j]
+            top = -rising_phase(held, amplitude)
+            peak = velocity + held_motion(amplitude, held, 0.0, top)[0]
+            onward = math.sqrt(2.0 * peak / (amplitude * (top - angle_minus_sine(top))))
+            lanes[_PSI + j] = _HALF_PI if lanes[_LEFT + j] > 0.0 else min(top + onward, _HALF_PI)
+            lanes[_PEAK + j] = peak if wants_peak else math.nan
+            lanes[_X + j] = 1.0 if lanes[_LEFT + j] > 0.0 else 0.0
+        for _ in range(_MOST_ITERATIONS):
+            if unsettled == 0:
+                break
+            unsettled = 0
+            for j in range(STRIP):
+                amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
+                over = lanes[_V + j] + held_motion(amplitude, held, 0.0, psi)[0]
+                step = over / (amplitude - held - amplitude * versine(psi))
+                settled = lanes[_X + j] > 0.0
+                lanes[_PSI + j] = psi if settled else min(max(psi - step, 0.0), _HALF_PI)
+                settled |= abs(step) <= _LANE_TOLERANCE * psi
+                lanes[_X + j] = 1.0 if settled else 0.0
+                unsettled += 0 if settled else 1
+        for j in range(STRIP):
+            lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_X + j])
+    for j in range(STRIP):
+        end = lanes[_PSI + j]
+        lanes[_W + j] += lanes[_V + j] * end + held_motion(lanes[AMPLITUDE + j], lanes[_HELD + j], 0.0, end)[1]
+
+
+@in_lanes
+def pause_of(began: float) -> float:
+    """Phase from Üg = 0 (t5) to the next Üg = Üy."""
+    return 1.5 * math.pi + began
+
+
+@in_lanes
+def slid(velocity: float, after: float, held: float) -> float:
+    """W while Eq. 12 brings V down: (V² − V'²) / 2b, the squares of which need be no doubles."""
+    return 0.5 * (velocity - after) * ((velocity + after) / held)
+
+
+@in_lanes
+def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: float) -> float:
+    """W of the pulse that a lane has followed and of `later` more, each entered with V greater by `gain`.
+
+    All but the last slide `braked` and π · gain · (2n − 1) more between two pulses, the last to its stop.
+    """
+    moved, left = lanes[_W + j], lanes[_LEFT + j] + later * gain
+    last = moved + later * gain * (_HALF_PI - lanes[BEGAN + j]) + slid(left, 0.0, lanes[_HELD + j])
+    return later * (moved + braked + math.pi * gain * (later - 1.0)) + last
 
 
 @scalar
-def lane_attenuation(count: int, way: int, cycles: int, lanes: np.ndarray) -> None:
+def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
     """Eq. 12, and all cycles: W in _W, the largest V in _PEAK.
 
     Where a block still slides at the next Üg = Üy, Eq. 4 and the hold act on it as in the
     pulse before, so that each cycle adds the same velocity v: an arithmetic series.  But what
     sticks at Üg = Üy when at rest does not when it slides: `lane_carried` goes on with it.
     """
-    for j in range(count):
+    for j in range(STRIP):
         held, left, moved = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j]
-        duration = 1.5 * math.pi + lanes[BEGAN + j]  # from Üg = 0 to the next Üg = Üy
-        carried = max(left - held * duration, 0.0)
-        braked = 0.5 * (left - carried) * (left + carried) / held
+        carried = max(left - held * pause_of(lanes[BEGAN + j]), 0.0)
+        braked = slid(left, carried, held)
         later = cycles - 1.0
-        last = moved + later * carried * (_HALF_PI - lanes[BEGAN + j]) + 0.5 * (left + later * carried) ** 2 / held
         lanes[_CARRIED + j], lanes[_MOVED + j] = carried, moved + braked
-        lanes[_LAST + j] = moved + 0.5 * left * left / held
+        lanes[_LAST + j] = moved + slid(left, 0.0, held)
         lanes[_HIGHEST + j], lanes[_ONSET + j] = lanes[_PEAK + j], lanes[_START + j]
-        lanes[_W + j] = later * (moved + braked + math.pi * carried * (later - 1.0)) + last
+        lanes[_W + j] = lane_series(lanes, j, braked, carried, later)
         lanes[_PEAK + j] += later * carried
         still = (carried > 0.0) & (cycles > 1)
         lanes[_CODE + j] = NOT_RECOUPLED if still else 0
@@ -377,95 +456,117 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
             for row in range(0, _LANES_SIZE, TILE):
                 lanes[row + used] = lanes[row + lane]
             used += 1
-    for lane in range(used, whole_lanes(used)):
-        for row in range(0, _LANES_SIZE, TILE):
-            lanes[row + lane] = lanes[row]
+    fill_up(used, LANE_ROWS + 21, lanes)
     return used
 
 
 @scalar
-def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
+def lane_carried(options: Options, lanes: np.ndarray) -> None:
     """All cycles of lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
 
-    Then they hold E(Üy) ≥ Üg from Üy on, and one of three things happens.  They stop before t1 of
-    the first pulse, and go on like it; they slide through and stop before the third pulse, which
-    is the first again; or they never stop, and each cycle adds the same velocity.
+    Then they hold E(Üy) ≥ Üg from Üy on and slide through, and each pulse is entered with V greater by
+    the same gain.  Where that is a loss, one of two things ends it, and the motion repeats: a pulse that
+    recouples, or one that stops before t1 of the first pulse and goes on like it.
     """
-    g, cycles = options.g, options.cycles
-    later = cycles - 1.0
-    # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
-    for j in range(count):
-        lanes[_LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], g)
-        lanes[_START + j] = lanes[_PSI + j] = lanes[BEGAN + j]
-    for _ in range(_LANE_ITERATIONS):
-        for j in range(count):
-            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_PSI + j]
-            velocity = lanes[_CARRIED + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
-            step = velocity / (amplitude - held - amplitude * versine(psi))
-            lanes[_PSI + j] = min(max(psi - step, lanes[BEGAN + j]), lanes[_ONSET + j])
-            settled = abs(step) <= _LANE_TOLERANCE * abs(lanes[_PSI + j] - lanes[BEGAN + j])
-            lanes[_X + j] = 1.0 if settled & (lanes[_PSI + j] < lanes[_ONSET + j]) else 0.0
-    for j in range(count):
-        began, psi = lanes[BEGAN + j], lanes[_PSI + j]
-        again = (
-            lanes[_CARRIED + j] * (psi - began) + held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], began, psi)[1]
-        )
-        stops = lanes[_X + j] > 0.0
-        lanes[_CODE + j] = later * (lanes[_MOVED + j] + again) + lanes[_LAST + j] if stops else math.nan
-        lanes[_CONVERGED + j] = 1.0
+    later = options.cycles - 1.0
+    for j in range(STRIP):
+        lanes[_LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
+        lanes[_START + j], lanes[_CONVERGED + j] = lanes[BEGAN + j], 1.0
     # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
-    lane_rise(count, _FOLLOWS, g, lanes)
-    for j in range(count):
+    lane_rise(_FOLLOWS, options.g, lanes)
+    for j in range(STRIP):
         amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
-        slowest = -inverse_versine((amplitude - held) / amplitude)
+        slowest = rising_phase(held, amplitude)
         lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
         # held until past its slowest, or else Eq. 4 itself slows it
-        through = (held < amplitude) & (lanes[_X + j] >= held) & (lanes[_SLOWEST + j] > 0.0)
+        through = (held < amplitude) & (lanes[_X + j] >= held)
         lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if through else 0.0
         lanes[_W + j] += -carried * began
         lanes[_V + j] += carried
-    lane_fall(count, lanes)
-    for j in range(count):
-        held, left, moved, began = lanes[_HELD + j], lanes[_LEFT + j], lanes[_W + j], lanes[BEGAN + j]
-        after = max(left - held * (1.5 * math.pi + began), 0.0)
-        braked = 0.5 * (left - after) * (left + after) / held
-        gain = after - lanes[_CARRIED + j]
-        most = later - 1.0  # pulses after the second
-        series = lanes[_MOVED + j] + most * (moved + braked + math.pi * gain * (most - 1.0))
-        series += moved + most * gain * (_HALF_PI - began) + 0.5 * (left + most * gain) ** 2 / held
-        # after == 0: pairs of pulses, and of an odd number the last is a first one
-        pairs = math.floor(0.5 * cycles)
-        paired = pairs * (lanes[_MOVED + j] + moved + braked) + (lanes[_LAST + j] if cycles > 2.0 * pairs else 0.0)
-        lasts = min(lanes[_SLOWEST + j], after) + most * min(gain, 0.0) > 0.0
-        slides = lanes[_CONVERGED + j] > 0.0
-        stopped = lanes[_CODE + j]
-        through = paired if after == 0.0 else series
-        lanes[_W + j] = through if slides else stopped
-        slides &= (after == 0.0) | lasts
-        lanes[_CONVERGED + j] = 1.0 if slides | (stopped == stopped) else 0.0
-        highest = lanes[_PEAK + j] + (most * max(gain, 0.0) if after > 0.0 else 0.0)
-        lanes[_PEAK + j] = max(lanes[_HIGHEST + j], highest if slides else 0.0)
+    lane_fall(options.wants_peak, lanes)
+    for j in range(STRIP):
+        # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
+        carried, slowest = lanes[_CARRIED + j], lanes[_SLOWEST + j]
+        gain = lanes[_LEFT + j] - lanes[_HELD + j] * pause_of(lanes[BEGAN + j]) - carried
+        after = carried + gain
+        through = (np.ceil(slowest / -gain) if gain < 0.0 else later) if slowest > 0.0 else 0.0
+        sliding = (np.ceil(after / -gain) if gain < 0.0 else later) if after > 0.0 else 0.0
+        most = min(min(through, sliding + 1.0), later)
+        stops = (through <= sliding) & (most < later)
+        lanes[_GAIN + j], lanes[_MOST + j] = gain, most
+        # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
+        lanes[_V + j] = carried + (most * gain if most > 0.0 else 0.0)
+        lanes[_PSI + j] = lanes[BEGAN + j]
+        lanes[_X + j] = 0.0 if stops else 1.0
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[_PSI + j]
+            velocity = lanes[_V + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
+            step = velocity / (amplitude - held - amplitude * versine(psi))
+            settled = lanes[_X + j] > 0.0
+            lanes[_PSI + j] = psi if settled else min(max(psi - step, lanes[BEGAN + j]), lanes[_ONSET + j])
+            settled |= abs(step) <= _LANE_TOLERANCE * abs(lanes[_PSI + j] - lanes[BEGAN + j])
+            lanes[_X + j] = 1.0 if settled else 0.0
+            # one that reaches t1 does not stop before
+            unsettled += 0 if settled | (lanes[_PSI + j] >= lanes[_ONSET + j]) else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        began, psi, left, gain, most = (
+            lanes[BEGAN + j],
+            lanes[_PSI + j],
+            lanes[_LEFT + j],
+            lanes[_GAIN + j],
+            lanes[_MOST + j],
+        )
+        held_on = held_motion(lanes[AMPLITUDE + j], lanes[_LEVEL + j], began, psi)[1]
+        again = lanes[_V + j] * (psi - began) + held_on if psi > began else 0.0
+        stops = psi > began
+        braked = slid(left, lanes[_CARRIED + j] + gain, lanes[_HELD + j])
+        periods = np.floor(later / (most + 1.0))
+        rest = later - periods * (most + 1.0)
+        sliding_on = most * (lanes[_W + j] + braked + math.pi * gain * (most - 1.0))
+        slides = sliding_on if stops else lane_series(lanes, j, braked, gain, most - 1.0)
+        period = lanes[_MOVED + j] + again + (slides if most > 0.0 else 0.0)
+        tail = lanes[_MOVED + j] + lane_series(lanes, j, braked, gain, rest - 1.0)
+        lanes[_W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if rest > 0.0 else lanes[_LAST + j])
+        # the slides through all reach t5, as the first does
+        alike = (lanes[_CONVERGED + j] > 0.0) & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
+        solved = ((most == 0.0) | alike) & (lanes[_X + j] > 0.0) & ((not stops) | (psi < lanes[_ONSET + j]))
+        lanes[_CONVERGED + j] = 1.0 if solved else 0.0
+        highest = lanes[_PEAK + j] + max(gain, 0.0) * max(rest - 1.0, 0.0)
+        lanes[_PEAK + j] = max(lanes[_HIGHEST + j], highest if most > 0.0 else 0.0)
         lanes[_CODE + j] = NOT_RECOUPLED
 
 
 @scalar
-def lane_recoupling(count: int, cycles: int, lanes: np.ndarray) -> None:
+def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
     """From Üg = 0 on by integration, χ = φ − π to the stop, which comes before 2π for b ≥ Üy; and all cycles."""
-    for j in range(count):
+    for j in range(STRIP):
         # vers χ ≥ 2 χ²/π²: this start lies beyond the stop
         b, left = lanes[_HELD + j], lanes[_LEFT + j]
         curvature = 4.0 * lanes[AMPLITUDE + j] / (math.pi * math.pi)
-        lanes[_PSI + j] = min(2.0 * left / (b + math.sqrt(b * b + 2.0 * curvature * left)), math.pi)
-    for iteration in range(_LANE_ITERATIONS):
-        for j in range(count):
+        longest = left / b
+        lanes[_PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
+        lanes[_X + j] = 0.0
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
             amplitude, b, chi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
             half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
             over = lanes[_LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
-            step = -over / (b + 2.0 * amplitude * half_sine * half_cosine)
-            lanes[_PSI + j] = min(max(chi - step, 0.0), math.pi)
-            settled = (abs(step) <= _LANE_TOLERANCE * chi) | (iteration < _LANE_ITERATIONS - 1)
-            lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if settled else 0.0
-    for j in range(count):
+            step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
+            settled = lanes[_X + j] > 0.0
+            lanes[_PSI + j] = chi if settled else min(max(chi + step, 0.0), math.pi)
+            settled |= abs(step) <= _LANE_TOLERANCE * chi
+            lanes[_X + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_X + j])
+    for j in range(STRIP):
         amplitude, b, chi = lanes[AMPLITUDE + j], lanes[_HELD + j], lanes[_PSI + j]
         sine = 2.0 * (0.5 * chi - angle_minus_sine(0.5 * chi)) * (1.0 - versine(0.5 * chi))
         lanes[_W + j] += (lanes[_LEFT + j] - 0.5 * b * chi) * chi - amplitude * (chi - sine)
@@ -473,37 +574,50 @@ def lane_recoupling(count: int, cycles: int, lanes: np.ndarray) -> None:
         lanes[_CODE + j] = 0.0
 
 
+@in_lanes
+def quarter_integrals(k: float) -> tuple[float, float]:
+    """∫ e^(−k sin φ) dφ and ∫ sin φ e^(−k sin φ) dφ over [0, π/2], for k from 0 to the e-foldings of the lanes.
+
+    The second is the derivative of the first by −k.  In closed form they are π/2 (I₀ − L₀) and
+    1 + π/2 (L₁ − I₁), modified Bessel and Struve functions of k.
+    """
+    below = _CENTRE - k
+    first, second = 0.0, 0.0
+    for n in range(_QUARTER_SERIES.size):
+        second = second * below + first
+        first = first * below + _QUARTER_SERIES[n]
+    return first, second
+
+
 @scalar
-def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
+def lane_continuous(options: Options, lanes: np.ndarray) -> None:
     """Continuous sliding, all cycles: W in row _W."""
     g = options.g
-    for j in range(count):
-        # the whole quarter: D in _V, a quarter of the drift in _X; up to Üg = Üy: _RATE, _MOMENT
-        lanes[_V + j] = lanes[_X + j] = lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
-    for node in range(_LANE_NODES.size):
-        weight, sine = _LANE_WEIGHTS[node], _LANE_SINES[node]
-        for j in range(count):
-            mu_s, tan_theta, x = lanes[MU_S + j], lanes[TAN_THETA + j], lanes[AMPLITUDE + j] * sine
-            mu = lane_friction(lanes, j, x, g)
-            lanes[_V + j] += weight * (x - eq.block_acceleration(x, mu, mu_s, tan_theta, g))
-            lanes[_X + j] += weight * x * (mu_s - tan_theta - mu)
+    for j in range(STRIP):
+        # the whole quarter: ∫ D in _V, a quarter of the drift in _X; up to Üg = Üy: _RATE, _MOMENT
+        amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
+        most = mu_s + lanes[DELTA_MU + j]
+        plain, with_sine = quarter_integrals(lanes[DECAY_RATE + j] * amplitude / g)
+        lanes[_X + j] = amplitude * tan_theta * (mu_s - tan_theta - most * with_sine)
+        lanes[_V + j] = g * (_HALF_PI * mu_s - most * plain) + lanes[_X + j]
+        lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
     for node in range(_SHORT_NODES.size):
         at, left, weight = _SHORT_NODES[node], 1.0 - _SHORT_NODES[node], _SHORT_WEIGHTS[node]
-        for j in range(count):
+        for j in range(STRIP):
             # sin φ on the way from Üg = 0 to Üg = Üy
             phi = (_HALF_PI + lanes[BEGAN + j]) * at
             x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-            weighted = weight * (x - lane_response(lanes, j, x, g))
+            weighted = weight * lane_slip(lanes, j, x, g)
             lanes[_RATE + j] += weighted
             lanes[_MOMENT + j] += left * weighted
-    for j in range(count):
+    for j in range(STRIP):
         began = lanes[BEGAN + j]
         width = _HALF_PI + began
         lanes[_W + j] = continuous_displacement(
-            _HALF_PI * lanes[_V + j],
+            lanes[_V + j],
             lanes[_RATE + j] * width,
             lanes[_MOMENT + j] * width * width,
-            4.0 * lanes[TAN_THETA + j] * _HALF_PI * lanes[_X + j],
+            4.0 * lanes[_X + j],
             began,
             options.cycles,
         )
@@ -511,18 +625,18 @@ def lane_continuous(count: int, options: Options, lanes: np.ndarray) -> None:
 
 
 @scalar
-def solve_lanes(count: int, way: int, options: Options, lanes: np.ndarray) -> None:
+def solve_strip(way: int, options: Options, lanes: np.ndarray) -> None:
     """Lanes that all go one way, from the onset to the end of all cycles."""
     if way == _CONTINUOUS:
-        lane_continuous(count, options, lanes)
+        lane_continuous(options, lanes)
         return
-    lane_onset(count, way, options.g, lanes)
-    lane_rise(count, way, options.g, lanes)
-    lane_fall(count, lanes)
+    lane_onset(way, options.g, lanes)
+    lane_rise(way, options.g, lanes)
+    lane_fall(options.wants_peak, lanes)
     if options.recoupling == INTEGRATE:
-        lane_recoupling(count, options.cycles, lanes)
+        lane_recoupling(options.cycles, lanes)
     else:
-        lane_attenuation(count, way, options.cycles, lanes)
+        lane_attenuation(way, options.cycles, lanes)
 
 
 @scalar
@@ -538,30 +652,56 @@ def sort_cells(cells: np.ndarray, count: int, options: Options, blocks: np.ndarr
 
 
 @scalar
-def fill_lanes(blocks: np.ndarray, count: int, way: int, lanes: np.ndarray, where: np.ndarray) -> int:
-    """Lay out the blocks that go one way; the number of them.  Lanes to the next multiple repeat the first."""
-    used = 0
-    for j in range(count):
-        if blocks[_WAY + j] == way:
-            where[used] = j
-            used += 1
-    for row in range(LANE_ROWS):
-        for lane in range(used):
-            lanes[row * TILE + lane] = blocks[row * TILE + where[lane]]
+def runs_of(blocks: np.ndarray, count: int, runs: np.ndarray) -> int:
+    """Where runs of cells that go the same way start (and the last ends); the number of them.
+
+    Along an axis of a sweep neighbours mostly go the same way: cells are laid out and collected
+    run by run.
+    """
+    runs[0], found = 0, 1
+    for j in range(1, count):
+        if blocks[_WAY + j] != blocks[_WAY + j - 1]:
+            runs[found] = j
+            found += 1
+    runs[found] = count
+    return found
+
+
+@scalar
+def fill_lanes(blocks: np.ndarray, first: int, last: int, used: int, lanes: np.ndarray) -> int:
+    """Lay out a run of blocks behind the `used` lanes; the number of lanes with them."""
+    if last - first < 8:  # a loop for each row would cost more than it does
+        for j in range(first, last):
+            for row in range(0, LANE_ROWS * TILE, TILE):
+                lanes[row + used + j - first] = blocks[row + j]
+    else:
+        for row in range(0, LANE_ROWS * TILE, TILE):
+            source, target = blocks[row + first : row + last], lanes[row + used : row + TILE]
+            for j in range(source.size):
+                target[j] = source[j]
+    return used + last - first
+
+
+@scalar
+def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
+    """Repeat the first lane up to the next whole number of strips."""
+    for row in range(0, rows * TILE, TILE):
         for lane in range(used, whole_lanes(used)):
-            lanes[row * TILE + lane] = lanes[row * TILE]
-    return used
+            lanes[row + lane] = lanes[row]
 
 
 @scalar
 def collect(
-    used: int, way: int, lanes: np.ndarray, where: np.ndarray, blocks: np.ndarray, motion: np.ndarray, codes: np.ndarray
-) -> None:
+    used: int, way: int, options: Options, lanes: np.ndarray, where: np.ndarray, blocks: np.ndarray,
+    motion: np.ndarray, codes: np.ndarray,
+) -> None:  # fmt: skip
     """Results of the lanes that have converged; the other cells are to go the long way."""
     for lane in range(used):
         j = where[lane]
         if lanes[_CONVERGED + lane] > 0.0:
-            motion[0, j], motion[1, j] = lanes[_W + lane], lanes[_PEAK + lane]
+            motion[0, j] = lanes[_W + lane]
+            if options.wants_peak:
+                motion[1, j] = lanes[_PEAK + lane]
             codes[1, j] |= int(lanes[_CODE + lane]) | (EQ4_BELOW_YIELD if way == _YIELD_GOVERNS else 0)
             blocks[_WAY + j] = way
         else:
@@ -569,31 +709,50 @@ def collect(
 
 
 @scalar
+def solve_way(
+    way: int, runs: np.ndarray, count: int, options: Options, blocks: np.ndarray, lanes: np.ndarray,
+    motion: np.ndarray, codes: np.ndarray,
+) -> None:  # fmt: skip
+    """Solve the cells of a tile that go one way."""
+    used = 0
+    for run in range(count):
+        if blocks[_WAY + runs[run]] == way:
+            used = fill_lanes(blocks, runs[run], runs[run + 1], used, lanes)
+    if used == 0:
+        return
+    fill_up(used, LANE_ROWS, lanes)
+    for first in range(0, used, STRIP):
+        solve_strip(way, options, lanes[first:])
+    where, lane = np.empty(used, np.int64), 0
+    for run in range(count):
+        if blocks[_WAY + runs[run]] == way:
+            for j in range(runs[run], runs[run + 1]):
+                where[lane] = j
+                lane += 1
+    collect(used, way, options, lanes, where, blocks, motion, codes)
+    if way == _STICKS:
+        used = fill_carried(used, lanes, where)
+        for first in range(0, used, STRIP):
+            lane_carried(options, lanes[first:])
+        collect(used, way, options, lanes, where, blocks, motion, codes)
+
+
+@scalar
 def solve_cells(
     cells: np.ndarray, count: int, options: Options, wave: Wave, motion: np.ndarray, codes: np.ndarray
 ) -> None:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
-    blocks, lanes, where = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE, np.int64)
-    for row in range(7):
-        for j in range(count, whole_lanes(count)):
-            cells[row * TILE + j] = cells[row * TILE]
+    blocks, lanes, runs = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE + 1, np.int64)
+    fill_up(count, 7, cells)
     sort_cells(cells, whole_lanes(count), options, blocks)
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[_MODE + j]), int(blocks[_VALIDITY + j])
-        motion[0, j] = motion[1, j] = 0.0 if codes[0, j] == STUCK else math.nan
+        motion[0, j] = motion[1, j] = 0.0 if blocks[_MODE + j] == STUCK else math.nan
+    found = runs_of(blocks, count, runs)
     for way in (_YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS):
-        used = fill_lanes(blocks, count, way, lanes, where)
-        if used == 0:
-            continue
-        solve_lanes(whole_lanes(used), way, options, lanes)
-        collect(used, way, lanes, where, blocks, motion, codes)
-        if way == _STICKS:
-            used = fill_carried(used, lanes, where)
-            if used > 0:
-                lane_carried(whole_lanes(used), options, lanes)
-                collect(used, way, lanes, where, blocks, motion, codes)
+        solve_way(way, runs, found, options, blocks, lanes, motion, codes)
     for j in range(count):
-        if blocks[_WAY + j] == _OTHER and codes[0, j] > STUCK:
+        if blocks[_WAY + j] == _OTHER:
             block = block_at(cells, j, options)
             if block.sliding_mode == CONTINUOUS:
                 answer = continuous(block, options.cycles, options.wants_peak)
