@@ -64,8 +64,9 @@ _LANES_SIZE = (LANE_ROWS + 21) * TILE
 _MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
 _BLOCKS_SIZE = (LANE_ROWS + 3) * TILE
 
-#: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak; held, then by Eq. 4; stuck at
-#: Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other, by `cycle.solve`.
+#: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak;
+#: held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other,
+#: by `cycle.solve`.
 _STAYS, _YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS, _OTHER = range(6)
 
 #: 12 nodes reach 1e-14 where friction falls by no more than e^6 (at 8 e-foldings, 2e-14).
@@ -124,7 +125,7 @@ def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tu
     mu = lane_friction(lanes, j, x, g)
     n = eq.normal_acceleration(x, tan_theta, g)
     slope = 1.0 - tan_theta * (mu_s - tan_theta - mu) - n * mu * lanes[DECAY_RATE + j] / g
-    return eq.block_acceleration(x, mu, mu_s, tan_theta, g), slope
+    return x - eq.lag(x, mu, mu_s, tan_theta, g), slope
 
 
 @scalar
