@@ -49,16 +49,21 @@ def mobilised_friction(
 
 
 @equation
-def relative_acceleration(
-    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
-) -> float:
-    """Eq. 4 as the rate of the relative velocity while the block slides, Üg − Ü, m/s².
+def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
+    """Eq. 4 as what the block falls short of the plane's acceleration, |Üg| − |Ü|, m/s².
 
     n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
     failure Üg is small against g tan θ, which would take its digits.
     """
-    lag = g * (mu_s - friction) + ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
-    return math.copysign(1.0, ground_acceleration) * lag
+    return g * (mu_s - friction) + ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
+
+
+@equation
+def relative_acceleration(
+    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
+) -> float:
+    """Eq. 4 as the rate of the relative velocity while the block slides, Üg − Ü, m/s²."""
+    return math.copysign(1.0, ground_acceleration) * lag(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
 @equation

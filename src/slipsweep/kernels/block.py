@@ -306,6 +306,5 @@ def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
 
 @in_lanes
 def lane_slip(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """D(x) of a lane."""
-    mu_s, tan_theta = lanes[MU_S + j], lanes[TAN_THETA + j]
-    return eq.relative_acceleration(x, lane_friction(lanes, j, x, g), mu_s, tan_theta, g)
+    """D(x) of a lane, x ≥ 0."""
+    return eq.lag(x, lane_friction(lanes, j, x, g), lanes[MU_S + j], lanes[TAN_THETA + j], g)

@@ -269,7 +269,7 @@ def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tu
     mu = lane_friction(lanes, j, x, g)
     n = eq.normal_acceleration(x, tan_theta, g)
     slope = 1.0 - tan_theta * (mu_s - tan_theta - mu) - n * mu * lanes[DECAY_RATE + j] / g
-    return eq.block_acceleration(x, mu, mu_s, tan_theta, g), slope
+    return x - eq.lag(x, mu, mu_s, tan_theta, g), slope
 
 
 @scalar
