@@ -195,6 +195,12 @@ def slip(block: Block, x: float) -> float:
 
 
 @scalar
+def opposite(a: float, b: float) -> bool:
+    """Whether one is positive and the other negative; their product might underflow."""
+    return a < 0.0 < b or b < 0.0 < a
+
+
+@scalar
 def slip_and_slope(block: Block, x: float) -> tuple[float, float]:
     """D and dD/dx (x ≠ 0)."""
     value, slope = response_and_slope(block, x)

@@ -32,6 +32,7 @@ from slipsweep.kernels.block import (
     block_at,
     friction,
     inflection,
+    opposite,
     response,
     response_and_slope,
     response_root,
@@ -198,7 +199,7 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
         if not follows and slope > 0.0 and response(block, end) > b:
             end = response_root(block, b, inner, end)
             crosses = True
-        if follows and slip(block, inner) * slip(block, end) < 0.0:
+        if follows and opposite(slip(block, inner), slip(block, end)):
             end = slip_root(block, 0.0, inner, end)
     if not follows and x < b < end:
         end = b
@@ -255,7 +256,7 @@ def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.n
     rate_end = plane(wave, p, amplitude, end) - held
     low, high = start, end
     stops = velocity + held_gain(wave, p, amplitude, held, start, end) <= 0.0
-    if rate * rate_end < 0.0 and (rate > 0.0 or velocity > 0.0):
+    if opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
         # V turns where x = b; one that starts from rest there only seems to fall, by rounding
         turn = offset_at(wave, p, amplitude, held)
         extreme = velocity + held_gain(wave, p, amplitude, held, start, turn)
@@ -429,7 +430,7 @@ def zeros_of_slip(block: Block, side: float, zeros: np.ndarray) -> int:
     for _ in range(zeros.size):
         target = next_break(block, x, end)
         inner = x + SLIVER * (target - x)
-        if slip(block, inner) * slip(block, target) < 0.0:
+        if opposite(slip(block, inner), slip(block, target)):
             zeros[count] = slip_root(block, 0.0, inner, target)
             count += 1
         x = target

@@ -36,6 +36,7 @@ from slipsweep.kernels.block import (
     Options,
     block_of,
     cell_of,
+    opposite,
     response,
     slip,
     slip_root,
@@ -256,7 +257,7 @@ def follow_leg(
         for _ in range(_MOST_LEGS):
             target = next_break(block, low, high)
             inner = low + _SLIVER * (target - low)
-            if slip(block, inner) * slip(block, target) < 0.0:
+            if opposite(slip(block, inner), slip(block, target)):
                 zero = slip_root(block, 0.0, inner, target)
                 gained = follow_integrals(block, x, slope, (zero - x) / slope, side)[0]
                 state[PEAK] = max(state[PEAK], state[VELOCITY] + gained)
@@ -274,7 +275,7 @@ def follow_through(
     """Eq. 4 from a place on to sample `until`."""
     while i < until:
         slope, end = slope_of(history, scale, i), scale * history.values[i + 1]
-        if x * end < 0.0:
+        if opposite(x, end):
             duration = min(-x / slope, left)
             follow_leg(block, state, x, math.copysign(0.0, x), slope, duration, math.copysign(1.0, x))
             x, left = math.copysign(0.0, end), left - duration

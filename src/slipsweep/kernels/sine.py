@@ -43,6 +43,7 @@ from slipsweep.kernels.block import (
     lane_of,
     lane_response,
     lane_slip,
+    opposite,
     phase,
     slip,
     slip_root,
@@ -153,7 +154,7 @@ def continuous_peak(block: Block, side: float, half_gain: float, after: float) -
     for _ in range(MOST_LEGS):
         target = next_break(block, x, end)
         inner = x + SLIVER * (target - x)
-        if slip(block, inner) * slip(block, target) < 0.0:
+        if opposite(slip(block, inner), slip(block, target)):
             zero = abs(slip_root(block, 0.0, inner, target))
             gained = slip_integrals(block, -_HALF_PI, phase(block, zero), side)[0]
             peak = max(peak, half_gain - gained)
