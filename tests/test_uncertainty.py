@@ -362,6 +362,7 @@ def test_no_warnings() -> None:
         ({"amplitude": {"distribution": "lognorm"}}, "uncertain.amplitude.s: missing: lognorm needs s"),
         ({"amplitude": LOGNORMAL}, "uncertain.amplitude: is drawn, but amplitude is given as well"),
         ({"amplitude": {**FACTOR, "s": 10**400}}, "must be a finite number"),
+        ({"mu_s": stats.norm([0.3, 0.4], 0.01)}, "uncertain.mu_s: is 2 distributions; must be one"),
         ({"amplitude": 3.0}, "uncertain.amplitude.distribution = 3.0: must be the name of a distribution"),
         ({"amplitude": {**FACTOR, "distribution": 1}}, "distribution = 1: must be the name of a distribution"),
         ({"mu": LOGNORMAL}, 'uncertain.mu: cannot be drawn; did you mean "mu_s"?'),

@@ -300,7 +300,6 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
         raise InputError(f"{key}.units = {units!r}: must be a unit that converts to {PARAMETERS[parameter]['units']}")
     if isinstance(chosen, str):
         frozen = _named(key, chosen, entries)
-        about = _described(frozen)
     elif not callable(getattr(chosen, "ppf", None)):
         raise InputError(
             f"{key}.distribution = {chosen!r}: must be the name of a distribution of scipy.stats, or a frozen one"
@@ -308,8 +307,13 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
     elif entries:
         raise InputError(f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own")
     else:
-        frozen, about = chosen, _described(chosen)
-    if not np.isfinite(frozen.ppf(0.5)):
+        frozen = chosen
+    with np.errstate(all="ignore"):
+        middle = np.asarray(frozen.ppf(0.5))
+    if middle.ndim:
+        raise InputError(f"{key}: is {middle.size} distributions; must be one")
+    about = _described(frozen)
+    if not np.isfinite(middle):
         raise InputError(f"{key}: parameters that scipy.stats does not allow: {about}")
     if units is not None:
         about["units"] = units
