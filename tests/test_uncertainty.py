@@ -17,7 +17,7 @@ from slipsweep import spec, store, uncertainty_figures
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.slices import Result
-from slipsweep.uncertainty import check_sampling, plan_samples
+from slipsweep.uncertainty import DRAWN, check_sampling, plan_samples
 
 G = 9.81
 LOGNORMAL: dict[str, Any] = {"distribution": "lognorm", "s": 0.3}
@@ -125,6 +125,39 @@ def test_statistics_of_a_sweep_over_the_draws(uncertain: dict[str, Any]) -> None
     for name, share in (("mode_share", modes), ("flag_share", flags)):
         ours, theirs = xr.broadcast(found[name].drop_vars(str(found[name].dims[-1])), share)
         np.testing.assert_allclose(ours, theirs.transpose(*ours.dims), atol=1e-15)
+
+
+#: A block on which every parameter matters, and by how much each is drawn.
+BLOCK = {
+    "theta": 5.0, "mu_s": 0.4, "amplitude": 5.0, "displacement_amplitude": 0.03, "frequency": 2.0,
+    "yield_acceleration": 2.5, "decay_rate": 2.0, "delta_mu": 0.1, "minimum_friction": 0.1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["absolute", "factor", "offset"])
+@pytest.mark.parametrize("name", DRAWN)
+def test_each_parameter_and_kind(name: str, kind: str) -> None:
+    """One parameter drawn, against a sweep over its draws."""
+    left_out = "amplitude" if name == "displacement_amplitude" else "displacement_amplitude"
+    given: dict[str, Any] = {key: value for key, value in BLOCK.items() if key != left_out}
+    if name in ("delta_mu", "minimum_friction"):
+        # where Eq. 4 governs, with λ by Eq. 6
+        del given["decay_rate"]
+        given["yield_acceleration"] = 0.6
+    base = given[name]
+    width = {"loc": 0.9, "scale": 0.2}
+    if kind != "factor":
+        width = {"loc": (0.9 if kind == "absolute" else -0.1) * base, "scale": 0.2 * base}
+    uncertain = {name: {"distribution": "uniform", **width, "kind": kind}}
+    values = drawn(uncertain, samples=64)[name]
+    values = {"absolute": values, "factor": base * values, "offset": base + values}[kind]
+    swept = slipsweep.sweep(**{**given, name: np.sort(values)}).permanent_displacement
+    if kind == "absolute":
+        del given[name]
+    found = slipsweep.sample(**given, uncertain=uncertain, samples=64, quantiles=[0.25, 0.75])
+    expected = swept.quantile([0.25, 0.75])
+    assert 0 < expected[0] < expected[1]
+    np.testing.assert_allclose(found.displacement_quantile, expected, rtol=1e-11)
 
 
 def test_of_a_displacement_amplitude() -> None:
@@ -318,6 +351,7 @@ def test_no_warnings() -> None:
         ({"amplitude": {**FACTOR, "distribution": "logistic"}}, 'uncertain.amplitude.s: unknown key; known here: '),
         ({"amplitude": {**FACTOR, "distribution": "lognormal"}}, 'no such distribution; did you mean "lognorm"?'),
         ({"amplitude": {**FACTOR, "distribution": "poisson"}}, "such as norm, lognorm|did you mean"),
+        ({"amplitude": {**FACTOR, "unit": "g"}}, 'uncertain.amplitude.unit: unknown key; did you mean "units"?'),
         ({"amplitude": {**FACTOR, "scle": 2}}, 'uncertain.amplitude.scle: unknown key; did you mean "scale"?'),
         ({"amplitude": {**FACTOR, "s": "wide"}}, "uncertain.amplitude.s = 'wide': must be a finite number"),
         ({"amplitude": {**FACTOR, "s": -1}}, "parameters that scipy.stats does not allow"),
@@ -327,7 +361,10 @@ def test_no_warnings() -> None:
         ({"amplitude": {"s": 1}}, "uncertain.amplitude.distribution: missing"),
         ({"amplitude": {"distribution": "lognorm"}}, "uncertain.amplitude.s: missing: lognorm needs s"),
         ({"amplitude": LOGNORMAL}, "uncertain.amplitude: is drawn, but amplitude is given as well"),
-        ({"amplitude": 3.0}, "must be a name with parameters, or a frozen"),
+        ({"amplitude": {**FACTOR, "s": 10**400}}, "must be a finite number"),
+        ({"mu_s": stats.norm([0.3, 0.4], 0.01)}, "uncertain.mu_s: is 2 distributions; must be one"),
+        ({"amplitude": 3.0}, "uncertain.amplitude.distribution = 3.0: must be the name of a distribution"),
+        ({"amplitude": {**FACTOR, "distribution": 1}}, "distribution = 1: must be the name of a distribution"),
         ({"mu": LOGNORMAL}, 'uncertain.mu: cannot be drawn; did you mean "mu_s"?'),
         ({"structure_frequency": LOGNORMAL}, "cannot be drawn"),
         ({"decay_rate": {**LOGNORMAL, "kind": "offset"}}, 'kind = "offset" wants decay_rate given'),

@@ -299,18 +299,21 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
     if units is not None and not isinstance(units, str):
         raise InputError(f"{key}.units = {units!r}: must be a unit that converts to {PARAMETERS[parameter]['units']}")
     if isinstance(chosen, str):
-        frozen, about = _named(key, chosen, entries), {"distribution": chosen, **entries}
+        frozen = _named(key, chosen, entries)
+    elif not callable(getattr(chosen, "ppf", None)):
+        raise InputError(
+            f"{key}.distribution = {chosen!r}: must be the name of a distribution of scipy.stats, or a frozen one"
+        )
+    elif entries:
+        raise InputError(f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own")
     else:
-        if entries:
-            raise InputError(
-                f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own"
-            )
-        if not callable(getattr(chosen, "ppf", None)):
-            raise InputError(
-                f"{key} = {chosen!r}: must be a name with parameters, or a frozen scipy.stats distribution"
-            )
-        frozen, about = chosen, _described(chosen)
-    if not np.isfinite(frozen.ppf(0.5)):
+        frozen = chosen
+    with np.errstate(all="ignore"):
+        middle = np.asarray(frozen.ppf(0.5))
+    if middle.ndim:
+        raise InputError(f"{key}: is {middle.size} distributions; must be one")
+    about = _described(frozen)
+    if not np.isfinite(middle):
         raise InputError(f"{key}: parameters that scipy.stats does not allow: {about}")
     if units is not None:
         about["units"] = units
@@ -318,7 +321,20 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
     return Distribution(parameter, kind, frozen, factor, {**about, "kind": kind})
 
 
-def _named(key: str, name: str, numbers: Mapping[str, Any]) -> Any:
+def _numbers(key: str, given: Mapping[str, Any]) -> dict[str, float]:
+    """Parameters of a distribution as floats."""
+    numbers = {}
+    for name, value in given.items():
+        try:
+            if isinstance(value, bool) or not math.isfinite(value):
+                raise ValueError
+            numbers[str(name)] = float(value)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(f"{key}.{name} = {value!r}: must be a finite number") from None
+    return numbers
+
+
+def _named(key: str, name: str, given: Mapping[str, Any]) -> Any:
     """A distribution of scipy.stats with its parameters, frozen."""
     from scipy import stats
 
@@ -330,16 +346,14 @@ def _named(key: str, name: str, numbers: Mapping[str, Any]) -> Any:
         raise InputError(f'{key}.distribution = "{name}": no such distribution; {hint}')
     family = getattr(stats, name)
     shapes = [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
-    for parameter, value in numbers.items():
+    for parameter in given:
         if parameter not in (*shapes, "loc", "scale"):
             allowed = ("distribution", "kind", "units", *shapes, "loc", "scale")
             raise InputError(f"{key}.{parameter}: unknown key; {did_you_mean(str(parameter), allowed)}")
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
-            raise InputError(f"{key}.{parameter} = {value!r}: must be a finite number")
     for shape in shapes:
-        if shape not in numbers:
+        if shape not in given:
             raise InputError(f"{key}.{shape}: missing: {name} needs {', '.join(shapes)}")
-    return family(**numbers)
+    return family(**_numbers(key, given))
 
 
 def _described(frozen: Any) -> dict[str, Any]:
