@@ -261,7 +261,7 @@ def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
 def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cycles: int) -> None:
     """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly, every third or
     fourth pulse begins again, and W of the cycles repeats."""
-    cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "cycles": cycles}
+    cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "cycles": cycles}
     expected = reference.solve(**cell)
     result = slipsweep.sweep(**cell, solver="cycle")
     for name in ("permanent_displacement", "peak_relative_velocity"):
