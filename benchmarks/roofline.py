@@ -23,6 +23,8 @@ EXP, LOG, VERSINE, ARCSINE = 20, 20, 13, 23
 #: Eqs. 2, 4 and 6 at a given friction, and the sums of a quadrature.
 NODE = 10
 NODES = 12
+#: Continuous sliding: nodes before Üg = Üy, and a series for two integrals over the quarter.
+EARLY_NODES, SERIES = 8, 2 * 31
 #: Eqs. 7-11 and λ; half of it where nothing beyond the Coulomb yield value is wanted.
 SETUP = 25 + LOG
 #: Two integrals of the hold, in closed form, and one Newton step towards the stop.
@@ -33,7 +35,7 @@ CYCLE_OPERATIONS = {
     "stuck": SETUP,
     "stick_slip, yield governs": SETUP + 2 * (EXP + NODE) + ARCSINE + 2 * HELD + 3 * NEWTON,
     "stick_slip, Eq. 4 governs": SETUP + 2 * (EXP + NODE) + 2 * ARCSINE + NODES * (VERSINE + EXP + NODE) + 3 * HELD,
-    "continuous": SETUP + ARCSINE + 2 * NODES * (VERSINE + EXP + NODE),
+    "continuous": SETUP + ARCSINE + SERIES + EARLY_NODES * (VERSINE + EXP + NODE),
     "newmark": SETUP // 2 + ARCSINE + 2 * HELD + 3 * NEWTON,
 }
 #: Operations of a step of the rectangle rule: Eq. 4 (but on the hold) and the two sums.
@@ -148,8 +150,9 @@ Written by `python -m benchmarks.roofline`.
         )
     }
 Operations count a fused multiply-add, a division or a root as one, and are those of the formulas at
-the least: Eqs. 7–11, the phases of the events, {NODES} nodes of quadrature where Eq. 4 is followed,
-each an exponential ({EXP}), a versine ({VERSINE}) and Eq. 4 ({NODE}).
+the least: Eqs. 7–11, the phases of the events, {NODES} nodes of quadrature where Eq. 4 is followed
+({EARLY_NODES} before the first Üg = Üy of continuous sliding, whose whole quarters are a series), each an
+exponential ({EXP}), a versine ({VERSINE}) and Eq. 4 ({NODE}).
 
 ## The cycle solver, a cell
 

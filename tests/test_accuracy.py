@@ -255,6 +255,21 @@ def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
     assert abs(float(result.permanent_displacement) - right) <= 1e-11 * abs(right) + 1e-12 * growth * scale
 
 
+@pytest.mark.parametrize(
+    ("theta", "mu_s", "amplitude", "cycles"), [(10.15, 0.2, 1.223, 4), (10.15, 0.2, 1.223, 6), (13.22, 0.257, 1.822, 7)]
+)
+def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cycles: int) -> None:
+    """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly, every third or
+    fourth pulse begins again, and W of the cycles repeats."""
+    cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "cycles": cycles}
+    expected = reference.solve(**cell)
+    result = slipsweep.sweep(**cell, solver="cycle")
+    for name in ("permanent_displacement", "peak_relative_velocity"):
+        right = float(getattr(expected, name))
+        assert abs(float(result[name]) / right - 1) <= 1e-13, name
+    assert int(result.validity) & Validity.NOT_RECOUPLED
+
+
 @strategies.reproducible
 @given(
     cell=strategies.given_friction(),
