@@ -1,4 +1,4 @@
-"""The figures quoted in the README: times, each with its error beside it.
+"""The figures quoted in docs/speed.md and README.md: times, each with its error beside it.
 
 ``python -m benchmarks.report`` writes report.md.  Everything that is compared is measured
 in turn, in one run; times are medians.  A time per cell and core is the wall clock times

@@ -1,7 +1,5 @@
 """Charts: what they show is the model's, and nothing is read that they do not show."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
+from processes import slipsweep as command
 
 import slipsweep
 from slipsweep import charts, spec, store
@@ -317,11 +316,9 @@ def test_default_set_of_charts(grid: Path, tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_formats(grid: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "slipsweep", "chart", str(grid), "--at", "theta=12", "--at", "mu_s=0.5"]
+    cuts = ("--at", "theta=12", "--at", "mu_s=0.5")
     outputs = [f"-oa.{suffix}" for suffix in ("png", "svg", "pdf")]
-    done = subprocess.run(
-        [*command, "--kind", "contours", *outputs], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = command(tmp_path, "chart", grid, *cuts, "--kind", "contours", *outputs)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.split() == ["a.png", "a.svg", "a.pdf"]
     assert matplotlib.image.imread(tmp_path / "a.png").shape[2] == 4
@@ -349,7 +346,10 @@ def test_every_axis_has_its_unit_and_the_caption_its_parameters(result: Result) 
         (("--at", "thta=3"), 'thta = 3: no such axis; did you mean "theta"?'),
         (("--at", "theta=45"), "theta = 45: outside the file's range, 0 to 20 degree"),
         (("--at", "theta=nan"), "theta = nan: outside"),
-        (("--at", "theta=steep"), "theta = steep: must be a number"),
+        (("--at", "theta=steep"), 'theta = "steep": must be a number, with a unit that converts to degree'),
+        (("--at", "amplitude=0.3Hz"), 'amplitude = "0.3Hz": must be a number, with a unit that converts to m s-2'),
+        (("--at", "mu_s=0.3g"), 'mu_s = "0.3g": must be a number'),
+        (("--at", "amplitude=3g"), "amplitude = 29.43: outside the file's range"),
         (("--at", "theta"), "--at theta: must be NAME=VALUE"),
         (("--at", "theta=1", "--at", "theta=2"), "theta is given twice"),
         (("--kind", "contour"), 'did you mean "contours"?'),
@@ -372,6 +372,16 @@ def test_bad_commands(
     assert printed.err.count("\n") == 1
     assert message in printed.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_cuts_with_units(grid: Path) -> None:
+    with Result(grid) as opened:
+        for text, number in (("0.4g", 0.4 * 9.81), ("400 cm/s^2", 4.0)):
+            assert opened.nearest({"amplitude": text}) == opened.nearest({"amplitude": number})
+        assert opened.nearest({"theta": "0.2rad"}) == opened.nearest({"theta": 180 / np.pi * 0.2})
+        assert opened.nearest({"frequency": "1200mHz", "mu_s": "0.45"}) == opened.nearest(
+            {"frequency": 1.2, "mu_s": 0.45}
+        )
 
 
 def test_not_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

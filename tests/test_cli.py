@@ -14,10 +14,9 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from processes import SLIPSWEEP, slipsweep
 
 SWEEPS = Path(__file__).parents[1] / "sweeps"
-SLIPSWEEP = (sys.executable, "-m", "slipsweep")
-
 SMALL = """
 [axes.theta]
 values = [0, 5]
@@ -52,19 +51,6 @@ variables = ["sliding_mode"]
 """
 
 SIMULATE = ("simulate", "--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8")
-
-
-def slipsweep(folder: Path, *arguments: str | Path, **options: object) -> "subprocess.CompletedProcess[str]":
-    """Run a command in `folder`."""
-    return subprocess.run(
-        [*SLIPSWEEP, *map(str, arguments)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        **options,  # type: ignore[call-overload]
-    )
 
 
 def assert_fails(done: "subprocess.CompletedProcess[str]", status: int, *messages: str) -> None:

@@ -7,7 +7,6 @@ import math
 import os
 import re
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from processes import slipsweep
 
 from slipsweep import InputError, SlidingMode, Validity, simulate, sweep
 from slipsweep.cli.explore import parse_size
@@ -46,17 +46,6 @@ path = "small.nc"
 """
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-
-
-def slipsweep(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "slipsweep", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
 
 
 def make(folder: Path, text: str) -> Path:

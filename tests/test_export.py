@@ -1,6 +1,5 @@
 """Long tables hold every cell once, exactly; flags come apart as the bits say."""
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from processes import slipsweep as command
 
 import slipsweep
 from slipsweep import export, spec, store
@@ -156,24 +156,17 @@ def test_memory_stays_that_of_a_block(tmp_path: Path) -> None:
     assert peak < 0.1 * (tmp_path / "a.csv").stat().st_size
 
 
-def slipsweep_in(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "slipsweep", *arguments],
-        cwd=folder, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-
-
 def test_the_command(folder: Path) -> None:
-    done = slipsweep_in(folder, "export", "cases.nc", "-o", "cases.csv", "--words", "--variable", "sliding_mode")
+    done = command(folder, "export", "cases.nc", "-o", "cases.csv", "--words", "--variable", "sliding_mode")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("cases.csv  6 rows, ")
     text = (folder / "cases.csv").read_text(encoding="utf-8")
     assert text.splitlines()[1] == '5.0,0.38,3.55,1.0,"mild ± slope, wet",stick_slip'
-    again = slipsweep_in(folder, "export", "cases.nc", "-o", "cases.csv")
+    again = command(folder, "export", "cases.nc", "-o", "cases.csv")
     assert again.returncode == 2
     assert "cases.csv: exists already; give --overwrite" in again.stderr
     assert (folder / "cases.csv").read_text(encoding="utf-8") == text
-    assert slipsweep_in(folder, "export", "cases.nc", "-o", "cases.csv", "--overwrite", "-q").stdout == ""
+    assert command(folder, "export", "cases.nc", "-o", "cases.csv", "--overwrite", "-q").stdout == ""
 
 
 def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

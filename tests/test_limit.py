@@ -1,14 +1,13 @@
 """The inverse of the sweep: limit amplitudes against the sweep itself, closed forms and dense scans."""
 
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from processes import slipsweep as command
 from scipy.optimize import brentq
 
 import slipsweep
@@ -225,18 +224,13 @@ cycles = 3
 """
 
 
-def slipsweep_command(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "slipsweep", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
-
-
 def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SWEEP)
-    assert slipsweep_command(tmp_path, "run", "small.toml", "-q").returncode == 0
+    assert command(tmp_path, "run", "small.toml", "-q").returncode == 0
     # the file holds what `limit_amplitude` gives with the sweep's own options
     expected = slipsweep.limit_amplitude([0.02, 0.05], [0, 5], [0.3, 0.5], [1, 2, 4], model="newmark", cycles=3)
     for source, result in (("small.toml", "one.nc"), ("small.nc", "two.nc")):
-        done = slipsweep_command(tmp_path, "limit", source, "-d", "50mm", "-d", "2 cm", "-o", result, "-o", "l.svg")
+        done = command(tmp_path, "limit", source, "-d", "50mm", "-d", "2 cm", "-o", result, "-o", "l.svg")
         assert (done.returncode, done.stderr) == (0, "")
         assert "24 limits (2 theta x 2 mu_s x 3 frequency x 2 displacement)" in done.stdout
         with xr.open_dataset(tmp_path / result) as dataset:
@@ -247,7 +241,7 @@ def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
         assert "<svg" in svg
         (tmp_path / "l.svg").unlink()
     # nothing is overwritten unasked
-    refused = slipsweep_command(tmp_path, "limit", "small.nc", "-d", "50mm", "-o", "one.nc")
+    refused = command(tmp_path, "limit", "small.nc", "-d", "50mm", "-o", "one.nc")
     assert refused.returncode == 2
     assert "one.nc" in refused.stderr
 
@@ -261,7 +255,7 @@ def test_command_names_what_is_wrong(tmp_path: Path) -> None:
         (("-d", "5cm", "-o", "small.csv"), "small.csv: the name must end in one of .nc, .png, .svg, .pdf"),
         (("-d", "5cm", "-o", "no/folder/l.nc"), "no/folder"),
     ):
-        done = slipsweep_command(tmp_path, "limit", "small.toml", *arguments)
+        done = command(tmp_path, "limit", "small.toml", *arguments)
         assert done.returncode == 2, done.stderr
         assert message in done.stderr
         assert done.stderr.count("\n") == 1

@@ -21,12 +21,19 @@ ROOT = Path(__file__).parents[1]
 DOCUMENTS = (
     "README.md",
     "docs/README.md",
+    "docs/accuracy.md",
     "docs/charts.md",
+    "docs/explore.md",
     "docs/files.md",
+    "docs/hard-cases.md",
+    "docs/large-sweeps.md",
+    "docs/limit.md",
     "docs/model.md",
     "docs/quickstart.md",
+    "docs/speed.md",
     "docs/sweep-files.md",
     "docs/tutorial.md",
+    "docs/uncertainty.md",
 )
 
 
@@ -124,7 +131,7 @@ def test_the_two_commands_of_the_readme() -> None:
 
 
 def test_figures_are_those_of_the_report() -> None:
-    """.ci/include-report copies benchmarks/results/report.md into README.md."""
+    """.ci/include-report copies benchmarks/results/report.md into README.md and docs/speed.md."""
     done = subprocess.run([sys.executable, ROOT / ".ci" / "include-report", "--check"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
@@ -152,7 +159,7 @@ CONTINUOUS: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "yi
 
 
 def five_cycles(experiment: dict[str, Any], frequency: float, **friction: Any) -> tuple[str, str]:
-    """Displacement in mm and peak velocity in m/s, as the README prints them."""
+    """Displacement in mm and peak velocity in m/s, as the tutorial prints them."""
     result = slipsweep.sweep(**experiment, frequency=frequency, cycles=5, **friction)
     return f"{result.permanent_displacement.item() * 1000:.0f}", f"{result.peak_relative_velocity.item():.3f}"
 
@@ -208,7 +215,7 @@ def test_numbers_of_the_paper_sweep(document: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("document", "heading"), [("README.md", "## What the numbers mean"), ("docs/model.md", "## Validity")]
+    ("document", "heading"), [("docs/files.md", "## What the numbers mean"), ("docs/model.md", "## Validity")]
 )
 def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
     stated = [(int(bit), name.strip("`"), value) for bit, name, _, value in rows(section(document, heading))[1:]]
@@ -228,6 +235,7 @@ def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
         ("## `[excitation]`", spec.Excitation),
         ("## `[solver]`", spec.Solver),
         ("## `[output]`", spec.Output),
+        ("## `[uncertainty]`", spec.Uncertainty),
     ],
 )
 def test_keys_are_those_of_the_schema(heading: str, table: Any) -> None:

@@ -3,25 +3,16 @@
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from processes import SLIPSWEEP, slipsweep
 
 COMMANDS = ("run", "info", "export", "simulate")
-SLIPSWEEP = (sys.executable, "-m", "slipsweep")
 SWEEP = "".join(
     f"[axes.{name}]\nvalues = [{value}]\n"
     for name, value in (("theta", 5), ("mu_s", 0.4), ("amplitude", 3), ("frequency", 1))
 )
-
-
-def slipsweep(folder: Path, *arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    clean = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
-    return subprocess.run(
-        [*SLIPSWEEP, *arguments],
-        cwd=folder, env={**clean, **environment}, capture_output=True, encoding="utf-8", timeout=120, check=False,
-    )  # fmt: skip
 
 
 def on_a_terminal(folder: Path, *arguments: str, **environment: str) -> str:
@@ -46,7 +37,7 @@ def on_a_terminal(folder: Path, *arguments: str, **environment: str) -> str:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_is_plain_in_a_pipe_and_has_examples(tmp_path: Path, command: str) -> None:
-    done = slipsweep(tmp_path, command, "--help", FORCE_COLOR="1", COLUMNS="80")
+    done = slipsweep(tmp_path, command, "--help", environment={"FORCE_COLOR": "1", "COLUMNS": "80"})
     assert (done.returncode, done.stderr) == (0, "")
     assert not re.search("[\x1b─-╿]", done.stdout)  # neither escape codes nor boxes
     examples = done.stdout.partition("Examples:\n")[2].splitlines()
@@ -85,7 +76,7 @@ def test_progress_has_no_colour_when_none_is_wanted(tmp_path: Path) -> None:
 
 
 def test_errors_are_plain(tmp_path: Path) -> None:
-    for text in (on_a_terminal(tmp_path, "info"), slipsweep(tmp_path, "info", FORCE_COLOR="1").stderr):
+    for text in (on_a_terminal(tmp_path, "info"), slipsweep(tmp_path, "info", environment={"FORCE_COLOR": "1"}).stderr):
         assert text.strip() == "slipsweep: error: Missing argument 'OUT.nc'."
 
 
@@ -112,15 +103,17 @@ def test_what_is_nearest_is_suggested(tmp_path: Path, arguments: tuple[str, ...]
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion(tmp_path: Path, shell: str) -> None:
-    script = slipsweep(tmp_path, "--show-completion", shell, _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1").stdout
+    script = slipsweep(
+        tmp_path, "--show-completion", shell, environment={"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    ).stdout
     assert "_SLIPSWEEP_COMPLETE" in script
     typed = "slipsweep ex"
-    done = slipsweep(
-        tmp_path,
-        _SLIPSWEEP_COMPLETE=f"complete_{shell}",
-        COMP_WORDS=typed, COMP_CWORD="1",  # bash
-        _TYPER_COMPLETE_ARGS=typed, _TYPER_COMPLETE_FISH_ACTION="get-args",  # zsh and fish
-    )  # fmt: skip
+    environment = {
+        "_SLIPSWEEP_COMPLETE": f"complete_{shell}",
+        "COMP_WORDS": typed, "COMP_CWORD": "1",  # bash
+        "_TYPER_COMPLETE_ARGS": typed, "_TYPER_COMPLETE_FISH_ACTION": "get-args",  # zsh and fish
+    }  # fmt: skip
+    done = slipsweep(tmp_path, environment=environment)
     assert "export" in done.stdout
     assert "simulate" not in done.stdout
 

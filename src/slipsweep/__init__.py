@@ -1,8 +1,9 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
-`sweep` solves a grid, `limit_amplitude` is its inverse, `sweep_record` solves one under a recorded
-motion, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history, `flags` takes
-a result's `validity` apart.  The model is that of Mendez, Romo and Botero (2012); `Validity` and
+`sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
+inputs are uncertain, `sweep_record` solves one under a recorded motion, `friction_parameters` gives the
+paper's Eqs. 7-11, `simulate` one time history, `flags` takes a result's `validity` apart.  The model is
+that of Mendez, Romo and Botero (2012); `Validity` and
 `SlidingMode` name the codes of the results.
 """
 
@@ -14,7 +15,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.datasets import friction_parameters, limit_amplitude, simulate, sweep, sweep_record
+    from slipsweep.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep, sweep_record
     from slipsweep.decoding import flags
     from slipsweep.records import Record, read_record
 
@@ -29,6 +30,7 @@ __all__ = [
     "friction_parameters",
     "limit_amplitude",
     "read_record",
+    "sample",
     "simulate",
     "sweep",
     "sweep_record",
@@ -42,6 +44,7 @@ _LAZY = {
     "friction_parameters": "slipsweep.datasets",
     "limit_amplitude": "slipsweep.datasets",
     "read_record": "slipsweep.records",
+    "sample": "slipsweep.datasets",
     "simulate": "slipsweep.datasets",
     "sweep": "slipsweep.datasets",
     "sweep_record": "slipsweep.datasets",

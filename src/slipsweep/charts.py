@@ -199,27 +199,27 @@ def families(table: Table, lines: Boundaries, name: str, x: str, family: str) ->
     name, x, family : str
         The result, the axis to draw over, and the axis whose values tell the curves apart.
     """
-    figure, axes = _plot()
+    figure, axes = new_plot()
     values = _grid(table[name], table, family, x)
     accelerations = _grid(table["amplitude"], table, family, x)
     millimetres = RESULTS[name].get("units") == "m"
     members = table[family].values
-    for member, colour in zip(range(members.size), _colours(members.size), strict=True):
+    for member, colour in zip(range(members.size), curve_colours(members.size), strict=True):
         curve = np.where(values[member] > 0, values[member], np.nan) * (1000 if millimetres else 1)
         xs, curve = _broken(table[x].values, curve, accelerations[member], _along(lines, table, family, x, member))
         axes.plot(xs, curve, color=colour, label=value_text(family, members[member]))
     axes.set_yscale("log")
-    _set_scale(axes, "x", table[x].values)
-    _limit_decades(axes, values * (1000 if millimetres else 1), _LEAST * 1000 if millimetres else None)
-    _axis_text(axes, "x", x)
+    set_scale(axes, "x", table[x].values)
+    limit_decades(axes, values * (1000 if millimetres else 1), _LEAST * 1000 if millimetres else None)
+    axis_text(axes, "x", x)
     label = RESULTS[name]["long_name"]
     shown = "mm" if millimetres else unit(name)
     axes.set_ylabel(f"{label} ({shown})" if shown else label)
     _mark_accelerations(axes, table, lines, x, family)
     if (values < 0).any():
         axes.plot([], [], linestyle="", label=_NOT_SHOWN)
-    _legend(axes, figure)
-    _caption(figure, table)
+    add_legend(axes, figure)
+    add_caption(figure, table)
     return figure
 
 
@@ -236,12 +236,12 @@ def dimensionless(table: Table, lines: Boundaries, family: str | None) -> Figure
     family : str or None
         The axis whose values tell the curves apart.
     """
-    figure, axes = _plot()
+    figure, axes = new_plot()
     curves = dimensionless_curves(table, lines, family)
     members = table[family].values if family else np.zeros(1)
     markers = ("", "o", "x", "s", "+", "D")
     frequencies = np.atleast_1d(table["frequency"].values)
-    for member, colour in zip(range(members.size), _colours(members.size), strict=True):
+    for member, colour in zip(range(members.size), curve_colours(members.size), strict=True):
         for number in range(frequencies.size):
             xs, ys = curves[member, number]
             ys = np.where(ys > 0, ys, np.nan)
@@ -258,7 +258,7 @@ def dimensionless(table: Table, lines: Boundaries, family: str | None) -> Figure
                     marker=markers[number % len(markers)] or "^", markevery=(number * every // frequencies.size, every),
                 )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="A / Üy", ylabel="u ω² / A")
-    _limit_decades(axes, np.array([ys for _, ys in curves.values()]), 1e-4)
+    limit_decades(axes, np.array([ys for _, ys in curves.values()]), 1e-4)
     axes.set_xlim(left=1.0)
     for side in ("x", "y"):
         getattr(axes, f"{side}axis").set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -275,8 +275,8 @@ def dimensionless(table: Table, lines: Boundaries, family: str | None) -> Figure
     if any((ys < 0).any() for _, ys in curves.values()):
         entries.append(Line2D([], [], linestyle=""))
         texts.append(_NOT_SHOWN)
-    _legend(axes, figure, entries, texts)
-    _caption(figure, table)
+    add_legend(axes, figure, entries, texts)
+    add_caption(figure, table)
     return figure
 
 
@@ -296,10 +296,10 @@ def dimensionless_curves(
     """A/Üy and uω²/A of every member of a family and every frequency of a slice, by their numbers."""
     drive = _drive(table)
     dims = tuple(dim for dim in (family, "frequency", drive) if dim)
-    displacement = _full(table["permanent_displacement"], table, dims)
-    amplitude = _full(table["amplitude"], table, dims)
-    omega = 2 * math.pi * _full(table["frequency"], table, dims)
-    threshold = _full(lines["yield_acceleration"], table, dims)
+    displacement = broadcast(table["permanent_displacement"], table, dims)
+    amplitude = broadcast(table["amplitude"], table, dims)
+    omega = 2 * math.pi * broadcast(table["frequency"], table, dims)
+    threshold = broadcast(lines["yield_acceleration"], table, dims)
     with np.errstate(divide="ignore", invalid="ignore"):
         scaled, ratio = displacement * omega**2 / amplitude, amplitude / threshold
     if family is None:
@@ -319,9 +319,9 @@ def threshold_line(threshold: Variable, table: Table, x: str, y: str) -> tuple[F
         if drive not in ("amplitude", "displacement_amplitude"):
             continue
         along = table[other].values
-        values = _full(threshold, table, (other,))
+        values = broadcast(threshold, table, (other,))
         if drive == "displacement_amplitude":
-            values = values / (2 * math.pi * _full(table["frequency"], table, (other,))) ** 2
+            values = values / (2 * math.pi * broadcast(table["frequency"], table, (other,))) ** 2
         return (values, along) if swapped else (along, values)
     return None
 
@@ -329,7 +329,7 @@ def threshold_line(threshold: Variable, table: Table, x: str, y: str) -> tuple[F
 # ------------------------------------------------------------------------------- grids
 
 
-def _full(variable: Variable, table: Table, dims: tuple[str, ...]) -> Floats:
+def broadcast(variable: Variable, table: Table, dims: tuple[str, ...]) -> Floats:
     """A variable over `dims`, in that order, broadcast along those it does not vary along."""
     own = variable.values.transpose([variable.dims.index(dim) for dim in dims if dim in variable.dims])
     shape = [table[dim].values.size for dim in dims]
@@ -339,7 +339,7 @@ def _full(variable: Variable, table: Table, dims: tuple[str, ...]) -> Floats:
 
 
 def _grid(variable: Variable, table: Table, y: str, x: str) -> Floats:
-    return _full(variable, table, (y, x))
+    return broadcast(variable, table, (y, x))
 
 
 def _drive(table: Table) -> str:
@@ -351,7 +351,7 @@ def _along(lines: Boundaries, table: Table, family: str | None, x: str | None, m
     dims = tuple(dim for dim in (family, x) if dim)
     found = {}
     for name, threshold in lines.items():
-        values = _full(threshold, table, dims)
+        values = broadcast(threshold, table, dims)
         found[name] = values[member] if family else values
     return found
 
@@ -429,7 +429,7 @@ def _value_label(name: str, value: float) -> str:
     return f"{value:.3g} {unit(name)}".strip()
 
 
-def _colours(number: int) -> list[Any]:
+def curve_colours(number: int) -> list[Any]:
     # not up to the yellow end, which is faint on white
     return [mpl.colormaps[COLOURS](place) for place in np.linspace(0, 0.87, number)]
 
@@ -437,7 +437,7 @@ def _colours(number: int) -> list[Any]:
 # ------------------------------------------------------------------------- parts of figures
 
 
-def _plot() -> tuple[Figure, Axes]:
+def new_plot() -> tuple[Figure, Axes]:
     figure = Figure(figsize=(7.0, 4.8), layout="constrained")
     axes = figure.subplots()
     axes.grid(color="0.9", which="major")
@@ -449,12 +449,12 @@ def _map(table: Table, x: str, y: str) -> tuple[Figure, Axes]:
     figure = Figure(figsize=(7.0, 5.3), layout="constrained")
     axes = figure.subplots()
     for side, name in (("x", x), ("y", y)):
-        _set_scale(axes, side, table[name].values)
-        _axis_text(axes, side, name)
+        set_scale(axes, side, table[name].values)
+        axis_text(axes, side, name)
     return figure, axes
 
 
-def _set_scale(axes: Axes, side: str, values: Floats) -> None:
+def set_scale(axes: Axes, side: str, values: Floats) -> None:
     getattr(axes, f"set_{side}lim")(values[0], values[-1])
     if not _is_log(values):
         return
@@ -465,7 +465,7 @@ def _set_scale(axes: Axes, side: str, values: Floats) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _axis_text(axes: Axes, side: str, name: str) -> None:
+def axis_text(axes: Axes, side: str, name: str) -> None:
     getattr(axes, f"set_{side}label")(axis_label(name))
 
 
@@ -498,7 +498,7 @@ def _label_contours(axes: Axes, drawn: Any, name: str, taken: list[Floats]) -> N
             label.set_bbox({"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "boxstyle": "round,pad=0.15"})
 
 
-def _second_scale(axes: Axes, table: Table, side: str) -> None:
+def second_scale(axes: Axes, table: Table, side: str) -> None:
     """The amplitude in units of g, on the other side."""
     g = float(table.attrs["g"])
     convert = (lambda a: a / g, lambda a: a * g)
@@ -510,7 +510,7 @@ def _second_scale(axes: Axes, table: Table, side: str) -> None:
     getattr(other, f"set_{side}label")("A / g")
 
 
-def _limit_decades(axes: Axes, values: Floats, least: float | None) -> None:
+def limit_decades(axes: Axes, values: Floats, least: float | None) -> None:
     """Show what is above `least`, and no more than seven decades."""
     there = values[np.isfinite(values) & (values > 0)]
     if there.size:
@@ -545,12 +545,12 @@ def _finish_map(
     legend += _hatch(axes, table, x, y)
     for side, name in (("x", x), ("y", y)):
         if name == "amplitude":
-            _second_scale(axes, table, side)
+            second_scale(axes, table, side)
     if legend:
         figure.legend(
             handles=legend, loc="outside upper center", ncols=3, frameon=False, fontsize="small", handlelength=2.4
         )
-    _caption(figure, table)
+    add_caption(figure, table)
 
 
 def _hatch(axes: Axes, table: Table, x: str, y: str) -> list[Patch]:
@@ -599,15 +599,16 @@ def _mark_accelerations(axes: Axes, table: Table, lines: Boundaries, x: str, fam
         if x == "amplitude" and not threshold.dims and np.isfinite(threshold.item()):
             axes.axvline(threshold.item(), gid=name, label=text, **{**look, "linewidth": 1.0})
     if x == "amplitude":
-        _second_scale(axes, table, "x")
+        second_scale(axes, table, "x")
 
 
-def _legend(axes: Axes, figure: Figure, handles: Any = None, labels: Any = None) -> None:
+def add_legend(axes: Axes, figure: Figure, handles: Any = None, labels: Any = None) -> None:
     if handles is None:
         handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize="small")
 
 
-def _caption(figure: Figure, table: Table) -> None:
+def add_caption(figure: Figure, table: Table) -> None:
+    """Parameters, model and origin, under the figure."""
     case = f"case {table.attrs['case']}: " if "case" in table.attrs else ""
     figure.supxlabel(f"{case}{caption(table)}; {table.attrs['source']}", fontsize="small")

@@ -420,6 +420,129 @@ def limit_amplitude(
     return _dataset(table, _brought(given, table.coords))
 
 
+def sample(
+    theta: Values | None = None,
+    mu_s: Values | None = None,
+    amplitude: Values | None = None,
+    frequency: Values | None = None,
+    *,
+    uncertain: Mapping[str, Any],
+    samples: int = 4096,
+    method: str = "sobol",
+    seed: int = 0,
+    quantiles: float | Sequence[float] | np.ndarray = (0.05, 0.5, 0.95),
+    thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
+    correlation: Sequence[tuple[str, str, float]] = (),
+    displacement_amplitude: Values | None = None,
+    cycles: int = 10,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    solver: str = "auto",
+    steps_per_cycle: int = STEPS_PER_CYCLE,
+    rule: str = "trapezoid",
+    g: float = 9.81,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
+
+    Parameters span a grid as in `sweep`; at every grid point those in `uncertain` are drawn.  The
+    draws are the same at all grid points.
+
+    Parameters
+    ----------
+    theta, mu_s, amplitude, frequency : float, array or DataArray
+        As in `sweep`.  One that is drawn with ``kind="absolute"`` must not be given.
+    uncertain : mapping of str to mapping or frozen distribution
+        For any of `theta`, `mu_s`, `amplitude`, `displacement_amplitude`, `frequency`,
+        `yield_acceleration`, `decay_rate`, `delta_mu` and `minimum_friction` either a frozen
+        distribution of scipy.stats, or a mapping with
+
+        - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
+          whose shape parameters, ``loc`` and ``scale`` are further keys;
+        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
+          at the grid point or, for the last four, the estimate) or "offset" (it is added to it);
+        - ``units``: of the draws, if not the parameter's own; not with factors.
+    samples : int
+        Samples a grid point; a power of 2 for Sobol's.
+    method : {"sobol", "latin_hypercube", "random"}
+        Scrambled Sobol sequence, Latin hypercube (scipy.stats.qmc) or pseudo-random numbers.
+    seed : int
+        The same seed gives the same draws.
+    quantiles : float or array
+        Increasing, between 0 and 1.
+    thresholds : float, str or list of these
+        Increasing displacements, m or with a unit ("50mm"), ≥ 0.
+    correlation : list of (str, str, float)
+        Pairs of drawn parameters and the correlation of their normal scores (a Gaussian copula).
+    progress : callable, optional
+        Called with the number of samples just solved, from any thread.
+
+    The remaining parameters are those of `sweep`.
+
+    Returns
+    -------
+    Dataset
+        Over the grid:
+
+        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and
+          `exceedance_probability`, dimension `threshold` (m): P(u > threshold).  They are of the
+          samples that have a value; NaN where none has.
+        - `mode_share`, dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
+          all samples, how many slide in which mode, have which flag, and have no value.  They do not
+          depend on the frequency and have no such dimension (but with `displacement_amplitude`).
+
+        How the inputs were drawn is in the attributes.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; a distribution that scipy.stats does not know, or draws that no physics allows.
+    """
+    from slipsweep.uncertainty import check_sampling, plan_samples
+
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "displacement_amplitude": displacement_amplitude,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+    }
+    sampling = check_sampling(
+        uncertain,
+        samples=samples,
+        method=method,
+        seed=seed,
+        quantiles=quantiles,
+        thresholds=thresholds,
+        correlation=correlation,
+        g=g,
+    )
+    plan = plan_samples(
+        sampling,
+        **_plain(given),
+        cycles=cycles,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        waveform=waveform,
+        solver=solver,
+        steps_per_cycle=steps_per_cycle,
+        rule=rule,
+        g=g,
+    )
+    return _dataset(plan.solve(progress), _brought(given, plan.coords))
+
+
 def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters without xarray: DataArrays (computed, where they are lazy) as `Variable`."""
     return {

@@ -4,7 +4,7 @@ Scalars in, a scalar out, SI units, angles already as tangents; the equation num
 the paper stands in each docstring.  The kernels call these functions as they are, so
 that what is written here is what is computed; but Eq. 5, which Eq. 6 replaces, and Eq. 12, which
 they take over a whole interval at once (`kernels.train.attenuate`).  The operators of the printed equations
-were recovered from the paper's Table 1 (README, "Against the paper").
+were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 """
 
 import math

@@ -7,8 +7,10 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
+from slipsweep.charts import set_scale
+from slipsweep.style import SYMBOLS, axis_label, value_text
 from slipsweep.tables import Table
-from slipsweep.variables import PARAMETERS, TOLERABLE_DISPLACEMENT, LimitStatus
+from slipsweep.variables import TOLERABLE_DISPLACEMENT, LimitStatus
 
 #: Most curves in a panel, and panels across and down, that a page can show.
 _MOST_CURVES, _MOST_PANELS = 6, 3
@@ -76,11 +78,11 @@ def limit_chart(table: Table) -> Figure:
         title = ", ".join(_label(table, d, k) for d, k in ((columns, at_column), (rows, at_row)) if d)
         panel.set_title(title, fontsize="medium")
         panel.grid(color="0.9", which="both")
-        if x.size > 2 and x[0] > 0.0 and np.ptp(np.diff(np.log(x))) < 1e-6:
-            panel.set_xscale("log")
+        if x.size > 1:
+            set_scale(panel, "x", x)
         panel.set_xlabel(_axis_label(abscissa) if i == len(down) - 1 else "")
     axes[0, 0].set_ylim(bottom=0.0)  # one scale for all, from zero; only now, for it ends the autoscaling
-    figure.supylabel("limit amplitude (g)")
+    figure.supylabel("limit amplitude A / g")
     if curves:
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside right upper", frameon=False)
@@ -98,35 +100,37 @@ def _values(table: Table, dim: str, sizes: dict[str, int]) -> np.ndarray:
     return table[dim].values if dim in table.coords else np.arange(1, sizes[dim] + 1)
 
 
-def _describe(name: str) -> dict[str, Any]:
-    return TOLERABLE_DISPLACEMENT if name == "displacement" else PARAMETERS.get(name, {})
-
-
-def _unit(name: str) -> str:
-    unit = str(_describe(name).get("units", "1"))
-    return {"1": "", "degree": "°", "m s-2": " m/s²"}.get(unit, f" {unit}")
+def _text(name: str, value: float) -> str:
+    """A value with symbol and unit; the tolerable displacement in mm below a metre."""
+    if name == "displacement":
+        return f"u = {value * 1000:.4g} mm" if value < 1.0 else f"u = {value:.4g} m"
+    return value_text(name, value) if name in SYMBOLS else f"{name} {value:.4g}"
 
 
 def _label(table: Table, name: str, index: int) -> str:
-    value = _values(table, name, table["limit_amplitude"].sizes)[index]
-    return f"{name} = {value:.4g}{_unit(name)}"
+    return _text(name, _values(table, name, table["limit_amplitude"].sizes)[index])
 
 
 def _axis_label(name: str | None) -> str:
     if name is None:
         return ""
-    unit = _unit(name).strip()
-    return f"{_describe(name).get('long_name', name)}{f' ({unit})' if unit else ''}"
+    if name == "displacement":
+        return f"{TOLERABLE_DISPLACEMENT['long_name']} u (m)"
+    return axis_label(name) if name in SYMBOLS else name
 
 
 def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int]) -> str:
     """Parameters, model, and what of the table is not shown."""
     sizes, attributes = table["limit_amplitude"].sizes, table.attrs
-    single = [f"{name} = {value.item():.4g}{_unit(name)}" for name, value in table.coords.items() if not value.dims]
+    single = [_text(name, value.item()) for name, value in table.coords.items() if not value.dims]
     single += [_label(table, dim, index) for dim, index in fixed.items()]
-    thinned = [f"{len(chosen)} of {sizes[dim]} {dim}" for dim, chosen in shown.items() if len(chosen) < sizes[dim]]
+    thinned = [
+        f"{len(chosen)} of {sizes[dim]} {SYMBOLS.get(dim, dim)}"
+        for dim, chosen in shown.items()
+        if len(chosen) < sizes[dim]
+    ]
     if any(sizes[dim] > 1 for dim in fixed):
-        thinned += [f"1 of {sizes[dim]} {dim}" for dim in fixed if sizes[dim] > 1]
+        thinned += [f"1 of {sizes[dim]} {SYMBOLS.get(dim, dim)}" for dim in fixed if sizes[dim] > 1]
     options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
     lines = [
         ", ".join(single),

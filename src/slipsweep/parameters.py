@@ -49,6 +49,8 @@ BOUNDS: dict[str, Bound] = {
     "scale": _POSITIVE,
     "time_scale": _POSITIVE,
     "g": _POSITIVE,
+    "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1"),
+    "threshold": _NOT_NEGATIVE,
 }
 
 MODELS = ("mendez", "newmark")
@@ -58,7 +60,7 @@ WAVEFORMS = ("sine",)
 SOLVERS = ("auto", "step", "cycle")
 RULES = ("rectangle", "trapezoid", "simpson")
 
-#: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (README).
+#: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (docs/speed.md).
 STEPS_PER_CYCLE = 1024
 
 #: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
@@ -71,8 +73,8 @@ def number_text(value: float) -> str:
     return repr(value).removesuffix(".0")
 
 
-def check_values(name: str, values: Any) -> NDArray[np.float64]:
-    """Return `values` as float64 if all are in the bounds of parameter `name`.
+def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.float64]:
+    """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors.
 
     Raises
     ------
@@ -85,11 +87,11 @@ def check_values(name: str, values: Any) -> NDArray[np.float64]:
             raise TypeError
         array = array.astype(np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{name} = {values!r}: must be a number, or an array of numbers") from None
+        raise InputError(f"{key or name} = {values!r}: must be a number, or an array of numbers") from None
     bound = BOUNDS[name]
     wrong = ~bound.holds(array)
     if wrong.any():
-        raise InputError(f"{name} = {number_text(float(array[wrong].flat[0]))}: must be {bound.text}")
+        raise InputError(f"{key or name} = {number_text(float(array[wrong].flat[0]))}: must be {bound.text}")
     return array
 
 

@@ -19,9 +19,13 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.tables import Table, Variable
-from slipsweep.variables import PARAMETERS, RESULTS
+from slipsweep.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
 
 Floats = NDArray[np.float64]
+
+#: What a file may hold along its axes, and on them.
+_COORDINATES = PARAMETERS | STATISTIC_COORDINATES
+_RESULTS = RESULTS | STATISTICS
 
 #: Points of an axis that a figure shows: more than one for every two dots on paper is lost.
 MOST_POINTS = 600
@@ -86,13 +90,13 @@ class Result:
     @property
     def variables(self) -> list[str]:
         """Names of the results in the file."""
-        return [name for name in self._file.variables if name in RESULTS and name not in self.coordinates]
+        return [name for name in self._file.variables if name in _RESULTS and name not in self.coordinates]
 
     @property
     def coordinates(self) -> list[str]:
         """Names of the parameters in the file: axes, scalars, and those that lie along other dimensions."""
         named = " ".join(v.coordinates for v in self._file.variables.values() if "coordinates" in v.ncattrs()).split()
-        return [name for name in PARAMETERS if name in self._file.variables and (name in named or name in self.axes)]
+        return [name for name in _COORDINATES if name in self._file.variables and (name in named or name in self.axes)]
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a variable."""
@@ -131,8 +135,8 @@ class Result:
         Parameters
         ----------
         at : mapping of axis name to value
-            In the axis's own unit; for ``case`` its number or label.  A parameter that is one number
-            for the whole file may be named too, with that number.
+            In the axis's own unit, or a text with another ("0.3g"); for ``case`` its number or label.
+            A parameter that is one number for the whole file may be named too, with that number.
 
         Returns
         -------
@@ -152,18 +156,14 @@ class Result:
             if name == "case" and isinstance(value, str) and value in self.labels:
                 found[name] = self.labels.index(value)
                 continue
-            try:
-                number = float(value)
-            except ValueError:
-                allowed = f"a number or one of {', '.join(self.labels)}" if name == "case" else "a number"
-                raise InputError(f"{self.path}: {name} = {value}: must be {allowed}") from None
+            number = self._number(name, value)
             values = self.axes[name] if name in self.axes else np.atleast_1d(self.read(name, ()))
             steps = np.diff(values)
             # an axis of one value takes that value, give or take its rounding
             low, high = (steps[0] / 2, steps[-1] / 2) if steps.size else (1e-6 * abs(values[0]),) * 2
             slack = 1e-12 * abs(values).max()
             if not values[0] - low - slack <= number <= values[-1] + high + slack:
-                unit = PARAMETERS[name]["units"] if name in PARAMETERS else "1"
+                unit = _COORDINATES[name]["units"] if name in _COORDINATES else "1"
                 there = f"{values[0]:.6g} to {values[-1]:.6g}" if values.size > 1 else f"{values[0]:.6g}"
                 raise InputError(
                     f"{self.path}: {name} = {number:.6g}: outside the file's range, {there}"
@@ -172,6 +172,20 @@ class Result:
             if name in self.axes:
                 found[name] = int(np.argmin(np.abs(values - number)))
         return found
+
+    def _number(self, name: str, value: float | str) -> float:
+        """A value on an axis in the axis's own unit."""
+        try:
+            return float(value)
+        except ValueError:
+            if name == "case":
+                allowed = f"a number or one of {', '.join(self.labels)}"
+                raise InputError(f"{self.path}: {name} = {value}: must be {allowed}") from None
+        from slipsweep.spec import quantity  # imports pydantic: only for values with units
+
+        # of the same unit
+        parameter = name if name in PARAMETERS else "displacement_amplitude" if name == "threshold" else "mu_s"
+        return quantity(f"{self.path}: {name}", str(value), parameter, float(self.attrs["g"]))
 
     # --------------------------------------------------------------------------- reading
 
@@ -211,7 +225,7 @@ class Result:
 
         def variable(name: str) -> Variable:
             dims = self.dims(name)
-            attrs = PARAMETERS[name] if name in self.coordinates else RESULTS[name]
+            attrs = _COORDINATES[name] if name in self.coordinates else _RESULTS[name]
             parts = tuple(where[dim] for dim in dims)
             return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, parts), attrs)
 

@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from slipsweep.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
 from slipsweep.suggest import did_you_mean
 from slipsweep.tables import Variable
 from slipsweep.variables import DEFAULT_RESULTS, DIMENSION_ORDER, PARAMETERS, RESULT_DTYPES, RESULTS
+
+if TYPE_CHECKING:
+    from slipsweep.uncertainty import Sampling
 
 Floats = NDArray[np.float64]
 
@@ -137,6 +140,46 @@ class Output(_Table):
     dtype: Literal["float64", "float32"] = "float64"
 
 
+#: One table of [uncertainty]; `slipsweep.uncertainty` knows what each distribution may hold.
+Drawn = dict[Text, Any]
+
+
+class Uncertainty(_Table):
+    """Inputs that are drawn, how they are sampled, and the statistics wanted of the displacement."""
+
+    samples: Whole = 4096
+    method: Text = "sobol"
+    seed: Whole = 0
+    quantiles: list[Number] = [0.05, 0.5, 0.95]
+    thresholds: list[Any] = [0.01, 0.1, 1.0]
+    correlation: list[Any] = []
+    theta: Drawn | None = None
+    mu_s: Drawn | None = None
+    amplitude: Drawn | None = None
+    displacement_amplitude: Drawn | None = None
+    frequency: Drawn | None = None
+    yield_acceleration: Drawn | None = None
+    decay_rate: Drawn | None = None
+    delta_mu: Drawn | None = None
+    minimum_friction: Drawn | None = None
+
+    def sampling(self, g: float) -> "Sampling":
+        """What `slipsweep.uncertainty` makes of the table (InputError: what is not allowed)."""
+        from slipsweep.uncertainty import DRAWN, check_sampling  # imports scipy: only for sweeps that need it
+
+        return check_sampling(
+            {name: drawn for name in DRAWN if (drawn := getattr(self, name)) is not None},
+            samples=self.samples,
+            method=self.method,
+            seed=self.seed,
+            quantiles=self.quantiles,
+            thresholds=self.thresholds,
+            correlation=self.correlation,
+            g=g,
+            keys="uncertainty.",
+        )
+
+
 class SweepFile(_Table):
     """A sweep file as written: its tables, defaults filled in."""
 
@@ -146,6 +189,7 @@ class SweepFile(_Table):
     excitation: Excitation = Excitation()
     solver: Solver = Solver()
     output: Output = Output()
+    uncertainty: Uncertainty | None = None
 
 
 # ----------------------------------------------------------------------- what comes out
@@ -174,6 +218,8 @@ class SweepSpec:
         Names of the rows of [[cases]]; empty without them.
     model, excitation, solver, output
         The tables of the sweep file.
+    sampling : Sampling or None
+        What [uncertainty] says; such a sweep gives statistics of the displacement.
     """
 
     source: str
@@ -184,6 +230,7 @@ class SweepSpec:
     excitation: Excitation
     solver: Solver
     output: Output
+    sampling: "Sampling | None" = None
 
     @property
     def shape(self) -> dict[str, int]:
@@ -303,20 +350,21 @@ def parse(text: str, source: str) -> SweepSpec:
     except ValidationError as error:
         raise InputError(f"{source}: {_one_line(_words(error))}") from None
     try:
-        parameters = _parameters(file)
+        sampling = file.uncertainty.sampling(file.model.g) if file.uncertainty is not None else None
+        parameters = _parameters(file, sampling)
         _check_model(file)
         _check_variables(file, parameters)
     except InputError as error:
         raise InputError(f"{source}: {_one_line(str(error))}") from None
     labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
-    return SweepSpec(source, text, parameters, labels, file.model, file.excitation, file.solver, file.output)
+    return SweepSpec(source, text, parameters, labels, file.model, file.excitation, file.solver, file.output, sampling)
 
 
 # ------------------------------------------------------------- from tables to parameters
 
 
-def _parameters(file: SweepFile) -> dict[str, Parameter]:
-    """Gather the inputs from [axes], [[cases]] and [model]: each once, none missing."""
+def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Parameter]:
+    """Gather the inputs from [axes], [[cases]] and [model]: each once, none missing that is not drawn."""
     axes = {name: axis for name in PARAMETERS if (axis := getattr(file.axes, name)) is not None}
     cases = _cases(file.cases or [])
     # yield_acceleration = "coulomb" is None here: it only says what holds by default
@@ -328,6 +376,9 @@ def _parameters(file: SweepFile) -> dict[str, Parameter]:
         if len(places) > 1:
             raise InputError(f"{places[0]}: given twice, also as {places[1]}: give it once")
     given = {*axes, *cases, *numbers}
+    if sampling is not None:
+        sampling.check_given(tuple(given))
+        given |= {*sampling.absolute}
     for name in ("theta", "mu_s", "frequency"):
         if name not in given:
             raise InputError(f"axes.{name}: missing: give it in [axes.{name}] or in every row of [[cases]]")
@@ -382,7 +433,7 @@ def _axis(name: str, axis: Axis, g: float) -> Floats:
         numbers = _spaced(key, axis)
 
     with np.errstate(over="ignore"):
-        values = numbers * _unit_factor(name, axis.units, g)
+        values = numbers * unit_factor(f"{key}.units", name, axis.units, g)
     if (bad := _first_bad(name, values)) is not None:
         where = f"values[entry {bad + 1}]" if axis.values is not None else "start" if bad == 0 else "stop"
         number = axis.stop if where == "stop" else numbers[bad]
@@ -424,6 +475,8 @@ def _check_model(file: SweepFile) -> None:
 
 def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> None:
     variables = file.output.variables
+    if file.uncertainty is not None and "variables" in file.output.model_fields_set:
+        raise InputError("output.variables: not allowed beside [uncertainty], which has statistics as its results")
     for number, name in enumerate(variables, 1):
         where = f"output.variables[entry {number}] = {_show(name)}"
         if name not in RESULTS:
@@ -450,9 +503,10 @@ _FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
 _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
 
 
-def _unit_factor(name: str, units: str | None, g: float) -> float:
+def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
     """Return what to multiply a number in `units` by, to have it in the parameter's own unit.
 
+    `key` is what the units are called in errors.
     "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
     meant against the gravity that the block feels.
     """
@@ -462,7 +516,7 @@ def _unit_factor(name: str, units: str | None, g: float) -> float:
     if own == "m s-2" and units == "g":
         return g
 
-    refusal = InputError(f"axes.{name}.units = {_show(units)}: must be a unit that converts to {own}")
+    refusal = InputError(f"{key} = {_show(units)}: must be a unit that converts to {own}")
     # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
     text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
     if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
@@ -511,7 +565,7 @@ def quantity(key: str, text: str, parameter: str, g: float) -> float:
     if found is None:
         raise refusal
     try:
-        return float(found[1]) * _unit_factor(parameter, found[2] or None, g)
+        return float(found[1]) * unit_factor(key, parameter, found[2] or None, g)
     except InputError:
         raise refusal from None
 

@@ -551,6 +551,19 @@ def write_table(table: Table, path: Path, *, title: str, command: str, overwrite
             file[name][...] = array.values
 
 
+def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str, overwrite: bool = False) -> None:
+    """Write the statistics of a sweep with uncertain inputs: with its text, so that it can be repeated from them."""
+    check_output(path, overwrite)
+    with (
+        complete_or_absent(path, overwrite) as temporary,
+        _netcdf(temporary, path) as file,
+        _writing(path),
+    ):
+        _head(file, spec, table, spec.labels, command)
+        for name, array in table.data_vars.items():
+            file[name][...] = array.values
+
+
 def without_time_axis(table: Table) -> Table:
     """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
 

@@ -1,5 +1,9 @@
 """How figures look: colours, symbols, units and captions, the same in all of them."""
 
+import json
+from collections.abc import Mapping
+from typing import Any
+
 from slipsweep.tables import Table
 from slipsweep.variables import PARAMETERS, RESULTS
 
@@ -47,6 +51,17 @@ def caption(table: Table) -> str:
     single = [name for name in SYMBOLS if name in table.coords and table[name].values.size == 1]
     parts = [value_text(name, table[name].item()) for name in single]
     attributes = table.attrs
+    uncertain = [f"uncertain: {_drawn_text(attributes)}"] if "uncertain" in attributes else []
     options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
     shaking = f"{attributes['cycles']} cycles of a {attributes['waveform']}"
-    return f"{', '.join(parts)}\nmodel: {', '.join(options)}; {shaking}".strip()
+    return "\n".join([", ".join(parts), *uncertain, f"model: {', '.join(options)}; {shaking}"]).strip()
+
+
+def _drawn_text(attributes: Mapping[str, Any]) -> str:
+    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``."""
+    signs = {"absolute": "~", "factor": "×", "offset": "+"}
+    texts = []
+    for name, about in json.loads(attributes["uncertain"]).items():
+        numbers = ", ".join(f"{key}={value}" for key, value in about.items() if key not in ("distribution", "kind"))
+        texts.append(f"{SYMBOLS[name]} {signs[about['kind']]} {about['distribution']}({numbers})")
+    return f"{', '.join(texts)}; {attributes['samples']} samples"

@@ -179,6 +179,44 @@ RECORD_COUNTS: dict[str, dict[str, Any]] = {
     "continuous_pulses": {"units": "1", "long_name": "number of pulses in continuous mode"},
 }
 
+#: Coordinates of the statistics of `sample`, beside the parameters.
+STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
+    "quantile": {"units": "1", "long_name": "share of the samples with a value that lies below"},
+    "threshold": {"units": "m", "long_name": "displacement to exceed"},
+    "mode": {
+        "units": "1",
+        **{name: RESULTS["sliding_mode"][name] for name in ("long_name", "flag_values", "flag_meanings")},
+    },
+    "flag": {
+        "units": "1",
+        "long_name": "flag of the validity",
+        "flag_values": [int(flag) for flag in Validity],
+        "flag_meanings": RESULTS["validity"]["flag_meanings"],
+    },
+}
+
+#: Statistics of `sample`; quantiles, mean and probabilities are of the samples that have a value.
+STATISTICS: dict[str, dict[str, Any]] = {
+    "displacement_quantile": {
+        "units": "m",
+        "long_name": "quantile of the permanent displacement",
+        "ancillary_variables": "valueless_share",
+    },
+    "mean_displacement": {
+        "units": "m",
+        "long_name": "mean permanent displacement",
+        "ancillary_variables": "valueless_share",
+    },
+    "exceedance_probability": {
+        "units": "1",
+        "long_name": "probability that the permanent displacement exceeds a threshold",
+        "ancillary_variables": "valueless_share",
+    },
+    "mode_share": {"units": "1", "long_name": "share of the samples in a sliding mode"},
+    "flag_share": {"units": "1", "long_name": "share of the samples with a flag"},
+    "valueless_share": {"units": "1", "long_name": "share of the samples without a value"},
+}
+
 #: dtype of each result; everything else is float64.
 RESULT_DTYPES: dict[str, str] = {"sliding_mode": "int8", "validity": "int16", "limit_status": "int8"}
 

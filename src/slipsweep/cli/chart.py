@@ -40,12 +40,16 @@ def chart(
             "--kind",
             "-k",
             metavar="KIND",
-            help="contours, modes, families, dimensionless or newmark; may be repeated (default: all that fit).",
+            help="contours, modes, families, dimensionless or newmark; of uncertain inputs fragility or quantiles; "
+            "may be repeated (default: all that fit).",
         ),
     ] = None,
     at: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Where to cut an axis, at the nearest value (default: its middle)."),
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Where to cut an axis, at the nearest value: theta=12, amplitude=0.3g (default: its middle).",
+        ),
     ] = None,
     x: Annotated[str | None, typer.Option(metavar="NAME", help="Axis to draw over.")] = None,
     y: Annotated[
@@ -62,7 +66,10 @@ def chart(
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Draw design charts from a result: contours, sliding modes, families of curves, ratios to Newmark."""
+    """Draw design charts from a result: contours, sliding modes, families of curves, ratios to Newmark.
+
+    From statistics of uncertain inputs: fragility curves and bands of quantiles.
+    """
     kinds = list(dict.fromkeys(kind or ()))
     for name in kinds:
         if name not in _CHARTS:
@@ -83,7 +90,8 @@ def chart(
     with Result(file) as result:
         figures: dict[str, Figure] = {}
         left_out: dict[str, str] = {}
-        wanted = {name: outputs or [Path(f"{file.stem}-{name}.png")] for name in kinds or _CHARTS}
+        fitting = _STATISTIC_CHARTS if "exceedance_probability" in result.variables else _SWEEP_CHARTS
+        wanted = {name: outputs or [Path(f"{file.stem}-{name}.png")] for name in kinds or fitting}
         for paths in wanted.values():
             for path in paths:
                 store.check_output(path, overwrite)
@@ -227,10 +235,54 @@ def _newmark(result: "Result", wish: _Wish) -> "Figure":
     return charts.newmark_ratio(table, slices.newmark(table), slices.boundaries(table), x, y)
 
 
-_CHARTS: dict[str, "Callable[[Result, _Wish], Figure]"] = {
+def _curves(result: "Result", wish: _Wish, variable: str, family: str | None) -> tuple[str, str | None]:
+    """The axis that statistics are drawn over, and the one that tells curves apart, if there is one."""
+    result.result(variable)
+    for asked in (wish.x, wish.y):
+        if asked is not None:
+            result.axis(asked)
+    own = ("quantile", "threshold")
+    free = [d for d in result.dims(variable) if result.axes[d].size > 1 and d not in wish.at and d != "case"]
+    x = wish.x or next((d for d in (*_DRIVES, *free) if d in free and d not in (*own, wish.y)), None)
+    if x is None or x not in free or x in own:
+        raise InputError(f"{result.path}: {variable} needs an axis of two values or more that --at does not cut")
+    chosen = wish.y or (family if family in free else None)
+    if chosen == x or (chosen is not None and chosen not in free):
+        raise InputError(f"{result.path}: --y {chosen}: must be another axis that {variable} has, and that is not cut")
+    return x, chosen
+
+
+def _fragility(result: "Result", wish: _Wish) -> "Figure":
+    from slipsweep import uncertainty_figures
+
+    x, family = _curves(result, wish, "exceedance_probability", "threshold")
+    keep: dict[str, slice | list[int]] = {x: result.thinned(x)}
+    if family:
+        keep[family] = result.spread(family, _CURVES)
+    table = result.select(["exceedance_probability", "valueless_share"], keep, wish.at)
+    return uncertainty_figures.fragility(table, x, family)
+
+
+def _quantiles(result: "Result", wish: _Wish) -> "Figure":
+    from slipsweep import uncertainty_figures
+
+    if wish.y is not None:
+        raise InputError(f"{result.path}: --y {wish.y}: not with quantiles, whose bands lie over one axis, --x")
+    x, _ = _curves(result, wish, "displacement_quantile", None)
+    names = ["displacement_quantile", "valueless_share"]
+    table = result.select(names, {x: result.thinned(x), "quantile": slice(None)}, wish.at)
+    return uncertainty_figures.quantile_bands(table, x)
+
+
+_SWEEP_CHARTS: dict[str, "Callable[[Result, _Wish], Figure]"] = {
     "contours": _contours,
     "modes": _modes,
     "families": _families,
     "dimensionless": _dimensionless,
     "newmark": _newmark,
 }
+
+#: Those of a sweep with uncertain inputs.
+_STATISTIC_CHARTS: dict[str, "Callable[[Result, _Wish], Figure]"] = {"fragility": _fragility, "quantiles": _quantiles}
+
+_CHARTS = _SWEEP_CHARTS | _STATISTIC_CHARTS

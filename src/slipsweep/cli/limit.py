@@ -77,6 +77,8 @@ def _arguments(sweep: "SweepSpec", displacement: list[str], maximum_amplitude: s
     """Arguments of `limit_table`: those of the sweep but for the amplitude and the time stepping."""
     from slipsweep.spec import quantity
 
+    if sweep.sampling is not None:
+        raise InputError(f"{sweep.source}: has uncertain inputs; limits are those of a sweep without [uncertainty]")
     skipped = ("amplitude", "displacement_amplitude", "solver", "rule", "steps_per_cycle", "variables")
     given = {name: value for name, value in sweep.arguments().items() if name not in skipped}
     g = sweep.model.g

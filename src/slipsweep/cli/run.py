@@ -2,12 +2,15 @@
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from slipsweep.cli.common import Overwrite, Quiet, echo_tally, examples, progress_bar, typed_command
 from slipsweep.errors import InputError
+
+if TYPE_CHECKING:
+    from slipsweep.spec import SweepSpec
 
 EXAMPLE = examples(
     "slipsweep run sweeps/design_chart.toml",
@@ -66,9 +69,22 @@ def run(
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
     if split and output is None:
         path = path.with_suffix("")
-    cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked, workers or 0)
     if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
         raise InputError(f"{path}: is the sweep file itself; give another name with -o")
+    if checked.sampling is not None:
+        refused = {
+            "--resume": resume,
+            "--split": split,
+            "--memory": memory is not None,
+            "--workers": workers is not None,
+            "--scheduler": scheduler is not None,
+        }
+        for option, given in refused.items():
+            if given:
+                raise InputError(f"{option}: not with [uncertainty], whose statistics are one small file")
+        _run_samples(checked, path, overwrite, quiet)
+        return
+    cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked, workers or 0)
     with ExitStack() as stack:
         solved: blocks.Solved = blocks.solve_here
         shared = None
@@ -97,3 +113,32 @@ def run(
     typer.echo(f"{report.tally.cells} cells ({grid}) in {report.seconds:.2f} s, {rate:.3g} cells/s")
     echo_tally(report.tally)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")
+
+
+def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -> None:
+    """Sample the uncertain inputs of a sweep, and write the statistics."""
+    import time
+
+    from slipsweep import store
+    from slipsweep.resources import size_text
+    from slipsweep.uncertainty import plan_samples, tally
+
+    assert sweep.sampling is not None
+    store.check_output(path, overwrite)
+    started = time.perf_counter()
+    try:
+        given = {name: value for name, value in sweep.arguments().items() if name != "variables"}
+        plan = plan_samples(sweep.sampling, **given)
+        with progress_bar(plan.cells, quiet, "samples") as progress:
+            table = plan.solve(progress)
+    except InputError as error:
+        raise InputError(f"{sweep.source}: {error}") from None
+    store.write_statistics(sweep, table, path, command=typed_command(), overwrite=overwrite)
+    if quiet:
+        return
+    seconds = max(time.perf_counter() - started, 1e-9)
+    grid = " x ".join(f"{length} {dim}" for dim, length in sweep.shape.items()) or "no axes"
+    typer.echo(f"{sweep.cells} grid points ({grid}), {sweep.sampling.samples} samples each")
+    typer.echo(f"{plan.cells} samples solved in {seconds:.2f} s, {plan.cells / seconds:.3g} samples/s")
+    echo_tally(tally(table, sweep.sampling.samples))
+    typer.echo(f"{path}  {size_text(path.stat().st_size)}")
