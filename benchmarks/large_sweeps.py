@@ -3,7 +3,8 @@
 ``python -m benchmarks.large_sweeps`` writes large_sweeps.md, scaling.md and large_sweeps.json; then
 ``.ci/include-report`` puts the tables into docs.  Commands are run as processes, as a user runs them.
 What is compared takes turns, and the least of several times is taken: on a machine that others use
-the median would measure them.  Some minutes, and 5 GB of disk for the sweep of 10⁹ cells.
+the median would measure them.  Where they use all of it, only the seconds of processor say something.
+Some minutes, and 5 GB of disk (`TMPDIR`) for the sweep of 10⁹ cells.
 """
 
 import json
@@ -332,22 +333,28 @@ def main() -> None:
     given = arguments(__doc__)
     before = os.getloadavg()[0]
     measured: dict[str, dict[str, float]] = {}
-    texts = []
+    texts: list[str] = []
+
+    def write() -> str:
+        """Write what there is so far; return the sentence that stands over it."""
+        measured["load"] = {"before": before, "after": os.getloadavg()[0]}
+        head = (
+            f"{measured_on(('numpy', 'numba', 'netCDF4', 'distributed'))} Load of the machine (processes that want a "
+            f"core) {before:.1f} before and {measured['load']['after']:.1f} after; "
+            "the least of several times. Written by `python -m benchmarks.large_sweeps`.\n"
+        )
+        (given.folder / "large_sweeps.md").write_text("\n".join([head, *texts]))
+        (given.folder / "large_sweeps.json").write_text(json.dumps(measured, indent=1) + "\n")
+        return head
+
     with tempfile.TemporaryDirectory() as folder:
         for section in (throughput, overhead, workers, memory, compression):
             text, measured[section.__name__] = section(Path(folder), given.tiny)
             texts.append(text)
             print(text, flush=True)
+            write()
     scaled = scaling(given.tiny, measured)
-    measured["load"] = {"before": before, "after": os.getloadavg()[0]}
-    head = (
-        f"{measured_on(('numpy', 'numba', 'netCDF4', 'distributed'))} Load of the machine (processes that want a core) "
-        f"{before:.1f} before and {measured['load']['after']:.1f} after; "
-        "the least of several times. Written by `python -m benchmarks.large_sweeps`.\n"
-    )
-    (given.folder / "large_sweeps.md").write_text("\n".join([head, *texts]))
-    (given.folder / "scaling.md").write_text(f"{head}\n{scaled}")
-    (given.folder / "large_sweeps.json").write_text(json.dumps(measured, indent=1) + "\n")
+    (given.folder / "scaling.md").write_text(f"{write()}\n{scaled}")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,11 @@ def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")  # of the packages compared with
-@pytest.mark.parametrize("name", WRITES)
+@pytest.mark.parametrize(
+    # half a minute of processes and clusters
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name == "large_sweeps" else ()) for name in WRITES],
+)
 def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # the outside solvers that compile take most of a minute
     monkeypatch.setitem(sys.modules, "diffrax", None)
