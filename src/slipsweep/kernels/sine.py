@@ -49,7 +49,17 @@ from slipsweep.kernels.block import (
     slip_root,
     whole_lanes,
 )
-from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break, solve_cell
+from slipsweep.kernels.cycle import (
+    LEG_COLUMNS,
+    MOST_LEGS,
+    NODES,
+    PANEL_BOUNDS,
+    SLIVER,
+    WEIGHTS,
+    answer,
+    next_break,
+    train,
+)
 from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.jit import in_lanes, scalar, summed
 
@@ -752,11 +762,11 @@ def solve_cells(
     found = runs_of(blocks, count, runs)
     for way in (_YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS):
         solve_way(way, runs, found, options, blocks, lanes, motion, codes)
+    no_legs = np.empty((0, LEG_COLUMNS))
     for j in range(count):
         if blocks[_WAY + j] == _OTHER:
             block = block_at(cells, j, options)
             if block.sliding_mode == CONTINUOUS:
-                answer = continuous(block, options.cycles, options.wants_peak)
-                motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
+                answer(continuous(block, options.cycles, options.wants_peak), j, motion, codes)
             else:
-                solve_cell(block, options, wave, j, motion, codes)
+                answer(train(block, options, wave, no_legs), j, motion, codes)

@@ -13,7 +13,7 @@ simpson     start, middle, end     4      Runge-Kutta 4 for a rate free of V
 
 Steps end where a piece of the waveform does (`excitation`): on its jumps, kinks, turns and zeros, and are
 of one length on each piece (`steps_of`).  The orders hold because a step in which something happens (t1, a
-switch to or from the hold, a turn of Eq. 4, the stop) is divided there by `rise_step` and `fall_step`, and
+switch to or from the hold, a turn of Eq. 4, the stop) is divided there by `rise_step` and `take`, and
 because a slide or a layer of friction shorter than a few steps is given steps of its own.  Steps in
 which nothing happens, nearly all, are taken by lanes of cells in lockstep, with w from a table
 (`stick_slip_lanes`, `continuous_lanes`); what is no matter of lanes goes pulse by pulse (`pulse`, `train`).
@@ -74,6 +74,9 @@ _FOLDINGS = 40.0
 #: No step is shorter: it would no longer move the phase.
 _LEAST_STEP = 1e-14
 
+#: Cycles from which on the rounding of V over one (1e-14) is kept from adding up (`mirrored_gain`).
+_MANY = 64
+
 #: More events than any step holds.
 _MOST_EVENTS = 16
 
@@ -86,8 +89,8 @@ class Steps(NamedTuple):
     """The steps of the pieces of a wave: `counts[p]` of one `length[p]` on each.
 
     ``nodes[offset[p] + 2 * k]`` is w at the beginning of step k of piece p, followed by w at its middle and
-    at its end (−0.0 where a negative piece is 0); `mirrored` is whether the two halves of a cycle are, but
-    for the sign, the same.
+    at its end (−0.0 where a negative piece is 0); `mirrored` is whether the halves of a cycle repeated
+    often are, but for the sign, the same.
     """
 
     wave: Wave
@@ -136,8 +139,8 @@ def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
 
 
 def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarray) -> bool:
-    """Whether in the repeated cycle w(φ + π) = −w(φ)."""
-    if wave.repeats == 0:
+    """Whether in a cycle repeated often w(φ + π) = −w(φ)."""
+    if wave.repeats < _MANY:
         return False
     low, high = wave.cycle[wave.lead], wave.cycle[wave.lead + 1]
     if (high - low) % 2:
@@ -309,28 +312,40 @@ def hold_step(block: Block, rule: int, wave: Wave, p: int, start: float, end: fl
 
 
 @scalar
-def whole_hold_step(block: Block, rule: int, steps: Steps, p: int, i: int, state: np.ndarray) -> None:
-    """Step i of piece p with b held, cut at the stop."""
-    held, amplitude, nodes, at = state[HELD], block.amplitude, steps.nodes, steps.offset[p] + 2 * i
-    c0, c1, c2 = coefficients(
-        rule, amplitude * nodes[at] - held, amplitude * nodes[at + 1] - held, amplitude * nodes[at + 2] - held
-    )
-    take(c0, c1, c2, steps.length[p], True, state)
+def whole_hold_step(
+    rule: int, amplitude: float, w_start: float, w_middle: float, w_end: float, h: float, state: np.ndarray
+) -> None:
+    """A step of length h with b held, cut at the stop."""
+    held = state[HELD]
+    c0, c1, c2 = coefficients(rule, amplitude * w_start - held, amplitude * w_middle - held, amplitude * w_end - held)
+    take(c0, c1, c2, h, True, state)
 
 
 @scalar
-def fall_step(block: Block, rule: int, options: Options, steps: Steps, p: int, i: int, state: np.ndarray) -> None:
-    """Step i of piece p with b held, in steps that a slide just begun asks for."""
-    wave, tau, end = steps.wave, node(steps, p, i), node(steps, p, i + 1)
-    if phase_at(wave, p, tau) >= state[REACH]:
-        whole_hold_step(block, rule, steps, p, i, state)
-        return
-    for _ in range(_MOST_EVENTS + options.steps_per_cycle):
-        cut = min(end, tau + longest_step(block, options, wave, p, tau, math.inf, state))
-        hold_step(block, rule, wave, p, tau, cut, state)
-        tau = cut
-        if tau >= end or state[SLIDES] == 0.0:
+def hold_steps(
+    rule: int, amplitude: float, nodes: np.ndarray, at: int, count: int, h: float, state: np.ndarray
+) -> None:
+    """So many steps with b held, up to the stop; w from nodes[at] on."""
+    for i in range(count):
+        whole_hold_step(rule, amplitude, nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2], h, state)
+        if state[SLIDES] == 0.0:
             break
+
+
+@scalar
+def fall_steps(block: Block, rule: int, options: Options, steps: Steps, p: int, state: np.ndarray) -> None:
+    """Along piece p with b held, in finer steps as long as a slide just begun asks for them."""
+    wave, first, at = steps.wave, 0, steps.offset[p]
+    while first < steps.counts[p] and phase_at(wave, p, node(steps, p, first)) < state[REACH]:
+        tau, end = node(steps, p, first), node(steps, p, first + 1)
+        while tau < end and state[SLIDES] > 0.0:
+            cut = min(end, tau + longest_step(block, options, wave, p, tau, math.inf, state))
+            hold_step(block, rule, wave, p, tau, cut, state)
+            tau = cut
+        if state[SLIDES] == 0.0:
+            return
+        first += 1
+    hold_steps(rule, block.amplitude, steps.nodes, at + 2 * first, steps.counts[p] - first, steps.length[p], state)
 
 
 @scalar
@@ -420,6 +435,45 @@ def rise_step(
 
 
 @scalar
+def rise_steps(
+    block: Block, rule: int, options: Options, steps: Steps, p: int, first: int, tau: float, x: float, state: np.ndarray
+) -> None:
+    """Along piece p, on which Üg > 0 does not fall, from τ within its step `first`, where Üg = x."""
+    nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
+    newmark, asked = block.rise == NEWMARK, math.nan
+    for i in range(first, steps.counts[p]):
+        x_end = block.amplitude * nodes[at + 2 * i + 2]
+        if state[SLIDES] == 0.0 and x_end <= block.yield_acceleration:
+            asked = math.nan
+            continue
+        asked_end = -math.inf if newmark else response(block, x_end)
+        # the step as it is where nothing happens in it, as in `lockstep_rise`
+        if state[SLIDES] > 0.0 and i > first and state[REACH] == -math.inf and state[LAYER] == 0.0:
+            x = block.amplitude * nodes[at + 2 * i]
+            if not newmark and math.isnan(asked):
+                asked = response(block, x)
+            follows, held, velocity, middle = state[FOLLOWS] > 0.0, state[HELD], state[VELOCITY], 0.0
+            if rule == SIMPSON:
+                x_middle = block.amplitude * nodes[at + 2 * i + 1]
+                middle = slip(block, x_middle) if follows else x_middle - held
+            c0, c1, c2 = coefficients(rule, x - held, middle, x_end - (asked_end if follows else held))
+            after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
+            switches = block.rise == MONOTONE and (asked_end < asked if follows else asked_end > held)
+            if not (switches or after <= 0.0 or (c0 > 0.0 and c0 + c1 + c2 < 0.0)):
+                state[DISPLACEMENT] += velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
+                state[VELOCITY] = after
+                state[PEAK], state[LEAST] = max(state[PEAK], after), min(state[LEAST], after)
+                if follows:
+                    state[HELD] = asked_end
+                asked = asked_end
+                continue
+        if i > first:
+            tau, x = node(steps, p, i), block.amplitude * nodes[at + 2 * i]
+        rise_step(block, rule, options, steps, p, i, tau, x, state)
+        asked = asked_end
+
+
+@scalar
 def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
     """What the beginning of piece p, after a jump upwards or a fall, asks of the block."""
     x = block.amplitude * wave.first[p]
@@ -464,19 +518,12 @@ def through_stretch(
                 max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.counts[q]), 0),
                 steps.counts[q] - 1,
             )
-        at = steps.offset[q]
         if kind_of(wave, q) == RISES:
-            for i in range(first, steps.counts[q]):
-                if i > first:
-                    tau, x = node(steps, q, i), block.amplitude * steps.nodes[at + 2 * i]
-                rise_step(block, rule, options, steps, q, i, tau, x, state)
+            rise_steps(block, rule, options, steps, q, first, tau, x, state)
         elif state[SLIDES] > 0.0:
             if state[HELD] <= 0.0:
                 return KD_NOT_POSITIVE
-            for i in range(steps.counts[q]):
-                fall_step(block, rule, options, steps, q, i, state)
-                if state[SLIDES] == 0.0:
-                    break
+            fall_steps(block, rule, options, steps, q, state)
     return KD_NOT_POSITIVE if state[SLIDES] > 0.0 and state[HELD] <= 0.0 else 0
 
 
@@ -486,16 +533,15 @@ def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, 
     wave = steps.wave
     state[RESTED] = math.inf
     for piece in range(q, min(p + 1, wave.first.size)):
-        last = tau if piece == p else wave.finish[piece]
-        for i in range(steps.counts[piece]):
-            start, end = node(steps, piece, i), node(steps, piece, i + 1)
-            if end <= last:
-                whole_hold_step(block, rule, steps, piece, i, state)
-            elif start < last:
-                hold_step(block, rule, wave, piece, start, last, state)
-            if state[SLIDES] == 0.0:
-                state[RESTED] = wave.end[piece]
-                return
+        h, whole = steps.length[piece], steps.counts[piece]
+        if piece == p:
+            whole = int((tau - wave.begin[piece]) / h)
+        hold_steps(rule, block.amplitude, steps.nodes, steps.offset[piece], whole, h, state)
+        if piece == p and state[SLIDES] > 0.0 and tau > node(steps, piece, whole):
+            hold_step(block, rule, wave, piece, node(steps, piece, whole), tau, state)
+        if state[SLIDES] == 0.0:
+            state[RESTED] = wave.end[piece]
+            return
 
 
 @scalar
@@ -652,6 +698,7 @@ def lockstep_fall(
 ) -> None:  # fmt: skip
     """Lanes along piece p with b held, or until all have stopped."""
     literally(rule)
+    columns = states.reshape((_STATE_SIZE, TILE))
     nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
     for i in range(steps.counts[p]):
         w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
@@ -678,8 +725,7 @@ def lockstep_fall(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    block = block_at(cells, where[j], options)
-                    whole_hold_step(block, rule, steps, p, i, states.reshape((_STATE_SIZE, TILE))[:, j])
+                    whole_hold_step(rule, lanes[AMPLITUDE + j], w_start, w_middle, w_end, h, columns[:, j])
 
 
 @scalar
@@ -861,20 +907,19 @@ def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int,
     g, wave, nodes = options.g, steps.wave, steps.nodes
     for j in range(count):
         lanes[_GAIN + j] = 0.0
+    stride = 1 if rule == SIMPSON else 2
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
         if wave.top[p] > 0.0:
-            at, h = steps.offset[p], steps.length[p]
-            for i in range(steps.counts[p]):
-                w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
+            at, last = steps.offset[p], 2 * steps.counts[p]
+            for k in range(0, last + 1, stride):
+                # what the step before k and that behind it give the node
+                c0, c1, c2 = coefficients(rule, 0.0, 1.0 if k % 2 else 0.0, 0.0 if k % 2 or k == 0 else 1.0)
+                share = velocity_gain(c0, c1, c2, steps.length[p], 1.0)
+                c0, c1, c2 = coefficients(rule, 0.0 if k % 2 or k == last else 1.0, 0.0, 0.0)
+                share += velocity_gain(c0, c1, c2, steps.length[p], 1.0)
+                w = nodes[at + k]
                 for j in range(count):
-                    amplitude = lanes[AMPLITUDE + j]
-                    start, middle, end = lane_shared(lanes, j, amplitude * w_start, g), 0.0, 0.0
-                    if rule == SIMPSON:
-                        middle = lane_shared(lanes, j, amplitude * w_middle, g)
-                    if rule != RECTANGLE:
-                        end = lane_shared(lanes, j, amplitude * w_end, g)
-                    c0, c1, c2 = coefficients(rule, start, middle, end)
-                    lanes[_GAIN + j] += 2.0 * velocity_gain(c0, c1, c2, h, 1.0)
+                    lanes[_GAIN + j] += 2.0 * share * lane_shared(lanes, j, lanes[AMPLITUDE + j] * w, g)
 
 
 @scalar
