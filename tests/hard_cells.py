@@ -150,6 +150,18 @@ def _friction_not_decaying() -> Iterator[Cell]:
             yield _cell(theta, mu_s, limit * short, cycles=2)
             given = _friction(theta, mu_s, yield_acceleration=2.0).limiting_acceleration
             yield _cell(theta, mu_s, given * short, cycles=2, yield_acceleration=2.0)
+    # beyond μs ξ² = 1 there is no value, but of Newmark's block, which slides
+    limit = _friction(0.0, 1.5, yield_acceleration=2.0).limiting_acceleration
+    for k in (2, 8, 14):
+        amplitude = limit * (1 + mpf(10) ** -k) / mp.sqrt(mpf(1.5))
+        yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0)
+        yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, model="newmark")
+    # with the default Δμ Eq. 4 holds these blocks back; without it the friction starts from μs, and on a level plane
+    # they slide as soon as it decays at all, which it does up to μs ξ = 1
+    for k in (2, 5, 8, 11, 14):
+        for side in (-1, 1):
+            amplitude = limit * (1 + side * mpf(10) ** -k) / mpf(1.5)
+            yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, delta_mu=0.0)
 
 
 def _sharp_decay() -> Iterator[Cell]:
@@ -275,7 +287,9 @@ CATEGORIES = (
     Category("level_plane", "θ = 0 or nearly: division by tan θ; the drift of a cycle must vanish", _level_plane),
     Category("uplift", "A tan θ → g: the normal force vanishes in the cycle", _uplift),
     Category("limit_undefined", "1 − tan θ (μs − tan θ) → 0: Üg,lim and Δμ grow without bound", _limit_undefined),
-    Category("friction_not_decaying", "μs ξ² → 1: λ is the logarithm of nearly 1", _friction_not_decaying),
+    Category(
+        "friction_not_decaying", "μs ξ² → 1: λ is the logarithm of nearly 1, or there is none", _friction_not_decaying
+    ),
     Category("sharp_decay", "λA/g up to 10⁶: friction gone in a layer of 10⁻⁶ of phase", _sharp_decay),
     Category(
         "tangential_onset", "Eq. 4 touches Üg: a double root, or none; the slide shrinks to a point", _tangential_onset

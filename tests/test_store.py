@@ -155,6 +155,36 @@ def test_float32_and_chosen_variables(tmp_path: Path) -> None:
     assert report.tally.flags is None
 
 
+SINGLE = '[output]\ndtype = "float32"\n'
+
+
+@pytest.mark.parametrize("cells", [7, 10**9], ids=["in blocks", "at once"])
+def test_float32_is_float64_rounded(tmp_path: Path, cells: int) -> None:
+    """Displacements from below the least subnormal to near the greatest float32; modes and flags the same."""
+    text = GRID.replace("[0.5, 1, 2, 4]", "[1e-18, 1e-10, 1.0, 1e10, 1e19, 1e22, 1e25]")
+    run(text, tmp_path / "double.nc")
+    run(text + SINGLE, tmp_path / "single.nc", block_cells=cells)
+    double, single = stored(tmp_path / "double.nc"), stored(tmp_path / "single.nc")
+    for name in ("permanent_displacement", "peak_relative_velocity"):
+        assert single[name].dtype == np.float32
+        np.testing.assert_array_equal(single[name], double[name].astype(np.float32))
+    displacement = single["permanent_displacement"]
+    assert np.nanmax(displacement) > 1e33
+    assert ((displacement > 0) & (displacement < np.finfo(np.float32).tiny)).any()
+    for name in ("sliding_mode", "validity"):
+        np.testing.assert_array_equal(single[name], double[name])
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_float32_does_not_overflow_in_silence(tmp_path: Path, split: bool) -> None:
+    text, path = GRID.replace("[0.5, 1, 2, 4]", "[1e-30]") + SINGLE, tmp_path / "a"
+    with pytest.raises(
+        InputError, match=r'output.dtype = "float32": permanent_displacement reaches .*must be "float64"'
+    ):
+        run(text, path, block_cells=100, split=split)
+    assert not path.exists()
+
+
 def test_cases_have_labels_and_no_string_type(tmp_path: Path) -> None:
     run(CASES, tmp_path / "a.nc", block_cells=5)
     with netCDF4.Dataset(tmp_path / "a.nc") as file:

@@ -1,12 +1,11 @@
 """Cases of every waveform in every regime, solved by `wave_reference`: data/waveforms.csv.
 
-``python tests/wave_cases.py`` writes the file anew (an hour); the tests solve a part of it again.
+``python tests/wave_cases.py`` writes the file anew (ten minutes); the tests solve a part of it again.
 """
 
 import csv
 import math
 import random
-import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -137,19 +136,19 @@ def _case(number: int, regime: str, waveform: str, harmonics: str, draw: random.
 
 def read_wave_cases() -> list[WaveCase]:
     """All cases of waveforms.csv."""
-    kinds = {"case": int, "cycles": int, "sliding_mode": int, "validity": int}
+    kinds: dict[str, Any] = {"case": int, "cycles": int, "sliding_mode": int, "validity": int}
     texts = ("regime", "waveform", "harmonics", "model", "rise", "recoupling")
     texts += ("permanent_displacement", "peak_relative_velocity")
     with PATH.open(newline="") as file:
-        return [
-            WaveCase(
-                **{
-                    name: value if name in texts else None if value == "" else kinds.get(name, float)(value)
-                    for name, value in row.items()
-                }
-            )
-            for row in csv.DictReader(file)
-        ]
+        rows = list(csv.DictReader(file))
+    cases = []
+    for row in rows:
+        given: dict[str, Any] = {
+            name: value if name in texts else None if value == "" else kinds.get(name, float)(value)
+            for name, value in row.items()
+        }
+        cases.append(WaveCase(**given))
+    return cases
 
 
 def main() -> None:
@@ -172,4 +171,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -61,10 +61,16 @@ class Section:
     def integrals(self, f: Function, start: mpf, end: mpf, decay: mpf) -> tuple[mpf, mpf]:
         """Integrals of f(ground) and of (end - phi) f(ground); `decay` is that of the friction, 1/(m/s2)."""
         rule = _gauss_legendre(DIGITS, mp.prec)
-        swing = abs(self.ground(end) - self.ground(start)) * decay
-        parts = 1 + int(mp.ceil((end - start) * self.fastest)) + int(mp.ceil(swing / 6))
+        x, y = self.ground(start), self.ground(end)
+        least, swing = min(abs(x), abs(y)), abs(y - x) * decay
+        # the friction falls by e^-6 at most on a part, until it is negligible
+        levels = [least + 6 * j / decay for j in range(1, 17) if 6 * j < swing]
+        cuts = {start, end, *(phi for level in levels if start < (phi := self.phase(self.side * level)) < end)}
+        ends = [start]
+        for a, b in pairwise(sorted(cuts)):
+            parts = 1 + int(mp.ceil((b - a) * self.fastest))
+            ends += [a + (b - a) * i / parts for i in range(1, parts + 1)]
         first = second = mpf(0)
-        ends = [start + (end - start) * i / parts for i in range(parts + 1)]
         for a, b in pairwise(ends):
             for node, weight in rule:
                 phi = a + node * (b - a)
@@ -167,7 +173,6 @@ class Block:
         self.sliding = False
         self.reset = True  # the next Ug = Uy on the rise resets b
         self.flags = 0
-        self.governs, self.slid = True, False
         self.rounding = interface.amplitude * mpf(10) ** (-DIGITS + 10)
 
     def starting(self, x: mpf) -> mpf:
@@ -226,11 +231,7 @@ class Block:
             extra += interface.monotone_pieces(self.slope, low, high)[1:-1]
         ends = self.levels(section, extra)
         for a, b in pairwise(ends):
-            begin, end, middle = section.ground(a), section.ground(b), section.ground((a + b) / 2)
-            if middle > self.threshold and not self.newmark:
-                self.slid = True
-                self.governs = self.governs and interface.eq4(end) <= self.threshold * (1 + mpf(10) ** -25)
-                self.governs = self.governs and interface.eq4(begin) <= self.threshold * (1 + mpf(10) ** -25)
+            begin, middle = section.ground(a), section.ground((a + b) / 2)
             self.meet(begin, middle)
             while self.sliding and a < b:
                 a = self.slide(section, a, b)
@@ -294,6 +295,22 @@ class Block:
         self.v -= self.b * span
         return b
 
+    def yield_governs(self, shaking: list[Section]) -> bool:
+        """Whether the plane exceeds Uy, and Eq. 4 stays below it at all that the plane rises through or jumps to."""
+        asked, before = [], mpf(0)
+        for section in shaking:
+            first, last = section.first, section.last
+            low = max(first, self.threshold)
+            if last > low:
+                asked += self.interface.monotone_pieces(self.slope, low, last)
+            elif first > self.threshold and (first > before + self.rounding or first == last):
+                asked.append(first)
+            before = last
+        if self.newmark:
+            return bool(asked)
+        limit = self.threshold * (1 + mpf(10) ** -25)
+        return bool(asked) and all(self.interface.eq4(x) <= limit for x in asked)
+
     def run(self, shaking: list[Section]) -> bool:
         """The whole motion; false where b <= 0 leaves no value."""
         before = mpf(0)
@@ -308,15 +325,9 @@ class Block:
                 elif self.sliding:
                     self.brake(section.start, section.end)
             elif last >= first:
-                if first == last and first > self.threshold:
-                    self.slid = True
-                    self.governs = self.governs and (self.newmark or self.interface.eq4(first) <= self.threshold)
                 self.rising(section)
             else:
                 if first > before + self.rounding:  # a jump upwards
-                    if first > self.threshold:
-                        self.slid = True
-                        self.governs = self.governs and (self.newmark or self.interface.eq4(first) <= self.threshold)
                     self.meet(first, first)
                 if self.sliding and self.reset and not self.integrate:
                     self.brake(section.start, section.end)
@@ -400,7 +411,7 @@ def solve(
             return Solution(u / omega**2, peak / omega, mode, validity, False, False)
         block = Block(interface, model, rise, recoupling)
         has_value = block.run(shaking)
-        below = block.governs and any(max(s.first, s.last) > block.threshold for s in shaking)
+        below = block.yield_governs(shaking)
         validity |= EQ4_BELOW_YIELD * below
         if not has_value:
             return Solution(mp.nan, mp.nan, MISSING, validity | KD_NOT_POSITIVE, False, below)

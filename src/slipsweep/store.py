@@ -414,11 +414,24 @@ class _OneFile:
         assert self.file is not None
         arrays = {}
         for name, result in table.data_vars.items():
-            arrays[name] = result.values.astype(self.spec.dtype(name), copy=False)
+            arrays[name] = _rounded(name, result.values, self.spec.dtype(name))
             self.file[name][_where(block, result.dims)] = arrays[name]
         self.file.sync()
         parts.sync(self.data)
         return arrays
+
+
+def _rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """A result as the file holds it; what is too large for that is an error, and not infinite."""
+    with np.errstate(over="ignore"):
+        rounded = values.astype(dtype, copy=False)
+    beyond = np.isinf(rounded)
+    if beyond.any() and np.isfinite(worst := np.abs(values[beyond]).max()):
+        raise InputError(
+            f'output.dtype = "{dtype}": {name} reaches {worst:.4g}, more than the {np.finfo(dtype).max:.4g} that it '
+            'holds; must be "float64"'
+        )
+    return rounded
 
 
 class _Files:
@@ -454,7 +467,7 @@ class _Files:
     def write(self, number: int, block: Block, table: Table) -> dict[str, NDArray[Any]]:
         """Write a block, have it on the disk, and return its values as they are stored."""
         results = {
-            name: replace(result, values=result.values.astype(self.spec.dtype(name), copy=False))
+            name: replace(result, values=_rounded(name, result.values, self.spec.dtype(name)))
             for name, result in table.data_vars.items()
         }
         coords = dict(table.coords)

@@ -440,8 +440,8 @@ def wave_of(waveform: Waveform, cycles: int) -> "Wave":
     wraps = plain[0].first > 0.0 and plain[-1].last > 0.0
     # a stretch that runs over from one cycle to the next makes the first cycle differ from the others
     lead = min(math.ceil(waveform.ramp_in) + int(wraps), cycles)
-    # the last plain cycle stands apart: another does not follow
-    tail = min(math.ceil(waveform.ramp_out) + 1, cycles - lead)
+    # the last plain cycle stands apart, as another does not follow; where stretches run over, so does the one before
+    tail = min(math.ceil(waveform.ramp_out) + 1 + int(wraps), cycles - lead)
     repeats = cycles - lead - tail
     numbers = [*range(lead), *([lead] if repeats else []), *range(cycles - tail, cycles)]
     ramped = [n < waveform.ramp_in or n + 1 > cycles - waveform.ramp_out for n in numbers]

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from slipsweep.equations import CONTINUOUS, STUCK
+from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     EVENT_TOLERANCE,
     INTEGRATE,
@@ -513,13 +513,12 @@ def continuous(block: Block, options: Options, wave: Wave) -> Motion:
 
 
 @scalar
-def solve(block: Block, options: Options, wave: Wave) -> Motion:
-    """The motion of a block that has a value."""
-    if block.sliding_mode == STUCK:
-        return Motion(0.0, 0.0, 0)
-    if block.sliding_mode == CONTINUOUS:
-        return continuous(block, options, wave)
-    return train(block, options, wave, np.empty((0, LEG_COLUMNS)))
+def answer(found: Motion, j: int, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Enter the motion of cell j of a tile."""
+    motion[0, j], motion[1, j] = found.displacement, found.peak_velocity
+    codes[1, j] |= found.validity
+    if found.validity & NO_VALUE:
+        codes[0, j] = -1
 
 
 @scalar
@@ -527,19 +526,12 @@ def solve_cells(
     cells: np.ndarray, count: int, options: Options, wave: Wave, motion: np.ndarray, codes: np.ndarray
 ) -> None:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
+    no_legs = np.empty((0, LEG_COLUMNS))
     for j in range(count):
         block = block_at(cells, j, options)
         codes[0, j], codes[1, j] = block.sliding_mode, block.validity
-        motion[0, j] = motion[1, j] = math.nan
-        if block.validity & NO_VALUE == 0:
-            solve_cell(block, options, wave, j, motion, codes)
-
-
-@scalar
-def solve_cell(block: Block, options: Options, wave: Wave, j: int, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Solve cell j of a tile, which has a mode."""
-    answer = solve(block, options, wave)
-    motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
-    codes[1, j] |= answer.validity
-    if answer.validity & NO_VALUE:
-        codes[0, j] = -1
+        motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
+        if block.sliding_mode == CONTINUOUS:
+            answer(continuous(block, options, wave), j, motion, codes)
+        elif block.sliding_mode == STICK_SLIP:
+            answer(train(block, options, wave, no_legs), j, motion, codes)

@@ -45,7 +45,17 @@ from slipsweep.kernels.block import (
     slip_root,
     whole_lanes,
 )
-from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break, solve_cell
+from slipsweep.kernels.cycle import (
+    LEG_COLUMNS,
+    MOST_LEGS,
+    NODES,
+    PANEL_BOUNDS,
+    SLIVER,
+    WEIGHTS,
+    answer,
+    next_break,
+    train,
+)
 from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.jit import in_lanes, scalar, summed
 
@@ -592,11 +602,11 @@ def solve_cells(
             if used > 0:
                 lane_carried(whole_lanes(used), options, lanes)
                 collect(used, way, lanes, where, blocks, motion, codes)
+    no_legs = np.empty((0, LEG_COLUMNS))
     for j in range(count):
         if blocks[_WAY + j] == _OTHER and codes[0, j] > STUCK:
             block = block_at(cells, j, options)
             if block.sliding_mode == CONTINUOUS:
-                answer = continuous(block, options.cycles, options.wants_peak)
-                motion[0, j], motion[1, j] = answer.displacement, answer.peak_velocity
+                answer(continuous(block, options.cycles, options.wants_peak), j, motion, codes)
             else:
-                solve_cell(block, options, wave, j, motion, codes)
+                answer(train(block, options, wave, no_legs), j, motion, codes)

@@ -13,7 +13,7 @@ simpson     start, middle, end     4      Runge-Kutta 4 for a rate free of V
 
 Steps end where a piece of the waveform does (`excitation`): on its jumps, kinks, turns and zeros, and are
 of one length on each piece (`steps_of`).  The orders hold because a step in which something happens (t1, a
-switch to or from the hold, a turn of Eq. 4, the stop) is divided there by `rise_step` and `fall_step`, and
+switch to or from the hold, a turn of Eq. 4, the stop) is divided there by `rise_step` and `take`, and
 because a slide or a layer of friction shorter than a few steps is given steps of its own.  Steps in
 which nothing happens, nearly all, are taken by lanes of cells in lockstep, with w from a table
 (`stick_slip_lanes`, `continuous_lanes`); what is no matter of lanes goes pulse by pulse (`pulse`, `train`).
@@ -44,7 +44,6 @@ from slipsweep.kernels.block import (
     Motion,
     Options,
     block_at,
-    friction,
     inflection,
     lane_friction,
     lane_of,
@@ -60,7 +59,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.excitation import Wave, offset_at, phase_at, plane
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
+from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of, yield_governs
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -75,6 +74,9 @@ _FOLDINGS = 40.0
 #: No step is shorter: it would no longer move the phase.
 _LEAST_STEP = 1e-14
 
+#: Cycles from which on the rounding of V over one (1e-14) is kept from adding up (`mirrored_gain`).
+_MANY = 64
+
 #: More events than any step holds.
 _MOST_EVENTS = 16
 
@@ -84,17 +86,18 @@ RISES, FALLS, BELOW = 0, 1, 2
 
 
 class Steps(NamedTuple):
-    """The steps of the pieces of a wave: `count` of one length on each.
+    """The steps of the pieces of a wave: `counts[p]` of one `length[p]` on each.
 
     ``nodes[offset[p] + 2 * k]`` is w at the beginning of step k of piece p, followed by w at its middle and
-    at its end (−0.0 where a negative piece is 0); `mirrored` is whether the two halves of a cycle are, but
-    for the sign, the same.
+    at its end (−0.0 where a negative piece is 0); `mirrored` is whether the halves of a cycle repeated
+    often are, but for the sign, the same.
     """
 
     wave: Wave
     nodes: np.ndarray
     offset: np.ndarray
-    count: np.ndarray
+    counts: np.ndarray
+    length: np.ndarray
     mirrored: bool
 
 
@@ -118,7 +121,7 @@ def steps_of(wave: Wave, steps_per_cycle: int) -> Steps:
             parts.append(_nodes(wave, p, int(count[p])))
             size += parts[-1].size
     nodes = np.concatenate(parts)
-    return Steps(wave, nodes, offset, count, _mirrored(wave, nodes, offset, count))
+    return Steps(wave, nodes, offset, count, length / count, _mirrored(wave, nodes, offset, count))
 
 
 def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
@@ -136,8 +139,8 @@ def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
 
 
 def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarray) -> bool:
-    """Whether in the repeated cycle w(φ + π) = −w(φ)."""
-    if wave.repeats == 0:
+    """Whether in a cycle repeated often w(φ + π) = −w(φ)."""
+    if wave.repeats < _MANY:
         return False
     low, high = wave.cycle[wave.lead], wave.cycle[wave.lead + 1]
     if (high - low) % 2:
@@ -151,11 +154,9 @@ def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarr
 
 
 @scalar
-def node(steps: Steps, p: int, k: int) -> float:
-    """τ on piece p at which step k begins."""
-    wave, count = steps.wave, steps.count[p]
-    h = (wave.finish[p] - wave.begin[p]) / count
-    return k * h if wave.begin[p] == 0.0 else (k - count) * h
+def node(steps: Steps, p: int, i: int) -> float:
+    """τ on piece p at which step i begins."""
+    return (i if steps.wave.begin[p] == 0.0 else i - steps.counts[p]) * steps.length[p]
 
 
 @scalar
@@ -169,18 +170,11 @@ def kind_of(wave: Wave, p: int) -> int:
 #: A state: V, W, the block's acceleration b, the largest and the least V; whether (1.0 or 0.0) the block
 #: slides and b follows Eq. 4; the phase at which it had come to rest; the phases at which the last
 #: slide began and up to which it needs steps of its own, and how long its rate grows; the plane's acceleration
-#: where D has its maximum on the way up, and that up to which friction is a layer thinner than steps; what of
-#: V's gain both sides of Üg = 0 share.
+#: where D has its maximum on the way up, and that up to which friction is a layer thinner than steps.
 (
-    VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS, RESTED, ONSET, REACH, LENGTH, TOUCH, LAYER, SHARED,
-) = range(14)  # fmt: skip
-_STATE_SIZE = 14
-
-
-@scalar
-def state_of(states: np.ndarray, j: int) -> np.ndarray:
-    """The state of lane j."""
-    return states.reshape((_STATE_SIZE, TILE))[:, j]
+    VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS, RESTED, ONSET, REACH, LENGTH, TOUCH, LAYER,
+) = range(13)  # fmt: skip
+_STATE_SIZE = 13
 
 
 @in_lanes
@@ -259,8 +253,10 @@ def rest(block: Block, state: np.ndarray) -> None:
         return
     if block.decay_rate * block.amplitude * _SHORTEST > _FOLDINGS * block.g:
         state[LAYER] = _FOLDINGS * block.g / block.decay_rate
-    # D = x − E is concave only beyond the inflection of E: it has its maximum there, if at all
-    if response_and_slope(block, block.amplitude)[1] > 1.0:
+    # D = x − E is concave only beyond the inflection of E: it has its maximum there, if at all, and none where
+    # friction is steeper than the plane and decays by more than tan θ
+    steep = block.mu_s < block.tan_theta or block.decay_rate < block.tan_theta
+    if steep and response_and_slope(block, block.amplitude)[1] > 1.0:
         low = max(inflection(block), _LEAST_STEP * block.amplitude)
         if low < block.amplitude and response_and_slope(block, low)[1] < 1.0:
             state[TOUCH] = slope_root(block, 1.0, low, block.amplitude)
@@ -293,9 +289,7 @@ def longest_step(block: Block, options: Options, wave: Wave, p: int, tau: float,
 
 
 @scalar
-def begin_slide(
-    block: Block, wave: Wave, p: int, tau: float, x: float, held: float, turn: float, state: np.ndarray
-) -> None:
+def begin_slide(wave: Wave, p: int, tau: float, x: float, held: float, turn: float, state: np.ndarray) -> None:
     """The block begins to slide at τ on piece p, where Üg = x; its rate grows up to τ = `turn`."""
     state[HELD] = min(held, x)  # equal at an onset, but for rounding
     state[SLIDES] = 1.0
@@ -318,18 +312,40 @@ def hold_step(block: Block, rule: int, wave: Wave, p: int, start: float, end: fl
 
 
 @scalar
-def fall_step(
-    block: Block, rule: int, options: Options, wave: Wave, p: int, tau: float, end: float, state: np.ndarray
+def whole_hold_step(
+    rule: int, amplitude: float, w_start: float, w_middle: float, w_end: float, h: float, state: np.ndarray
 ) -> None:
-    """From τ to end within a step of piece p with b held, in steps that a slide just begun asks for."""
-    for _ in range(_MOST_EVENTS + options.steps_per_cycle):
-        cut = end
-        if phase_at(wave, p, tau) < state[REACH]:
-            cut = min(end, tau + longest_step(block, options, wave, p, tau, math.inf, state))
-        hold_step(block, rule, wave, p, tau, cut, state)
-        tau = cut
-        if tau >= end or state[SLIDES] == 0.0:
+    """A step of length h with b held, cut at the stop."""
+    held = state[HELD]
+    c0, c1, c2 = coefficients(rule, amplitude * w_start - held, amplitude * w_middle - held, amplitude * w_end - held)
+    take(c0, c1, c2, h, True, state)
+
+
+@scalar
+def hold_steps(
+    rule: int, amplitude: float, nodes: np.ndarray, at: int, count: int, h: float, state: np.ndarray
+) -> None:
+    """So many steps with b held, up to the stop; w from nodes[at] on."""
+    for i in range(count):
+        whole_hold_step(rule, amplitude, nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2], h, state)
+        if state[SLIDES] == 0.0:
             break
+
+
+@scalar
+def fall_steps(block: Block, rule: int, options: Options, steps: Steps, p: int, state: np.ndarray) -> None:
+    """Along piece p with b held, in finer steps as long as a slide just begun asks for them."""
+    wave, first, at = steps.wave, 0, steps.offset[p]
+    while first < steps.counts[p] and phase_at(wave, p, node(steps, p, first)) < state[REACH]:
+        tau, end = node(steps, p, first), node(steps, p, first + 1)
+        while tau < end and state[SLIDES] > 0.0:
+            cut = min(end, tau + longest_step(block, options, wave, p, tau, math.inf, state))
+            hold_step(block, rule, wave, p, tau, cut, state)
+            tau = cut
+        if state[SLIDES] == 0.0:
+            return
+        first += 1
+    hold_steps(rule, block.amplitude, steps.nodes, at + 2 * first, steps.counts[p] - first, steps.length[p], state)
 
 
 @scalar
@@ -341,14 +357,14 @@ def rise_step(
     Cut at Üg = Üy, at t1, at switches to and from the hold, and at the stop.
     """
     wave, amplitude, literal = steps.wave, block.amplitude, block.rise == LITERAL
-    end, x_end = node(steps, p, k + 1), amplitude * steps.nodes[steps.offset[p] + 2 * k + 2]
-    if state[SLIDES] == 0.0 and x < block.yield_acceleration:
-        if x_end <= block.yield_acceleration:
-            return
-        x = block.yield_acceleration
-        tau = offset_at(wave, p, amplitude, x)
+    begin, end, at = node(steps, p, k), node(steps, p, k + 1), steps.offset[p] + 2 * k
+    x_end, located = amplitude * steps.nodes[at + 2], True
     for _ in range(_MOST_EVENTS + options.steps_per_cycle):
         if state[SLIDES] == 0.0:
+            if x < block.yield_acceleration:
+                if x_end <= block.yield_acceleration:
+                    break
+                x, located = block.yield_acceleration, False
             if block.rise == NEWMARK or slip(block, x) > 0.0:
                 held = starting_acceleration(block, x)
             else:
@@ -358,53 +374,103 @@ def rise_step(
                         break
                     top = touch
                 x = held = slip_root(block, 0.0, x, top)  # where Eq. 4 meets Üg
-                tau = offset_at(wave, p, amplitude, x)
+                located = False
+            if not located:
+                tau, located = offset_at(wave, p, amplitude, x), True
             follows = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
             state[FOLLOWS] = 1.0 if follows else 0.0
             turn = wave.finish[p]
             if x < state[TOUCH] < amplitude * wave.last[p]:
                 turn = offset_at(wave, p, amplitude, state[TOUCH])
-            begin_slide(block, wave, p, tau, x, held, turn, state)
+            begin_slide(wave, p, tau, x, held, turn, state)
         cut, x_cut, switches = end, x_end, False
-        longest = longest_step(block, options, wave, p, tau, x, state)
-        if longest < end - tau:
-            cut = tau + longest
-            x_cut = plane(wave, p, amplitude, cut)
-        if block.rise == MONOTONE:
+        if state[REACH] > -math.inf or state[LAYER] > 0.0:
+            longest = longest_step(block, options, wave, p, tau, x, state)
+            if longest < end - tau:
+                cut = tau + longest
+                x_cut = plane(wave, p, amplitude, cut)
+        asked, asked_cut = 0.0, 0.0
+        if block.rise != NEWMARK:
             asked, slope = response_and_slope(block, x)
-            asked_end = response(block, x_cut)
-            if state[FOLLOWS] == 0.0 and asked_end > state[HELD]:
-                if asked < state[HELD] or slope <= 0.0:
-                    x_cut, switches = response_root(block, state[HELD], x, x_cut), True
-                else:
-                    state[FOLLOWS] = 1.0
-            elif state[FOLLOWS] == 1.0 and asked_end < asked:
-                if slope > 0.0:
-                    x_cut, switches = slope_root(block, 0.0, x, x_cut), True
-                else:
-                    state[FOLLOWS] = 0.0
+            asked_cut = response(block, x_cut)
+            if block.rise == MONOTONE:
+                held = state[HELD]
+                if state[FOLLOWS] == 0.0 and asked_cut > held:
+                    if asked < held or slope <= 0.0:
+                        x_cut, asked_cut, switches = response_root(block, held, x, x_cut), held, True
+                    else:
+                        state[FOLLOWS] = 1.0
+                elif state[FOLLOWS] == 1.0 and asked_cut < asked:
+                    if slope > 0.0:
+                        x_cut, switches = slope_root(block, 0.0, x, x_cut), True
+                        asked_cut = response(block, x_cut)
+                    else:
+                        state[FOLLOWS] = 0.0
         if switches:
             cut = offset_at(wave, p, amplitude, x_cut)
         follows, held, h = state[FOLLOWS] == 1.0, state[HELD], cut - tau
-        x_middle = plane(wave, p, amplitude, tau + 0.5 * h)
-        rate = slip(block, x) if follows else x - held
+        rate, middle = x - (asked if follows else held), 0.0
+        if rule == SIMPSON:
+            x_middle = amplitude * steps.nodes[at + 1]
+            if tau != begin or cut != end:
+                x_middle = plane(wave, p, amplitude, tau + 0.5 * h)
+            middle = slip(block, x_middle) if follows else x_middle - held
         c0, c1, c2 = coefficients(
             rule,
             rate if state[VELOCITY] > 0.0 else max(rate, 0.0),  # rounding may not stop what starts here
-            slip(block, x_middle) if follows else x_middle - held,
-            slip(block, x_cut) if follows else x_cut - held,
+            middle,
+            x_cut - (asked_cut if follows else held),
         )
         fraction = take(c0, c1, c2, h, True, state)
         if state[SLIDES] == 0.0:
             cut = tau + fraction * h
             x_cut = plane(wave, p, amplitude, cut)
-        if follows:
-            state[HELD] = response(block, x_cut)
+        elif follows:
+            state[HELD] = asked_cut
         if switches:
             state[FOLLOWS] = 1.0 - state[FOLLOWS]
         tau, x = cut, x_cut
         if tau >= end:
             break
+
+
+@scalar
+def rise_steps(
+    block: Block, rule: int, options: Options, steps: Steps, p: int, first: int, tau: float, x: float, state: np.ndarray
+) -> None:
+    """Along piece p, on which Üg > 0 does not fall, from τ within its step `first`, where Üg = x."""
+    nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
+    newmark, asked = block.rise == NEWMARK, math.nan
+    for i in range(first, steps.counts[p]):
+        x_end = block.amplitude * nodes[at + 2 * i + 2]
+        if state[SLIDES] == 0.0 and x_end <= block.yield_acceleration:
+            asked = math.nan
+            continue
+        asked_end = -math.inf if newmark else response(block, x_end)
+        # the step as it is where nothing happens in it, as in `lockstep_rise`
+        if state[SLIDES] > 0.0 and i > first and state[REACH] == -math.inf and state[LAYER] == 0.0:
+            x = block.amplitude * nodes[at + 2 * i]
+            if not newmark and math.isnan(asked):
+                asked = response(block, x)
+            follows, held, velocity, middle = state[FOLLOWS] > 0.0, state[HELD], state[VELOCITY], 0.0
+            if rule == SIMPSON:
+                x_middle = block.amplitude * nodes[at + 2 * i + 1]
+                middle = slip(block, x_middle) if follows else x_middle - held
+            c0, c1, c2 = coefficients(rule, x - held, middle, x_end - (asked_end if follows else held))
+            after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
+            switches = block.rise == MONOTONE and (asked_end < asked if follows else asked_end > held)
+            if not (switches or after <= 0.0 or (c0 > 0.0 and c0 + c1 + c2 < 0.0)):
+                state[DISPLACEMENT] += velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
+                state[VELOCITY] = after
+                state[PEAK], state[LEAST] = max(state[PEAK], after), min(state[LEAST], after)
+                if follows:
+                    state[HELD] = asked_end
+                asked = asked_end
+                continue
+        if i > first:
+            tau, x = node(steps, p, i), block.amplitude * nodes[at + 2 * i]
+        rise_step(block, rule, options, steps, p, i, tau, x, state)
+        asked = asked_end
 
 
 @scalar
@@ -422,7 +488,7 @@ def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
         held = starting_acceleration(block, x)
         if held < x:
             state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
-            begin_slide(block, wave, p, wave.begin[p], x, held, offset_at(wave, p, block.amplitude, held), state)
+            begin_slide(wave, p, wave.begin[p], x, held, offset_at(wave, p, block.amplitude, held), state)
 
 
 @scalar
@@ -449,22 +515,15 @@ def through_stretch(
         else:
             x = block.yield_acceleration
             first = min(
-                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.count[q]), 0),
-                steps.count[q] - 1,
+                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.counts[q]), 0),
+                steps.counts[q] - 1,
             )
-        at = steps.offset[q]
         if kind_of(wave, q) == RISES:
-            for i in range(first, steps.count[q]):
-                if i > first:
-                    tau, x = node(steps, q, i), block.amplitude * steps.nodes[at + 2 * i]
-                rise_step(block, rule, options, steps, q, i, tau, x, state)
+            rise_steps(block, rule, options, steps, q, first, tau, x, state)
         elif state[SLIDES] > 0.0:
             if state[HELD] <= 0.0:
                 return KD_NOT_POSITIVE
-            for i in range(steps.count[q]):
-                fall_step(block, rule, options, wave, q, node(steps, q, i), node(steps, q, i + 1), state)
-                if state[SLIDES] == 0.0:
-                    break
+            fall_steps(block, rule, options, steps, q, state)
     return KD_NOT_POSITIVE if state[SLIDES] > 0.0 and state[HELD] <= 0.0 else 0
 
 
@@ -474,14 +533,15 @@ def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, 
     wave = steps.wave
     state[RESTED] = math.inf
     for piece in range(q, min(p + 1, wave.first.size)):
-        last = tau if piece == p else wave.finish[piece]
-        for i in range(steps.count[piece]):
-            start, end = node(steps, piece, i), min(node(steps, piece, i + 1), last)
-            if end > start:
-                hold_step(block, rule, wave, piece, start, end, state)
-            if state[SLIDES] == 0.0:
-                state[RESTED] = wave.end[piece]
-                return
+        h, whole = steps.length[piece], steps.counts[piece]
+        if piece == p:
+            whole = int((tau - wave.begin[piece]) / h)
+        hold_steps(rule, block.amplitude, steps.nodes, steps.offset[piece], whole, h, state)
+        if piece == p and state[SLIDES] > 0.0 and tau > node(steps, piece, whole):
+            hold_step(block, rule, wave, piece, node(steps, piece, whole), tau, state)
+        if state[SLIDES] == 0.0:
+            state[RESTED] = wave.end[piece]
+            return
 
 
 @scalar
@@ -519,16 +579,6 @@ train = train_of(pulse)
 
 
 @scalar
-def shared_rate(block: Block, x: float) -> float:
-    """|x| tan θ (μs − tan θ − μ): what of D both sides of Üg = 0 share; the rest, ±g (μs − μ), changes its sign.
-
-    Where the halves of a cycle mirror each other V keeps the former only, and on a plane nearly level that is
-    less than the rounding of the latter.
-    """
-    return abs(x) * block.tan_theta * (block.mu_s - block.tan_theta - friction(block, x))
-
-
-@scalar
 def continuous_step(
     block: Block, rule: int, options: Options, wave: Wave, p: int, start: float, end: float, state: np.ndarray
 ) -> None:
@@ -554,10 +604,6 @@ def continuous_step(
                 sided_slip(block, wave, p, x_end),
             )
             take(c0, c1, c2, h, False, state)
-            c0, c1, c2 = coefficients(
-                rule, shared_rate(block, x), shared_rate(block, x_middle), shared_rate(block, x_end)
-            )
-            state[SHARED] += velocity_gain(c0, c1, c2, h, 1.0)
 
 
 @scalar
@@ -567,13 +613,13 @@ def sided_slip(block: Block, wave: Wave, p: int, x: float) -> float:
 
 
 #: The first rows of the lanes' states, and the rows of the lanes beside the block's: D (or E) at the last node,
-#: what of D both sides of Üg = 0 share there, whether something happens in the step, whether the cell
-#: goes on without the lanes, |w| up to which friction is a layer thinner than steps, and W at the beginning
-#: of the cycle.  Row + j is cell j.
+#: whether something happens in the step, whether the cell goes on without the lanes, |w| up to which
+#: friction is a layer thinner than steps, V, W and the largest V before the cycle.  Row + j is cell j.
 _VELOCITY, _DISPLACEMENT, _HELD, _PEAK, _LEAST, _SLIDES, _FOLLOWS = range(0, 7 * TILE, TILE)
-_SHARED = SHARED * TILE
-_ASKED, _SHARE, _HAPPENS, _ALONE, _THIN, _BEFORE = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
-_LANE_SIZE = (LANE_ROWS + 6) * TILE
+_ASKED, _HAPPENS, _ALONE, _THIN, _BEFORE, _BEFORE_V, _BEFORE_PEAK, _GAIN = range(
+    LANE_ROWS * TILE, (LANE_ROWS + 8) * TILE, TILE
+)
+_LANE_SIZE = (LANE_ROWS + 8) * TILE
 
 
 @scalar
@@ -590,21 +636,22 @@ def lockstep_rise(
 ) -> None:  # fmt: skip
     """Lanes along piece p, on which Üg > 0 does not fall."""
     literally(rule)
-    rise, g, wave, nodes, at = options.rise, options.g, steps.wave, steps.nodes, steps.offset[p]
-    h = (wave.finish[p] - wave.begin[p]) / steps.count[p]
+    columns = states.reshape((_STATE_SIZE, TILE))
+    rise, g = options.rise, options.g
+    nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
     first, least, going = 0, math.inf, 0
     for j in range(count):
         least = min(least, lanes[YIELD + j] / lanes[AMPLITUDE + j])
         going += 1 if states[_SLIDES + j] > 0.0 else 0
     if going == 0:
         # at rest below Üy nothing happens
-        while first < steps.count[p] and nodes[at + 2 * first + 2] <= least * (1.0 - 1e-15):
+        while first < steps.counts[p] and nodes[at + 2 * first + 2] <= least * (1.0 - 1e-15):
             first += 1
-        if first == steps.count[p]:
+        if first == steps.counts[p]:
             return
     for j in range(count):
         lanes[_ASKED + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * nodes[at + 2 * first], g)
-    for i in range(first, steps.count[p]):
+    for i in range(first, steps.counts[p]):
         w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events = 0
         for j in range(count):
@@ -638,7 +685,7 @@ def lockstep_rise(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    block, state = block_at(cells, where[j], options), state_of(states, j)
+                    block, state = block_at(cells, where[j], options), columns[:, j]
                     rise_step(block, rule, options, steps, p, i, node(steps, p, i), block.amplitude * w_start, state)
                     if state[REACH] > -math.inf:
                         set_aside(lanes, states, j)
@@ -651,9 +698,9 @@ def lockstep_fall(
 ) -> None:  # fmt: skip
     """Lanes along piece p with b held, or until all have stopped."""
     literally(rule)
-    wave, nodes, at = steps.wave, steps.nodes, steps.offset[p]
-    h = (wave.finish[p] - wave.begin[p]) / steps.count[p]
-    for i in range(steps.count[p]):
+    columns = states.reshape((_STATE_SIZE, TILE))
+    nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
+    for i in range(steps.counts[p]):
         w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events, going = 0, 0
         for j in range(count):
@@ -678,8 +725,7 @@ def lockstep_fall(
         if events > 0:
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
-                    block, state = block_at(cells, where[j], options), state_of(states, j)
-                    hold_step(block, rule, wave, p, node(steps, p, i), node(steps, p, i + 1), state)
+                    whole_hold_step(rule, lanes[AMPLITUDE + j], w_start, w_middle, w_end, h, columns[:, j])
 
 
 @scalar
@@ -702,6 +748,7 @@ def stick_slip_cycle(
 ) -> None:  # fmt: skip
     """Stick-slip lanes through cycle c of the table; one that carries velocity into a new slide is set aside."""
     literally(rule)
+    columns = states.reshape((_STATE_SIZE, TILE))
     wave = steps.wave
     pieces = wave.first.size
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
@@ -710,8 +757,8 @@ def stick_slip_cycle(
         if kind != BELOW and asks_anew(wave, p):
             for j in range(count):
                 if lanes[_ALONE + j] == 0.0:
-                    arrive(block_at(cells, where[j], options), wave, p, state_of(states, j))
-                    if states[REACH * TILE + j] > -math.inf:
+                    arrive(block_at(cells, where[j], options), wave, p, columns[:, j])
+                    if columns[REACH, j] > -math.inf:
                         set_aside(lanes, states, j)
         if options.rise == LITERAL and kind != RISES and before != kind:
             for j in range(count):
@@ -722,10 +769,17 @@ def stick_slip_cycle(
         elif kind == FALLS or options.recoupling == INTEGRATE:
             lockstep_fall(count, rule, options, steps, p, cells, where, lanes, states)
         elif before != BELOW:
+            pause, q = 0.0, p
+            while q < pieces and wave.top[q] < 0.0:
+                pause += wave.finish[q] - wave.begin[q]
+                q += 1
             for j in range(count):
                 if states[_SLIDES + j] > 0.0:
-                    wait = until_next(block_at(cells, where[j], options), wave, p)
-                    left, slid = attenuate(states[_HELD + j], states[_VELOCITY + j], wait)
+                    held, velocity = states[_HELD + j], states[_VELOCITY + j]
+                    wait = math.inf
+                    if velocity > held * pause:  # else it stops before Üg > 0
+                        wait = until_next(block_at(cells, where[j], options), wave, p)
+                    left, slid = attenuate(held, velocity, wait)
                     states[_DISPLACEMENT + j] += slid
                     states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
                     if left > 0.0:
@@ -743,9 +797,10 @@ def stick_slip_lanes(
 ) -> None:  # fmt: skip
     """Stick-slip: pulses from rest in lockstep; cells that do not come to rest in one go on pulse by pulse."""
     literally(rule)
+    columns = states.reshape((_STATE_SIZE, TILE))
     wave, whole = steps.wave, whole_lanes(count)
     for j in range(whole):
-        state = state_of(states, j)
+        state = columns[:, j]
         rest(block_at(cells, where[j], options), state)
         lanes[_ALONE + j] = 0.0
         if state[LAYER] > 0.0 or state[TOUCH] < math.inf:
@@ -770,7 +825,9 @@ def stick_slip_lanes(
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
                 moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
-            answer = Motion(moved, states[_PEAK + j], EQ4_BELOW_YIELD if yield_governs(block, wave) else 0)
+            slides = first_pulse(block, wave, 0) < wave.height.size
+            validity = EQ4_BELOW_YIELD if slides and yield_governs(block, wave) else 0
+            answer = Motion(moved, states[_PEAK + j], validity)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
         codes[1, where[j]] |= answer.validity
         if answer.validity & NO_VALUE:
@@ -784,27 +841,24 @@ def continuous_cycle(
 ) -> None:  # fmt: skip
     """Continuous lanes through cycle c of the table, from the first Üg ≥ Üy on."""
     literally(rule)
+    columns = states.reshape((_STATE_SIZE, TILE))
     g, wave, nodes = options.g, steps.wave, steps.nodes
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
         at, side = steps.offset[p], math.copysign(1.0, wave.top[p])
-        h = (wave.finish[p] - wave.begin[p]) / steps.count[p]
+        h = steps.length[p]
         for j in range(count):
-            x = lanes[AMPLITUDE + j] * nodes[at]
-            lag, shared = lane_slip(lanes, j, x, side, g)
-            lanes[_ASKED + j], lanes[_SHARE + j] = lag + shared, shared
-        for i in range(steps.count[p]):
+            lanes[_ASKED + j] = lane_slip(lanes, j, lanes[AMPLITUDE + j] * nodes[at], side, g)
+        for i in range(steps.counts[p]):
             w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
             near = min(abs(w_start), abs(w_end))
             events = 0
             for j in range(count):
                 x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
-                lag, shared_end = lane_slip(lanes, j, x_end, side, g)
-                rate, rate_end, shared = lanes[_ASKED + j], lag + shared_end, lanes[_SHARE + j]
-                lanes[_ASKED + j], lanes[_SHARE + j] = rate_end, shared_end
-                middle, shared_middle = 0.0, 0.0
+                rate, rate_end = lanes[_ASKED + j], lane_slip(lanes, j, x_end, side, g)
+                lanes[_ASKED + j] = rate_end
+                middle = 0.0
                 if rule == SIMPSON:
-                    lag, shared_middle = lane_slip(lanes, j, lanes[AMPLITUDE + j] * w_middle, side, g)
-                    middle = lag + shared_middle
+                    middle = lane_slip(lanes, j, lanes[AMPLITUDE + j] * w_middle, side, g)
                 c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
                 velocity, began = states[_VELOCITY + j], states[_SLIDES + j] > 0.0
                 after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
@@ -813,8 +867,6 @@ def continuous_cycle(
                 begins = max(x, x_end) > lanes[YIELD + j]
                 happens = (turns | (near < lanes[_THIN + j])) if began else begins
                 goes = began & (not happens)
-                c0, c1, c2 = coefficients(rule, shared, shared_middle, shared_end)
-                states[_SHARED + j] += velocity_gain(c0, c1, c2, h, 1.0) if goes else 0.0
                 states[_VELOCITY + j] = after if goes else velocity
                 states[_DISPLACEMENT + j] += moved if goes else 0.0
                 states[_PEAK + j] = max(states[_PEAK + j], after if goes else velocity)
@@ -823,7 +875,7 @@ def continuous_cycle(
             if events > 0:
                 for j in range(count):
                     if lanes[_HAPPENS + j] > 0.0:
-                        block, state = block_at(cells, where[j], options), state_of(states, j)
+                        block, state = block_at(cells, where[j], options), columns[:, j]
                         start = node(steps, p, i)
                         if state[SLIDES] == 0.0 and block.amplitude * w_start < block.yield_acceleration:
                             start = offset_at(wave, p, block.amplitude, block.yield_acceleration)
@@ -832,10 +884,42 @@ def continuous_cycle(
 
 
 @in_lanes
-def lane_slip(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float]:
-    """D of a lane on one side of Üg = 0, in two: what changes its sign with Üg, and `shared_rate`."""
+def lane_slip(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> float:
+    """D of a lane at Üg = x on one side of Üg = 0."""
     excess = lanes[MU_S + j] - lane_friction(lanes, j, x, g)
-    return side * g * excess, side * x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j])
+    return side * (g * excess + x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j]))
+
+
+@in_lanes
+def lane_shared(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """The part of D that is the same on both sides of Üg = 0, x > 0; the other, ±g (μs − μ), changes its sign."""
+    excess = lanes[MU_S + j] - lane_friction(lanes, j, x, g)
+    return x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j])
+
+
+@scalar
+def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int, lanes: np.ndarray) -> None:
+    """Gain of V of continuous lanes over cycle c, whose halves mirror each other: what both sides share, twice.
+
+    The rest cancels.  In V it would leave its rounding, and on a plane nearly level that is more than the gain.
+    """
+    literally(rule)
+    g, wave, nodes = options.g, steps.wave, steps.nodes
+    for j in range(count):
+        lanes[_GAIN + j] = 0.0
+    stride = 1 if rule == SIMPSON else 2
+    for p in range(wave.cycle[c], wave.cycle[c + 1]):
+        if wave.top[p] > 0.0:
+            at, last = steps.offset[p], 2 * steps.counts[p]
+            for k in range(0, last + 1, stride):
+                # what the step before k and that behind it give the node
+                c0, c1, c2 = coefficients(rule, 0.0, 1.0 if k % 2 else 0.0, 0.0 if k % 2 or k == 0 else 1.0)
+                share = velocity_gain(c0, c1, c2, steps.length[p], 1.0)
+                c0, c1, c2 = coefficients(rule, 0.0 if k % 2 or k == last else 1.0, 0.0, 0.0)
+                share += velocity_gain(c0, c1, c2, steps.length[p], 1.0)
+                w = nodes[at + k]
+                for j in range(count):
+                    lanes[_GAIN + j] += 2.0 * share * lane_shared(lanes, j, lanes[AMPLITUDE + j] * w, g)
 
 
 @scalar
@@ -843,11 +927,12 @@ def continuous_lanes(
     count: int, rule: int, options: Options, steps: Steps, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
     states: np.ndarray, motion: np.ndarray,
 ) -> None:  # fmt: skip
-    """Continuous sliding, cycle by cycle; repeated ones are stepped twice, and the later ones follow from the second."""
+    """Continuous sliding, cycle by cycle; repeated ones are stepped twice, the later ones follow from the second."""
     literally(rule)
+    columns = states.reshape((_STATE_SIZE, TILE))
     wave, whole = steps.wave, whole_lanes(count)
     for j in range(whole):
-        state = state_of(states, j)
+        state = columns[:, j]
         rest(block_at(cells, where[j], options), state)
         lanes[_THIN + j] = state[LAYER] / lanes[AMPLITUDE + j]
     for c in range(wave.shape.size):
@@ -856,19 +941,19 @@ def continuous_lanes(
             continue
         times = wave.repeats - 1.0 + (1.0 if wave.alike else 0.0)
         if times > 0.0:
-            before = states.copy()
             for j in range(whole):
-                states[_PEAK + j], states[_SHARED + j] = states[_VELOCITY + j], 0.0
+                lanes[_BEFORE + j], lanes[_BEFORE_V + j] = states[_DISPLACEMENT + j], states[_VELOCITY + j]
+                lanes[_BEFORE_PEAK + j], states[_PEAK + j] = states[_PEAK + j], states[_VELOCITY + j]
             continuous_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
+            if steps.mirrored:
+                mirrored_gain(whole, rule, options, steps, c, lanes)
             for j in range(whole):
-                gain = states[_VELOCITY + j] - before[_VELOCITY + j]
-                if steps.mirrored:
-                    gain = states[_SHARED + j]
-                moved = states[_DISPLACEMENT + j] - before[_DISPLACEMENT + j]
+                moved, velocity = states[_DISPLACEMENT + j] - lanes[_BEFORE + j], lanes[_BEFORE_V + j]
+                gain = lanes[_GAIN + j] if steps.mirrored else states[_VELOCITY + j] - velocity
                 peak = states[_PEAK + j] + max(0.0, (times - 1.0) * gain)
-                states[_PEAK + j] = max(before[_PEAK + j], peak)
-                states[_VELOCITY + j] = before[_VELOCITY + j] + times * gain
-                states[_DISPLACEMENT + j] = before[_DISPLACEMENT + j] + times * (moved + math.pi * gain * (times - 1.0))
+                states[_PEAK + j] = max(lanes[_BEFORE_PEAK + j], peak)
+                states[_VELOCITY + j] = velocity + times * gain
+                states[_DISPLACEMENT + j] = lanes[_BEFORE + j] + times * (moved + math.pi * gain * (times - 1.0))
         if wave.alike:
             break
     for j in range(count):

@@ -8,9 +8,8 @@ what follows from that map over many cycles stands here.
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
 
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
@@ -83,8 +82,8 @@ def yield_governs(block: Block, wave: Wave) -> bool:
 
 
 def train_of(
-    pulse: Callable[[Block, Options, Wave, np.ndarray, int, int, float], Pulse],
-) -> Callable[[Block, Options, Wave, np.ndarray], Motion]:
+    pulse: Callable[[Block, Options, Wave, Any, int, int, float], Pulse],
+) -> Callable[[Block, Options, Wave, Any], Motion]:
     """The jitted train of a solver's pulses.
 
     A pulse is given block, options, wave, what the solver itself has tabulated, the stretch it begins in,
@@ -93,7 +92,7 @@ def train_of(
 
     @scalar
     def pulses(
-        block: Block, options: Options, wave: Wave, table: np.ndarray, k: int, until: int, velocity: float
+        block: Block, options: Options, wave: Wave, table: Any, k: int, until: int, velocity: float
     ) -> tuple[Pulse, int]:
         """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
         displacement, peak, least, rested, validity = 0.0, velocity, velocity, 0.0, 0
@@ -111,7 +110,7 @@ def train_of(
         return Pulse(velocity, displacement, peak, least, rested, validity), k
 
     @scalar
-    def train(block: Block, options: Options, wave: Wave, table: np.ndarray) -> Motion:
+    def train(block: Block, options: Options, wave: Wave, table: Any) -> Motion:
         """All pulses of a stick-slip (or Newmark) block.
 
         Where the map of the repeated cycle returns to a velocity seen before, the cycles in between

@@ -1,0 +1,126 @@
+"""The step solver on any waveform: closed forms, orders across jumps and kinks, agreement with the cycle solver."""
+
+from math import pi, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import slipsweep
+
+ORDERS = {"rectangle": 1, "trapezoid": 2, "simpson": 4}
+RULES = pytest.mark.parametrize("rule", ORDERS)
+
+#: Several maxima in a pulse, no symmetry, a beginning above zero.
+HARMONICS: dict[str, Any] = {"waveform": "harmonics", "harmonics": "1:1:0,0.6:2:40,0.35:5:100"}
+WAVES: dict[str, dict[str, Any]] = {
+    "cosine": {"waveform": "cosine"},
+    "triangle": {"waveform": "triangle"},
+    "square": {"waveform": "square"},
+    "harmonics": HARMONICS,
+    "ramped sine": {"ramp_in": 1.5, "ramp_out": 1.0},
+    "ramped triangle": {"waveform": "triangle", "ramp_in": 2.25, "ramp_out": 0.5},
+    "ramped square": {"waveform": "square", "ramp_in": 1.25},
+    "ramped harmonics": {**HARMONICS, "ramp_in": 1.0, "ramp_out": 2.0},
+}
+EVERY_WAVE = pytest.mark.parametrize("wave", WAVES)
+
+#: Stick-slip that recouples and that does not, sliding with v carried over, continuous; a plane nearly level.
+CELLS = {
+    "theta": [5.0, 5.0, 5.0, 18.0, 18.0, 18.0, 6.0, 6.0, 0.01],
+    "mu_s": [0.38, 0.38, 0.38, 0.34, 0.34, 0.34, 0.38, 0.38, 0.4],
+    "amplitude": [3.1, 3.8, 4.6, 0.8, 1.4, 2.1, 6.8, 8.5, 9.0],
+}
+OPTIONS: tuple[dict[str, Any], ...] = ({}, {"recoupling": "integrate"}, {"rise": "literal"}, {"model": "newmark"})
+
+
+def solve(wave: str, cycles: int = 5, **options: Any) -> xr.Dataset:
+    """All cells under all options; dimensions `options` and `cell`."""
+    columns: dict[str, Any] = {name: xr.DataArray(values, dims="cell") for name, values in CELLS.items()}
+    runs = [
+        slipsweep.sweep(**columns, frequency=1 / (2 * pi), cycles=cycles, **WAVES[wave], **given, **options)
+        for given in OPTIONS
+    ]
+    return xr.concat(runs, "options", combine_attrs="drop")
+
+
+def errors(wave: str, rule: str, counts: list[int]) -> np.ndarray:
+    """Worst relative error of the displacement over a few step counts, against the cycle solver; of cells that move."""
+    exact = solve(wave, solver="cycle").permanent_displacement
+    moves = (exact > 0).values
+    found = [solve(wave, solver="step", rule=rule, steps_per_cycle=count).permanent_displacement for count in counts]
+    return np.max([np.abs(run / exact - 1).values[moves] for run in found], axis=0)
+
+
+def newmark(wave: str, rule: str, steps: int, **options: Any) -> float:
+    """W of a Newmark block on the level with A = 2 and Üy = 1."""
+    result = slipsweep.sweep(
+        theta=0.0, mu_s=0.1, amplitude=2.0, yield_acceleration=1.0, frequency=1 / (2 * pi), cycles=3, model="newmark",
+        waveform=wave, solver="step", rule=rule, steps_per_cycle=steps, **options,
+    )  # fmt: skip
+    return float(result.permanent_displacement)
+
+
+@RULES
+def test_square_wave_under_newmark(rule: str) -> None:
+    """Rate (A − Üy) for π, then −(A + Üy) to the stop: constant, so that every rule is exact with any step."""
+    exact = 3 * (pi**2 / 2 + pi**2 / (2 * 3))
+    assert newmark("square", rule, 8) == pytest.approx(exact, rel=1e-14)
+    assert newmark("square", rule, 1000) == pytest.approx(exact, rel=1e-13)
+
+
+def test_triangle_wave_under_newmark() -> None:
+    """From t1 on the rate rises for L = π/4 with s = 2A/π, falls as fast, and V is 0 √2 L after the rate was."""
+    exact = 3 * (4 / pi) * (pi / 4) ** 3 * (1 + 2 * sqrt(2) / 3)
+    for rule in ("trapezoid", "simpson"):
+        assert newmark("triangle", rule, 8) == pytest.approx(exact, rel=1e-12), f"{rule} is exact on straight lines"
+    coarse, fine = (abs(newmark("triangle", "rectangle", steps) / exact - 1) for steps in (100, 1600))
+    assert fine == pytest.approx(coarse / 16, rel=0.2)
+
+
+def test_no_ramp_is_no_ramp() -> None:
+    """A ramp over the first cycle leaves the later ones as they are: 9 cycles more, 9 plain cycles more."""
+    options: dict[str, Any] = {"solver": "step", "steps_per_cycle": 256, "theta": 5.0, "mu_s": 0.38, "amplitude": 4.0}
+    options |= {"frequency": 1.0, "waveform": "triangle"}
+    plain = slipsweep.sweep(cycles=9, **options).permanent_displacement
+    short, long = (slipsweep.sweep(cycles=cycles, ramp_in=1.0, **options).permanent_displacement for cycles in (3, 12))
+    assert float(long - short) == pytest.approx(float(plain), rel=1e-12)
+
+
+@RULES
+@EVERY_WAVE
+def test_order_across_jumps_and_kinks(wave: str, rule: str) -> None:
+    """Four times the steps: the median cell gains by the rule's order, every cell by first order at least."""
+    counts = [96, 120, 152]
+    before, after = errors(wave, rule, counts), errors(wave, rule, [4 * count for count in counts])
+    assert before.size >= 20
+    rounding = 1e-11
+    assert (after <= np.maximum(before / 4**0.75, rounding)).all(), "first order in every cell"
+    seen = after > rounding
+    if seen.sum() >= 5:
+        gained = np.log(before[seen] / after[seen]) / np.log(4)
+        assert np.median(gained) > ORDERS[rule] - 0.3
+    else:
+        assert rule == "simpson" or wave in ("square", "triangle"), "only these are exact"
+
+
+@EVERY_WAVE
+def test_finest_steps_reach_the_cycle_solver(wave: str) -> None:
+    """Simpson's rule with 2048 steps, 1000 cycles: displacement and peak velocity to 1e-9, modes and flags alike."""
+    exact = solve(wave, 1000, solver="cycle")
+    found = solve(wave, 1000, solver="step", rule="simpson", steps_per_cycle=2048)
+    for name in ("sliding_mode", "validity"):
+        np.testing.assert_array_equal(found[name], exact[name], err_msg=name)
+    for name in ("permanent_displacement", "peak_relative_velocity"):
+        np.testing.assert_allclose(found[name], exact[name], rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+@EVERY_WAVE
+def test_cells_do_not_depend_on_their_neighbours(wave: str) -> None:
+    """Lanes of other cells beside it change no bit of a cell."""
+    options: dict[str, Any] = {"frequency": 1.0, "cycles": 5, "solver": "step", "steps_per_cycle": 64, **WAVES[wave]}
+    whole = slipsweep.sweep(theta=18.0, mu_s=0.34, amplitude=np.linspace(0.3, 3.0, 60), **options)
+    for i in (0, 17, 59):
+        alone = slipsweep.sweep(theta=18.0, mu_s=0.34, amplitude=whole.amplitude.values[i], **options)
+        assert float(alone.permanent_displacement) == float(whole.permanent_displacement[i])
