@@ -21,7 +21,8 @@ from scipy.integrate import solve_ivp
 import slipsweep
 from slipsweep import InputError, Record, sweep_record
 from slipsweep.kernels.block import MONOTONE, Cell, block_of
-from slipsweep.kernels.linear import follow_integrals, held_stop
+from slipsweep.kernels.linear import held_stop
+from slipsweep.kernels.record import follow_integrals
 
 G = 9.81
 
@@ -391,6 +392,28 @@ def test_finely_sampled_sine(options: dict[str, Any], cell: tuple[float, float, 
         assert errors[1] < errors[0] / 150, f"{name}: 16 times the samples, 256 times less"
 
 
+@pytest.mark.parametrize(
+    ("options", "cell"),
+    [
+        ({"model": "newmark"}, (10.0, 0.5, 6.0, 1.0)),
+        ({}, (8.0, 0.3, 2.9, 1.0)),
+        ({"yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09}, (5.0, 0.38, 3.55, 1.8)),
+        ({"yield_acceleration": 0.59, "recoupling": "integrate"}, (5.0, 0.38, 3.55, 1.8)),
+        ({"yield_acceleration": 0.59, "decay_rate": 2.7, "rise": "literal"}, (5.0, 0.38, 3.55, 1.8)),
+    ],
+)
+def test_a_triangle_is_its_own_record(options: dict[str, Any], cell: tuple[float, float, float, float]) -> None:
+    """A wave of straight lines is a record of its corners: two ways through other pieces to one answer."""
+    theta, mu_s, amplitude, frequency = cell
+    wave = slipsweep.sweep(theta, mu_s, amplitude, frequency, cycles=3, waveform="triangle", **options)
+    times = np.arange(13) / (4 * frequency)
+    record = Record(times, amplitude * np.array([0.0, *[1.0, 0.0, -1.0, 0.0] * 3]))
+    result = sweep_record(record, theta, mu_s, **options)
+    assert float(wave.permanent_displacement) > 1e-4
+    for name in ("permanent_displacement", "peak_relative_velocity", "validity"):
+        assert float(result[name]) == pytest.approx(float(wave[name]), rel=3e-13), name
+
+
 def test_finely_sampled_sine_in_continuous_sliding() -> None:
     """A record ends with the plane at rest: what velocity is left when the sine ends is braked by Eq. 12."""
     theta, mu_s, amplitude, frequency = 6.0, 0.38, 6.5, 2.0
@@ -552,6 +575,7 @@ def test_command(tmp_path: Path, shaking: Record) -> None:
         direct = sweep_record(shaking, [0.0, 5.0, 10.0], [0.3, 0.4], polarity="both")
         np.testing.assert_array_equal(stored.permanent_displacement, direct.permanent_displacement)
         assert stored.attrs["record_units"] == "m/s2"
+        np.testing.assert_array_equal(stored.record_acceleration, shaking.acceleration)
         assert stored.permanent_displacement.attrs["units"] == "m"
     assert command(*arguments).returncode == 2, "an output that exists is left alone"
     wrong = command("record", path, "--theta", "0:10", "--mu-s", "0.3")

@@ -31,7 +31,7 @@ BLOCK_CELLS = 4_000_000
 
 #: The same of a record: a cell takes some thousands of times as long, and no more than seconds
 #: of work are to be lost with a block.
-RECORD_BLOCK_CELLS = 100_000
+RECORD_BLOCK_CELLS = 20_000
 
 #: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
 #: 469 MB, of which 96 MB were its blocks.

@@ -1,16 +1,13 @@
-"""The motion while the plane's acceleration goes along a straight line, x(t) = x₀ + s t.
+"""Integrals while the plane's acceleration goes along a straight line, x(t) = x₀ + s t.
 
-What a recorded history, joined by straight lines, and a triangle or square wave are made of.
-With the block's acceleration b held the relative velocity is a parabola; where it follows Eq. 4,
-D = x − E(x) = ±[n (μs − tan θ − μ) + g tan θ] holds a constant, a term linear in t, and both times
-an exponential, so that its integrals are closed forms, too.  No step is taken, no error but rounding.
-
-All of them are gains from rest over a duration τ: ∫ D dt (velocity) and ∫ (τ − t) D dt (displacement).
+With the block's acceleration b held the relative velocity is a parabola (`held_integrals`, `held_stop`).
+Where it follows Eq. 4 the rate D = x − E(x) holds a constant, a term linear in t, and both times an
+exponential, whose moments are closed forms, too (`exponential_moments`; `cycle.straight_lag` puts them
+together).  No step is taken, no error but rounding.
 """
 
 import math
 
-from slipsweep.kernels.block import EVENT_TOLERANCE, Block, friction, slip
 from slipsweep.kernels.jit import scalar
 
 #: From here on the moments' closed forms lose less than a digit; below, their power series is summed.
@@ -46,29 +43,6 @@ def exponential_moments(z: float) -> tuple[float, float, float, float]:
 
 
 @scalar
-def follow_integrals(block: Block, x: float, slope: float, duration: float, side: float) -> tuple[float, float]:
-    """Gains of velocity and displacement under Eq. 4 from plane acceleration x on.
-
-    The piece must lie on one `side` (±1) of Üg = 0.  The exponential is taken from the end where
-    the friction is larger, so that its argument is never positive: nothing overflows, however
-    large λ is.
-    """
-    tan_theta, g = block.tan_theta, block.g
-    kept = block.mu_s - tan_theta
-    change = slope * duration
-    n, n_change = g + tan_theta * x, tan_theta * change
-    decays = side * slope >= 0.0  # |x| grows, the friction falls
-    z = block.decay_rate / g * abs(change)
-    largest = friction(block, x if decays else x + change)
-    whole, early, late, both = exponential_moments(z)
-    if not decays:
-        early, late = late, early
-    first = kept * (n + 0.5 * n_change) + g * tan_theta - largest * (n * whole + n_change * late)
-    second = 0.5 * (kept * n + g * tan_theta) + kept * n_change / 6.0 - largest * (n * early + n_change * both)
-    return side * first * duration, side * second * duration * duration
-
-
-@scalar
 def held_integrals(x: float, slope: float, held: float, duration: float) -> tuple[float, float]:
     """Gains of velocity and displacement with the block's acceleration held, from plane acceleration x on."""
     rate = x - held
@@ -91,24 +65,3 @@ def held_stop(velocity: float, rate: float, slope: float) -> float:
         return math.inf
     fall = math.sqrt(square) - rate
     return 2.0 * velocity / fall if fall > 0.0 else math.inf
-
-
-@scalar
-def follow_stop(block: Block, x: float, slope: float, duration: float, velocity: float) -> float:
-    """When, within `duration`, a velocity that falls under Eq. 4 (x > 0) is zero: Newton kept in its bracket."""
-    low, high = 0.0, duration
-    t = 0.5 * duration
-    for _ in range(200):
-        left = velocity + follow_integrals(block, x, slope, t, 1.0)[0]
-        if left > 0.0:
-            low = t
-        else:
-            high = t
-        new = t - left / slip(block, x + slope * t)
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        step = abs(new - t)
-        t = new
-        if step <= EVENT_TOLERANCE * t:
-            break
-    return t

@@ -20,6 +20,7 @@ from slipsweep.compiled import Kernel
 from slipsweep.equations import CONTINUOUS
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
+    EVENT_TOLERANCE,
     FRICTION_NOT_DECAYING,
     INTEGRATE,
     KD_NOT_POSITIVE,
@@ -43,10 +44,10 @@ from slipsweep.kernels.block import (
     starting_acceleration,
     stays_below_yield,
 )
-from slipsweep.kernels.cycle import next_break, onset, rising_leg
+from slipsweep.kernels.cycle import next_break, onset, rising_leg, straight_lag
 from slipsweep.kernels.grid import Grid, gather
 from slipsweep.kernels.jit import scalar
-from slipsweep.kernels.linear import follow_integrals, follow_stop, held_integrals, held_stop
+from slipsweep.kernels.linear import held_integrals, held_stop
 
 #: More legs than a piece has: breaks of Eq. 4, and a stop and an onset between each.
 _MOST_LEGS = 64
@@ -86,6 +87,35 @@ _STATE_SIZE = 7
 def slope_of(history: History, scale: float, i: int) -> float:
     """Rate of the plane's acceleration on piece i."""
     return scale * (history.values[i + 1] - history.values[i]) / (history.times[i + 1] - history.times[i])
+
+
+@scalar
+def follow_integrals(block: Block, x: float, slope: float, duration: float, side: float) -> tuple[float, float]:
+    """Gains of velocity and displacement under Eq. 4 from plane acceleration x on, on one `side` (±1) of Üg = 0."""
+    first, second, first_x, second_x = straight_lag(block, abs(x), side * slope * duration, duration)
+    side_g = side * block.g
+    return side_g * first + block.tan_theta * first_x, side_g * second + block.tan_theta * second_x
+
+
+@scalar
+def follow_stop(block: Block, x: float, slope: float, duration: float, velocity: float) -> float:
+    """When, within `duration`, a velocity that falls under Eq. 4 (x > 0) is zero: Newton kept in its bracket."""
+    low, high = 0.0, duration
+    t = 0.5 * duration
+    for _ in range(200):
+        left = velocity + follow_integrals(block, x, slope, t, 1.0)[0]
+        if left > 0.0:
+            low = t
+        else:
+            high = t
+        new = t - left / slip(block, x + slope * t)
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        step = abs(new - t)
+        t = new
+        if step <= EVENT_TOLERANCE * t:
+            break
+    return t
 
 
 @scalar
