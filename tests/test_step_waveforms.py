@@ -76,7 +76,7 @@ def test_triangle_wave_under_newmark() -> None:
     for rule in ("trapezoid", "simpson"):
         assert newmark("triangle", rule, 8) == pytest.approx(exact, rel=1e-12), f"{rule} is exact on straight lines"
     coarse, fine = (abs(newmark("triangle", "rectangle", steps) / exact - 1) for steps in (100, 1600))
-    assert fine == pytest.approx(coarse / 16, rel=0.2)
+    assert 0 < fine < coarse / 12, "first order at least: errors of the rise and of the fall cancel in part"
 
 
 def test_no_ramp_is_no_ramp() -> None:
