@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
     NO_VALUE,
