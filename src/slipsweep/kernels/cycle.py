@@ -259,6 +259,9 @@ def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.n
     gained, moved = held_integrals(wave, p, amplitude, held, start, end)
     low, high = start, end
     stops = velocity + gained <= 0.0
+    if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
+        # nothing slows it: over a leg so short that its gain is rounding, it does not stop
+        stops, gained = False, max(gained, 0.0)
     if rate * rate_end < 0.0 and (rate > 0.0 or velocity > 0.0):
         # V turns where x = b; one that starts from rest there only seems to fall, by rounding
         turn = offset_at(wave, p, amplitude, held)
