@@ -136,8 +136,8 @@ solver the heading names the rule and the steps a cycle; its errors fall with th
 ends them.
 
 {errors_table(cases, answers)}
-The cycle solver is held to 100 everywhere but in "beyond squares" and cell 134 (below), its peak velocity likewise. Where one
-ulp of an input changes the sliding mode or a flag, a solver may give that of either side (column `outcomes`
+The cycle solver is held to 100 everywhere but in "beyond squares" and cell 134 (below), its peak velocity
+likewise. Where one ulp of an input changes the sliding mode or a flag, a solver may give that of either side (column `outcomes`
 of the data file); a neighbour without a value is left out of the bound.
 
 Known limits: with accelerations beyond about 1e±150 m/s², V²/b in Eq. 12 passes through squares that
