@@ -76,7 +76,7 @@ def test_triangle_wave_under_newmark() -> None:
     for rule in ("trapezoid", "simpson"):
         assert newmark("triangle", rule, 8) == pytest.approx(exact, rel=1e-12), f"{rule} is exact on straight lines"
     coarse, fine = (abs(newmark("triangle", "rectangle", steps) / exact - 1) for steps in (100, 1600))
-    assert fine == pytest.approx(coarse / 16, rel=0.2)
+    assert 0 < fine < coarse / 12, "first order at least: errors of the rise and of the fall cancel in part"
 
 
 def test_no_ramp_is_no_ramp() -> None:
@@ -91,15 +91,16 @@ def test_no_ramp_is_no_ramp() -> None:
 @RULES
 @EVERY_WAVE
 def test_order_across_jumps_and_kinks(wave: str, rule: str) -> None:
-    """Four times the steps: the median cell gains by the rule's order, every cell by first order at least."""
-    counts = [96, 120, 152]
-    before, after = errors(wave, rule, counts), errors(wave, rule, [4 * count for count in counts])
+    """More steps: the median cell gains by the rule's order, every cell by first order at least."""
+    # errors of first order change their sign here and there: far enough apart that this does not count
+    counts, times = ([256, 304, 376], 16) if rule == "rectangle" else ([96, 120, 152], 4)
+    before, after = errors(wave, rule, counts), errors(wave, rule, [times * count for count in counts])
     assert before.size >= 20
     rounding = 1e-11
-    assert (after <= np.maximum(before / 4**0.75, rounding)).all(), "first order in every cell"
+    assert (after <= np.maximum(before / times**0.75, rounding)).all(), "first order in every cell"
     seen = after > rounding
     if seen.sum() >= 5:
-        gained = np.log(before[seen] / after[seen]) / np.log(4)
+        gained = np.log(before[seen] / after[seen]) / np.log(times)
         assert np.median(gained) > ORDERS[rule] - 0.3
     else:
         assert rule == "simpson" or wave in ("square", "triangle"), "only these are exact"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mpmath import mpf, nstr
+from mpmath import nstr
 from strategies import reproducible
 from wave_cases import REGIMES, WaveCase, read_wave_cases
 from wave_cases import solve as reference
@@ -155,7 +155,7 @@ def test_later_cycles_of_the_cosine_are_those_of_the_sine(cell: str) -> None:
 def test_peak_below_zero_decides_the_mode_alone() -> None:
     """A wave whose positive peak stays below Üy moves no block, however large A is."""
     harmonics = {"amplitudes": [1.0, 0.5], "multiples": [1, 2], "phases": [0.0, 90.0]}  # 0.75 up, 1.5 down
-    cell = {"theta": 5.0, "mu_s": 0.38, "waveform": "harmonics", "harmonics": harmonics}
+    cell: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "waveform": "harmonics", "harmonics": harmonics}
     still = slipsweep.sweep(**cell, amplitude=3.55, frequency=1.0, yield_acceleration=1.8)
     assert float(still.permanent_displacement) == 0.0
     assert int(still.sliding_mode) == 1
@@ -234,7 +234,12 @@ def test_step_solver_goes_to_the_cycle_solver() -> None:
 
 def test_a_grid_is_its_cells() -> None:
     """A sweep of a waveform, lazy or at once, gives what each cell gives by itself."""
-    axes = {"theta": [0.0, 5.0], "mu_s": [0.3, 0.5], "amplitude": [2.0, 4.0, 7.0], "frequency": [1.0, 2.0]}
+    axes: dict[str, Any] = {
+        "theta": [0.0, 5.0],
+        "mu_s": [0.3, 0.5],
+        "amplitude": [2.0, 4.0, 7.0],
+        "frequency": [1.0, 2.0],
+    }
     grid = slipsweep.sweep(**axes, **WAVES["ramped harmonics"], cycles=5)
     lazy = slipsweep.sweep(**axes, **WAVES["ramped harmonics"], cycles=5, chunks={"amplitude": 1}).compute()
     assert lazy.equals(grid)

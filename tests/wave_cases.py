@@ -105,7 +105,7 @@ def _case(number: int, regime: str, waveform: str, harmonics: str, draw: random.
         onset = G * (mu_s - tan) / (1 + mu_s * tan)
         if onset <= 0.1:
             continue
-        given: dict[str, float | None] = {"yield_acceleration": None, "decay_rate": None, "delta_mu": None}
+        given: dict[str, Any] = {"yield_acceleration": None, "decay_rate": None, "delta_mu": None}
         if regime in ("measured", "sharp_decay", "carried"):
             onset *= draw.uniform(0.02 if regime == "carried" else 0.1, 0.9 if regime != "carried" else 0.2)
             given["yield_acceleration"] = onset
@@ -137,8 +137,8 @@ def _case(number: int, regime: str, waveform: str, harmonics: str, draw: random.
 def read_wave_cases() -> list[WaveCase]:
     """All cases of waveforms.csv."""
     kinds: dict[str, Any] = {"case": int, "cycles": int, "sliding_mode": int, "validity": int}
-    texts = ("regime", "waveform", "harmonics", "model", "rise", "recoupling")
-    texts += ("permanent_displacement", "peak_relative_velocity")
+    texts = {"regime", "waveform", "harmonics", "model", "rise", "recoupling"}
+    texts |= {"permanent_displacement", "peak_relative_velocity"}
     with PATH.open(newline="") as file:
         rows = list(csv.DictReader(file))
     cases = []

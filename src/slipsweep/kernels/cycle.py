@@ -252,10 +252,17 @@ def advance(
 def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.ndarray, legs: np.ndarray) -> float:
     """Slide with b held along piece p from start to end, or to the stop: where that is."""
     amplitude, held, velocity = block.amplitude, state[HELD], state[VELOCITY]
-    rate = plane(wave, p, amplitude, start) - held
-    rate_end = plane(wave, p, amplitude, end) - held
+    # most legs are whole pieces, whose ends are known
+    rate = amplitude * wave.first[p] if start == wave.begin[p] else plane(wave, p, amplitude, start)
+    rate_end = amplitude * wave.last[p] if end == wave.finish[p] else plane(wave, p, amplitude, end)
+    rate -= held
+    rate_end -= held
+    gained, moved = held_integrals(wave, p, amplitude, held, start, end)
     low, high = start, end
-    stops = velocity + held_gain(wave, p, amplitude, held, start, end) <= 0.0
+    stops = velocity + gained <= 0.0
+    if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
+        # nothing slows it: over a leg so short that its gain is rounding, it does not stop
+        stops, gained = False, max(gained, 0.0)
     if opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
         # V turns where x = b; one that starts from rest there only seems to fall, by rounding
         turn = offset_at(wave, p, amplitude, held)
@@ -267,10 +274,10 @@ def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.n
             state[LEAST] = min(state[LEAST], extreme)
             stops, high = extreme <= 0.0, turn
     if stops:
-        end = (
-            start if velocity <= 0.0 and rate <= 0.0 else stop(block, wave, p, held, False, velocity, start, low, high)
-        )
-    gained, moved = held_integrals(wave, p, amplitude, held, start, end)
+        end = start
+        if velocity > 0.0 or rate > 0.0:
+            end = stop(block, wave, p, held, False, velocity, start, low, high)
+        gained, moved = held_integrals(wave, p, amplitude, held, start, end)
     record(legs, HOLD, p, start, phase_at(wave, p, start), phase_at(wave, p, end), state)
     advance(wave, p, end, stops, gained, moved, end - start, state)
     return end

@@ -29,6 +29,7 @@ from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     AMPLITUDE,
     EQ4_BELOW_YIELD,
+    EVENT_TOLERANCE,
     INTEGRATE,
     KD_NOT_POSITIVE,
     LANE_ROWS,
@@ -57,9 +58,10 @@ from slipsweep.kernels.block import (
     starting_acceleration,
     whole_lanes,
 )
-from slipsweep.kernels.excitation import Wave, offset_at, phase_at, plane
+from slipsweep.kernels.excitation import Wave, from_top, offset_at, phase_at, plane
+from slipsweep.kernels.excitation import slope as w_slope
 from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of, yield_governs
+from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -299,6 +301,32 @@ def begin_slide(wave: Wave, p: int, tau: float, x: float, held: float, turn: flo
 
 
 @scalar
+def tau_within(steps: Steps, p: int, k: int, amplitude: float, x: float) -> float:
+    """τ at which Üg = x within step k of piece p: as `offset_at`, but from the ends of the step, which are known."""
+    wave, at = steps.wave, steps.offset[p] + 2 * k
+    low, high, w_low, w_high = node(steps, p, k), node(steps, p, k + 1), steps.nodes[at], steps.nodes[at + 2]
+    if w_low == w_high:
+        return low
+    wanted = (x - amplitude * wave.top[p]) / amplitude
+    rises = w_high > w_low
+    tau = low + (high - low) * min(max((x / amplitude - w_low) / (w_high - w_low), 0.0), 1.0)
+    for _ in range(60):
+        over = from_top(wave, p, tau) - wanted
+        if (over > 0.0) == rises:
+            high = tau
+        else:
+            low = tau
+        new = tau - over / w_slope(wave, p, tau)
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        step = abs(new - tau)
+        tau = new
+        if step <= EVENT_TOLERANCE * abs(tau):
+            break
+    return tau
+
+
+@scalar
 def hold_step(block: Block, rule: int, wave: Wave, p: int, start: float, end: float, state: np.ndarray) -> None:
     """From τ = start to end on piece p with b held, cut at the stop."""
     held, h, amplitude = state[HELD], end - start, block.amplitude
@@ -376,7 +404,7 @@ def rise_step(
                 x = held = slip_root(block, 0.0, x, top)  # where Eq. 4 meets Üg
                 located = False
             if not located:
-                tau, located = offset_at(wave, p, amplitude, x), True
+                tau, located = tau_within(steps, p, k, amplitude, x), True
             follows = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
             state[FOLLOWS] = 1.0 if follows else 0.0
             turn = wave.finish[p]
@@ -407,7 +435,7 @@ def rise_step(
                     else:
                         state[FOLLOWS] = 0.0
         if switches:
-            cut = offset_at(wave, p, amplitude, x_cut)
+            cut = tau_within(steps, p, k, amplitude, x_cut)
         follows, held, h = state[FOLLOWS] == 1.0, state[HELD], cut - tau
         rate, middle = x - (asked if follows else held), 0.0
         if rule == SIMPSON:
@@ -817,6 +845,7 @@ def stick_slip_lanes(
             states[_DISPLACEMENT + j] = before + times * (states[_DISPLACEMENT + j] - before)
         if c == wave.lead and wave.alike:
             break
+    highest = wave.height.max() if wave.height.size else 0.0
     for j in range(count):
         block = block_at(cells, where[j], options)
         if lanes[_ALONE + j] > 0.0:
@@ -825,7 +854,7 @@ def stick_slip_lanes(
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
                 moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
-            slides = first_pulse(block, wave, 0) < wave.height.size
+            slides = block.amplitude * highest > block.yield_acceleration
             validity = EQ4_BELOW_YIELD if slides and yield_governs(block, wave) else 0
             answer = Motion(moved, states[_PEAK + j], validity)
         motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
@@ -843,7 +872,13 @@ def continuous_cycle(
     literally(rule)
     columns = states.reshape((_STATE_SIZE, TILE))
     g, wave, nodes = options.g, steps.wave, steps.nodes
+    thickest = 0.0
+    for j in range(count):
+        thickest = max(thickest, lanes[_THIN + j])
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
+        starting = False
+        for j in range(count):
+            starting = starting | (states[_SLIDES + j] == 0.0)
         at, side = steps.offset[p], math.copysign(1.0, wave.top[p])
         h = steps.length[p]
         for j in range(count):
@@ -851,6 +886,7 @@ def continuous_cycle(
         for i in range(steps.counts[p]):
             w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
             near = min(abs(w_start), abs(w_end))
+            layered = near < thickest
             events = 0
             for j in range(count):
                 x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
@@ -860,12 +896,12 @@ def continuous_cycle(
                 if rule == SIMPSON:
                     middle = lane_slip(lanes, j, lanes[AMPLITUDE + j] * w_middle, side, g)
                 c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
-                velocity, began = states[_VELOCITY + j], states[_SLIDES + j] > 0.0
+                velocity, began = states[_VELOCITY + j], (not starting) | (states[_SLIDES + j] > 0.0)
                 after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
                 moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
                 turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
                 begins = max(x, x_end) > lanes[YIELD + j]
-                happens = (turns | (near < lanes[_THIN + j])) if began else begins
+                happens = (turns | (layered & (near < lanes[_THIN + j]))) if began else begins
                 goes = began & (not happens)
                 states[_VELOCITY + j] = after if goes else velocity
                 states[_DISPLACEMENT + j] += moved if goes else 0.0
