@@ -68,7 +68,7 @@ class Problem:
 
 
 def solver_of(problem: Problem) -> str:
-    """The solver that a problem is given to: "auto" takes "cycle", faster and exact to rounding for every sine."""
+    """The solver that a problem is given to: "auto" takes "cycle", faster and exact to rounding for every waveform."""
     return "cycle" if problem.solver == "auto" else problem.solver
 
 
