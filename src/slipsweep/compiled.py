@@ -176,6 +176,37 @@ class _Compiler(numba.core.compiler.Compiler):
         super().__init__(typingctx, targetctx, library, *arguments)
 
 
+class _Part(JITCodeLibrary):
+    """What a kernel is made of: never machine code by itself, since nothing calls it but kernels with copies of it."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        return _Nowhere
+
+
+class _Nowhere:
+    """Where the environment of a function that has no machine code is put."""
+
+    @staticmethod
+    def set_env(name: str, environment: Any) -> None:
+        pass
+
+
+class PartCompiler(numba.core.compiler.Compiler):
+    """numba's compiler, for functions that only kernels call."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
+        super().__init__(typingctx, targetctx, _Part(targetctx.codegen(), "part"), *arguments)
+
+
 class Kernel:
     """A jitted function that is compiled, or loaded from disk, when first called.
 

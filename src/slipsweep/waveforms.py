@@ -471,6 +471,7 @@ def wave_of(waveform: Waveform, cycles: int) -> "Wave":
         top=np.where(at_end, last, first),
         degree=np.where(coefficients != 0.0, power, 0).max(axis=1),
         coefficients=coefficients,
+        arc=np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
         once=coefficients / (power + 1),
         twice=coefficients / ((power + 1) * (power + 2)),
         jumps=jumps,

@@ -5,7 +5,9 @@ anchor: that end of it at which |w| is larger.  Differences from a peak thus com
 not out of a subtraction of two numbers near 1, and keep their digits however small they are
 (near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
 smooth waves are cut so short that the series are exact to rounding (`slipsweep.waveforms`, which
-fills the table): one form for all waveforms.  Times the amplitude A it is the plane's acceleration x.
+fills the table): one form for all waveforms.  Only the series of a plain sine has a name, and is
+evaluated by it (a slide of many pulses takes a fifth of the time).  Times the amplitude A it is the plane's
+acceleration x.
 """
 
 import math
@@ -13,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
 from slipsweep.kernels.jit import scalar
 
 #: Relative size of the last Newton step of `offset_at`: its square is below rounding.
@@ -38,6 +41,8 @@ class Wave(NamedTuple):
         Of the polynomial: 0 on a plateau, 1 on a straight line.
     coefficients, once, twice : ndarray, shape (pieces, terms)
         c₁, c₂, …; and those of the sum's first and second integral from the anchor, τ² and τ³ on.
+    arc : ndarray of bool
+        Whether it is a quarter of a sine about its peak, whose closed forms are shorter than its series.
     jumps : ndarray of bool
         Whether w jumps up at the beginning.
     cycle : ndarray of int, shape (cycles in the table + 1,)
@@ -67,6 +72,7 @@ class Wave(NamedTuple):
     coefficients: np.ndarray
     once: np.ndarray
     twice: np.ndarray
+    arc: np.ndarray
     jumps: np.ndarray
     cycle: np.ndarray
     shape: np.ndarray
@@ -81,6 +87,8 @@ class Wave(NamedTuple):
 @scalar
 def from_top(wave: Wave, p: int, tau: float) -> float:
     """w − top on piece p, τ from its anchor."""
+    if wave.arc[p]:
+        return -wave.top[p] * versine(tau)
     sum_ = 0.0
     for k in range(wave.degree[p] - 1, -1, -1):
         sum_ = (sum_ + wave.coefficients[p, k]) * tau
@@ -90,6 +98,8 @@ def from_top(wave: Wave, p: int, tau: float) -> float:
 @scalar
 def slope(wave: Wave, p: int, tau: float) -> float:
     """dw/dτ on piece p."""
+    if wave.arc[p]:
+        return -wave.top[p] * math.sin(tau)
     sum_ = 0.0
     for k in range(wave.degree[p] - 1, -1, -1):
         sum_ = sum_ * tau + (k + 1.0) * wave.coefficients[p, k]
@@ -99,6 +109,8 @@ def slope(wave: Wave, p: int, tau: float) -> float:
 @scalar
 def integral(wave: Wave, p: int, start: float, end: float) -> float:
     """∫ (w − top) dτ over a part of piece p."""
+    if wave.arc[p]:
+        return -wave.top[p] * (angle_minus_sine(end) - angle_minus_sine(start))
     sum_start, sum_end = 0.0, 0.0
     for k in range(wave.degree[p] - 1, -1, -1):
         sum_start, sum_end = (sum_start + wave.once[p, k]) * start, (sum_end + wave.once[p, k]) * end
@@ -108,6 +120,10 @@ def integral(wave: Wave, p: int, start: float, end: float) -> float:
 @scalar
 def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
+    if wave.arc[p]:
+        sine_part = angle_minus_sine(start)
+        rest = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
+        return -wave.top[p] * (angle_minus_sine(end) - sine_part), -wave.top[p] * rest
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
     for k in range(wave.degree[p] - 1, -1, -1):
         once, twice = wave.once[p, k], wave.twice[p, k]
@@ -151,6 +167,8 @@ def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
         return far
     if wave.degree[p] == 1:
         return far * share
+    if wave.arc[p]:
+        return math.copysign(inverse_versine(abs(wanted)), far)
     tau = far * (math.sqrt(share) if wave.coefficients[p, 0] == 0.0 else share)
     low, high = 0.0, far  # from the anchor on
     for _ in range(100):

@@ -9,7 +9,11 @@ import functools
 
 from numba import njit
 
-_inner = functools.partial(njit, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+from slipsweep.compiled import PartCompiler
+
+_inner = functools.partial(
+    njit, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=PartCompiler
+)
 
 #: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once; nothing that assumes
 #: away NaN or infinity, which are results here.
