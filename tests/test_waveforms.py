@@ -8,7 +8,8 @@ import pytest
 from mpmath import mp, mpf
 
 from slipsweep import InputError
-from slipsweep.waveforms import MOST_RAMP, Waveform, check_waveform, text_of, wave_of
+from slipsweep.kernels.excitation import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TOP
+from slipsweep.waveforms import MOST_RAMP, TERMS, Waveform, check_waveform, text_of, wave_of
 
 RICH = {"amplitudes": [1.0, 0.6, 0.35, 0.2], "multiples": [1, 2, 5, 50], "phases": [0.0, 40.0, 100.0, 7.0]}
 EVERY = {
@@ -69,29 +70,33 @@ def test_pieces_are_the_wave(name: str) -> None:
     waveform = EVERY[name]
     wave = wave_of(waveform, CYCLES)
     scale = exact_peak(waveform) if waveform.multiples else 1.0
-    for p in range(wave.start.size):
-        tau = wave.begin[p] + np.linspace(0.01, 0.99, 23) * (wave.finish[p] - wave.begin[p])
-        phase = wave.start[p] + (tau - wave.begin[p])
+    for p in range(len(wave.pieces)):
+        tau = wave.pieces[p, BEGIN] + np.linspace(0.01, 0.99, 23) * (wave.pieces[p, FINISH] - wave.pieces[p, BEGIN])
+        phase = wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])
         if wave.repeats and p >= wave.cycle[wave.lead + 1]:
             phase += 2 * pi * (wave.repeats - 1)  # the table has the plain cycle once
-        found = wave.top[p] + sum(c * tau ** (k + 1) for k, c in enumerate(wave.coefficients[p]))
+        found = wave.pieces[p, TOP] + sum(
+            c * tau ** (k + 1) for k, c in enumerate(wave.pieces[p, COEFFICIENTS : COEFFICIENTS + TERMS])
+        )
         error = np.abs(found - defined(waveform, phase, CYCLES) / scale).max()
         assert error < 1e-14 + 4e-16 * max(waveform.multiples, default=1) * 8 * pi, f"piece {p}: off by {error:.1e}"
-        assert np.all(np.diff(found) * (wave.last[p] - wave.first[p]) >= 0), f"piece {p}: not monotone"
-        assert np.all(found * (wave.first[p] + wave.last[p]) > 0), f"piece {p}: changes its sign"
+        assert np.all(np.diff(found) * (wave.pieces[p, LAST] - wave.pieces[p, FIRST]) >= 0), f"piece {p}: not monotone"
+        assert np.all(found * (wave.pieces[p, FIRST] + wave.pieces[p, LAST]) > 0), f"piece {p}: changes its sign"
 
 
 @each
 def test_pieces_join(name: str) -> None:
     """No phase is left out, and w jumps only where it is said to, upwards, or down."""
     wave = wave_of(EVERY[name], CYCLES)
-    assert wave.start[0] == 0.0
-    np.testing.assert_array_equal(wave.start[1:], wave.end[:-1])
-    assert wave.end[-1] == pytest.approx(2 * pi * (wave.cycle.size - 1), rel=1e-15)
-    leaps = wave.first - np.concatenate([[0.0], wave.last[:-1]])
+    assert wave.pieces[0, START] == 0.0
+    np.testing.assert_array_equal(wave.pieces[1:, START], wave.pieces[:-1, END])
+    assert wave.pieces[-1, END] == pytest.approx(2 * pi * (wave.cycle.size - 1), rel=1e-15)
+    leaps = wave.pieces[:, FIRST] - np.concatenate([[0.0], wave.pieces[:-1, LAST]])
     if EVERY[name].name != "square":
         assert not leaps[1:].any(), "a jump in a continuous wave"
-    np.testing.assert_array_equal(wave.jumps, leaps > np.maximum(0.0, -np.concatenate([[0.0], wave.last[:-1]])))
+    np.testing.assert_array_equal(
+        wave.pieces[:, JUMPS] > 0.0, leaps > np.maximum(0.0, -np.concatenate([[0.0], wave.pieces[:-1, LAST]]))
+    )
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -105,10 +110,10 @@ def test_peak_is_exact(seed: int) -> None:
         {"amplitudes": draw.normal(size=count), "multiples": multiples, "phases": draw.uniform(0, 360, count)},
     )
     wave = wave_of(waveform, 1)
-    assert np.abs(wave.top).max() == 1.0
+    assert np.abs(wave.pieces[:, TOP]).max() == 1.0
     # scaled by the peak, the coefficients give it back
-    p = int(np.abs(wave.top).argmax())
-    phase = wave.start[p] if wave.begin[p] == 0.0 else wave.end[p]
+    p = int(np.abs(wave.pieces[:, TOP]).argmax())
+    phase = wave.pieces[p, START] if wave.pieces[p, BEGIN] == 0.0 else wave.pieces[p, END]
     assert abs(defined(waveform, np.array([phase]), 1)[0]) == pytest.approx(exact_peak(waveform), rel=1e-13)
 
 
@@ -116,17 +121,17 @@ def test_stretches_of_several_maxima() -> None:
     """sin φ + 0.6 sin 5φ is above zero in one run with three maxima, and its mirror image below."""
     wave = wave_of(check_waveform("harmonics", {"amplitudes": [1, 0.6], "multiples": [1, 5]}), 1)
     ((a, b),) = wave.stretch[:1]
-    tops = [p for p in range(a, b - 1) if wave.first[p] < wave.last[p] > wave.last[p + 1]]
+    tops = [p for p in range(a, b - 1) if wave.pieces[p, FIRST] < wave.pieces[p, LAST] > wave.pieces[p + 1, LAST]]
     assert len(wave.stretch) == 3 or len(tops) == 3
     assert wave.height.max() == 1.0
 
 
 def test_one_plain_cycle_stands_for_all() -> None:
     """Tables do not grow with the cycles, but for ramps."""
-    assert wave_of(Waveform("square"), 10**9).start.size == 4
+    assert len(wave_of(Waveform("square"), 10**9).pieces) == 4
     long = wave_of(EVERY["ramped triangle"], 10**9)
     assert long.repeats == 10**9 - long.lead - 3
-    assert long.start.size == 4 * (long.lead + 4)
+    assert len(long.pieces) == 4 * (long.lead + 4)
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,9 @@ How a solver uses the pieces.  `wave_of` gives a `kernels.excitation.Wave`: the 
 bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece (and further
 where a smooth one would be too long for its polynomial).  `kernels.excitation` evaluates a piece
 (`plane`, `from_top`, `slope`), integrates it (`held_integrals`) and inverts it (`offset_at`); τ, the
-phase on a piece, runs from ``begin[p]`` to ``finish[p]``, and ``start[p] <= phase <= end[p]`` is the same
+phase on a piece, runs from `BEGIN` to `FINISH` (columns of ``pieces``), and `START` to `END` is the same
 in the table's phases.  Pieces do not depend on the cell.  What happens between two pieces: w
-goes from ``last[p]`` to ``first[p + 1]``; where that is a jump upwards ``jumps[p + 1]`` is set.  Before piece 0
+goes from `LAST` of the one to `FIRST` of the other, whose `JUMPS` tells a jump upwards.  Before piece 0
 and after the last one the plane is at rest.  Cycle c of the table is the pieces ``cycle[c]`` to
 ``cycle[c + 1] - 1``; cycle number `lead` comes `repeats` times (there is no such cycle where `repeats` is 0),
 all others once.  Cycles of the same number in ``shape`` have equal pieces.  Pulses happen in the `stretch`es
@@ -52,7 +52,7 @@ MOST_RAMP = 100
 #: Longest piece of a smooth wave, in radians of its fastest harmonic, and terms of its Taylor series
 #: about the anchor: the first one left out is below 1e-18.
 _LONGEST = 0.5 * math.pi
-_TERMS = 22
+TERMS = 22
 
 #: Points of a cycle closer than this, as parts of it, are one.
 _SAME = 1e-12
@@ -403,13 +403,13 @@ def _smooth_pieces(period: _Period, i: int, low: float, high: float, envelope: t
     at, rate = envelope
     places = np.array(points)
     scale = at + rate * (places.astype(_Extended) - low) * _TURN
-    orders = range(_TERMS + 1) if period.fastest else range(2)
+    orders = range(TERMS + 1) if period.fastest else range(2)
     taylor = [period.derivative(i, places, order) / math.factorial(order) for order in orders]
     # the product with the envelope, a straight line
-    series = np.zeros((_TERMS + 1, places.size), _Extended)
+    series = np.zeros((TERMS + 1, places.size), _Extended)
     for order, term in enumerate(taylor):
         series[order] += scale * term
-        if order < _TERMS:
+        if order < TERMS:
             series[order + 1] += rate * term
     for j, point in enumerate(points):
         if near(point, zeros):
@@ -434,7 +434,19 @@ def _smooth_pieces(period: _Period, i: int, low: float, high: float, envelope: t
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform, cycles: int) -> "Wave":
     """The table of pieces of `cycles` cycles of a waveform."""
-    from slipsweep.kernels.excitation import Wave  # here: to check a sweep file takes no numba
+    from slipsweep.kernels.excitation import (  # here: to check a sweep file takes no numba
+        ARC,
+        BEGIN,
+        DEGREE,
+        END,
+        FINISH,
+        FIRST,
+        JUMPS,
+        LAST,
+        START,
+        TOP,
+        Wave,
+    )
 
     plain = _pieces(Waveform(waveform.name, waveform.amplitudes, waveform.multiples, waveform.phases), 1, 0)
     wraps = plain[0].first > 0.0 and plain[-1].last > 0.0
@@ -455,26 +467,27 @@ def wave_of(waveform: Waveform, cycles: int) -> "Wave":
     at_end = np.array([piece.at_end for piece in pieces])
     length = 2.0 * math.pi * np.array([piece.end - piece.start for piece in pieces])
     coefficients = np.array([piece.coefficients for piece in pieces])
-    power = np.arange(1, _TERMS + 1)
+    power = np.arange(1, TERMS + 1)
     before = np.concatenate([[0.0], last[:-1]])
     first = np.where(np.abs(first - before) < _ROUNDING, before, first)  # two cycles' roundings are no jump
     jumps = first > np.maximum(before, 0.0)
     stretch = _stretches(first, last)
     top = np.maximum(first, last)
+    named = {
+        START: offset + 2.0 * math.pi * np.array([piece.start for piece in pieces]),
+        END: offset + 2.0 * math.pi * np.array([piece.end for piece in pieces]),
+        BEGIN: np.where(at_end, -length, 0.0),
+        FINISH: np.where(at_end, 0.0, length),
+        FIRST: first,
+        LAST: last,
+        TOP: np.where(at_end, last, first),
+        DEGREE: np.where(coefficients != 0.0, power, 0).max(axis=1),
+        JUMPS: jumps,
+        ARC: np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
+    }
+    series = [coefficients, coefficients / (power + 1), coefficients / ((power + 1) * (power + 2))]
     return Wave(
-        start=offset + 2.0 * math.pi * np.array([piece.start for piece in pieces]),
-        end=offset + 2.0 * math.pi * np.array([piece.end for piece in pieces]),
-        begin=np.where(at_end, -length, 0.0),
-        finish=np.where(at_end, 0.0, length),
-        first=first,
-        last=last,
-        top=np.where(at_end, last, first),
-        degree=np.where(coefficients != 0.0, power, 0).max(axis=1),
-        coefficients=coefficients,
-        arc=np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
-        once=coefficients / (power + 1),
-        twice=coefficients / ((power + 1) * (power + 2)),
-        jumps=jumps,
+        pieces=np.ascontiguousarray(np.column_stack([*(named[column] for column in range(len(named))), *series])),
         cycle=np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64),
         shape=np.array(shape, np.int64),
         stretch=stretch,

@@ -42,7 +42,23 @@ from slipsweep.kernels.block import (
     slope_root,
     starting_acceleration,
 )
-from slipsweep.kernels.excitation import Wave, held_gain, held_integrals, offset_at, phase_at, plane
+from slipsweep.kernels.excitation import (
+    BEGIN,
+    DEGREE,
+    END,
+    FINISH,
+    FIRST,
+    JUMPS,
+    LAST,
+    START,
+    TOP,
+    Wave,
+    held_gain,
+    held_integrals,
+    offset_at,
+    phase_at,
+    plane,
+)
 from slipsweep.kernels.jit import scalar, summed
 from slipsweep.kernels.linear import exponential_moments
 from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of
@@ -111,7 +127,7 @@ def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) ->
     """
     amplitude = block.amplitude
     x_start, x_end = abs(plane(wave, p, amplitude, start)), abs(plane(wave, p, amplitude, end))
-    if wave.degree[p] <= 1:
+    if int(wave.pieces[p, DEGREE]) <= 1:
         return straight_lag(block, x_start, x_end - x_start, end - start)
     mu_s, kept = block.mu_s, block.mu_s - block.tan_theta
     decay = block.decay_rate / block.g
@@ -123,7 +139,7 @@ def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) ->
     for bound in PANEL_BOUNDS:
         until = far
         if e_foldings > bound:
-            until = offset_at(wave, p, amplitude, math.copysign(least + bound / decay, wave.top[p]))
+            until = offset_at(wave, p, amplitude, math.copysign(least + bound / decay, wave.pieces[p, TOP]))
         width = until - near
         for node in range(NODES.size):
             tau = near + width * NODES[node]
@@ -146,7 +162,7 @@ def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) ->
 def slip_integrals(block: Block, wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest."""
     first, second, first_x, second_x = lag_integrals(block, wave, p, start, end)
-    side_g = math.copysign(block.g, wave.top[p])
+    side_g = math.copysign(block.g, wave.pieces[p, TOP])
     return side_g * first + block.tan_theta * first_x, side_g * second + block.tan_theta * second_x
 
 
@@ -253,8 +269,8 @@ def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.n
     """Slide with b held along piece p from start to end, or to the stop: where that is."""
     amplitude, held, velocity = block.amplitude, state[HELD], state[VELOCITY]
     # most legs are whole pieces, whose ends are known
-    rate = amplitude * wave.first[p] if start == wave.begin[p] else plane(wave, p, amplitude, start)
-    rate_end = amplitude * wave.last[p] if end == wave.finish[p] else plane(wave, p, amplitude, end)
+    rate = amplitude * wave.pieces[p, FIRST] if start == wave.pieces[p, BEGIN] else plane(wave, p, amplitude, start)
+    rate_end = amplitude * wave.pieces[p, LAST] if end == wave.pieces[p, FINISH] else plane(wave, p, amplitude, end)
     rate -= held
     rate_end -= held
     gained, moved = held_integrals(wave, p, amplitude, held, start, end)
@@ -319,7 +335,7 @@ def rise(block: Block, wave: Wave, p: int, tau: float, x: float, state: np.ndarr
     Eq. 4; each leg ends where that changes, where E or D turns, or where V turns or vanishes.
     """
     amplitude, literal = block.amplitude, block.rise == LITERAL
-    top, finish = amplitude * wave.last[p], wave.finish[p]
+    top, finish = amplitude * wave.pieces[p, LAST], wave.pieces[p, FINISH]
     for _ in range(MOST_LEGS):
         if state[SLIDES] == 0.0:
             began = top
@@ -357,20 +373,24 @@ def through_stretch(block: Block, wave: Wave, k: int, p: int, tau: float, state:
     """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of stretch k; b ≤ 0 at the end of a rise makes b NaN."""
     amplitude = block.amplitude
     for q in range(p, wave.stretch[k, 1]):
-        first, last = wave.first[q], wave.last[q]
+        first, last = wave.pieces[q, FIRST], wave.pieces[q, LAST]
         x = amplitude * first
         if q == p:
             x = max(x, block.yield_acceleration)
         else:
-            tau = wave.begin[q]
-        if wave.jumps[q] or first == last or (q > p and first < last and wave.first[q - 1] > wave.last[q - 1]):
+            tau = wave.pieces[q, BEGIN]
+        if (
+            wave.pieces[q, JUMPS] > 0.0
+            or first == last
+            or (q > p and first < last and wave.pieces[q - 1, FIRST] > wave.pieces[q - 1, LAST])
+        ):
             arrive(block, x, state)
         if first < last:
             rise(block, wave, q, tau, x, state, legs)
         elif state[SLIDES] > 0.0:
             if first > last and state[HELD] <= 0.0:
                 break
-            hold(block, wave, q, tau, wave.finish[q], state, legs)
+            hold(block, wave, q, tau, wave.pieces[q, FINISH], state, legs)
     if state[SLIDES] > 0.0 and state[HELD] <= 0.0:
         state[HELD] = math.nan
 
@@ -378,12 +398,12 @@ def through_stretch(block: Block, wave: Wave, k: int, p: int, tau: float, state:
 @scalar
 def recouple(block: Block, wave: Wave, q: int, p: int, tau: float, state: np.ndarray, legs: np.ndarray) -> None:
     """From the beginning of piece q (t5) to τ on piece p, integrating on."""
-    for piece in range(q, min(p + 1, wave.start.size)):
+    for piece in range(q, min(p + 1, wave.pieces.shape[0])):
         if state[SLIDES] == 0.0:
             break
-        end = tau if piece == p else wave.finish[piece]
-        if end > wave.begin[piece]:
-            hold(block, wave, piece, wave.begin[piece], end, state, legs)
+        end = tau if piece == p else wave.pieces[piece, FINISH]
+        if end > wave.pieces[piece, BEGIN]:
+            hold(block, wave, piece, wave.pieces[piece, BEGIN], end, state, legs)
 
 
 @scalar
@@ -393,7 +413,7 @@ def follow_pulse(
     """From Üg = Üy in stretch k to that in the `following` one, or to the end of the motion if none follows."""
     state = np.zeros(STATE_SIZE)
     p, tau = beginning(block, wave, k)
-    x = max(block.amplitude * wave.first[p], block.yield_acceleration)
+    x = max(block.amplitude * wave.pieces[p, FIRST], block.yield_acceleration)
     state[VELOCITY] = state[PEAK] = state[LEAST] = velocity
     state[HELD], state[SLIDES] = starting_acceleration(block, x), 1.0 if velocity > 0.0 else 0.0
     state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
@@ -402,14 +422,14 @@ def follow_pulse(
         return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, KD_NOT_POSITIVE)
     if state[SLIDES] > 0.0:
         q, last = wave.stretch[k, 1], following >= wave.height.size
-        p, tau = wave.start.size, 0.0
+        p, tau = wave.pieces.shape[0], 0.0
         if not last:
             p, tau = beginning(block, wave, following)
         if options.recoupling == INTEGRATE:
             recouple(block, wave, q, p, tau, state, legs)
-        started = wave.start[q] if q < wave.start.size else wave.end[q - 1]
+        started = wave.pieces[q, START] if q < wave.pieces.shape[0] else wave.pieces[q - 1, END]
         if options.recoupling == INTEGRATE:
-            started = wave.end[wave.end.size - 1]
+            started = wave.pieces[wave.pieces.shape[0] - 1, END]
         if state[SLIDES] > 0.0 and (last or options.recoupling != INTEGRATE):
             duration = math.inf if last else phase_at(wave, p, tau) - started
             b = state[HELD]
@@ -458,10 +478,10 @@ def continuous_cycle(
     velocity, displacement, peak = 0.0, 0.0, 0.0
     above, below, both = 0.0, 0.0, 0.0
     for q in range(p, wave.cycle[c + 1]):
-        start, end = tau if q == p else wave.begin[q], wave.finish[q]
-        side = 1 if wave.top[q] > 0.0 else 0
+        start, end = tau if q == p else wave.pieces[q, BEGIN], wave.pieces[q, FINISH]
+        side = 1 if wave.pieces[q, TOP] > 0.0 else 0
         if wants_peak:
-            least, most = sorted_pair(block.amplitude * wave.first[q], block.amplitude * wave.last[q])
+            least, most = sorted_pair(block.amplitude * wave.pieces[q, FIRST], block.amplitude * wave.pieces[q, LAST])
             for i in range(up if side == 1 else down):
                 zero = zeros[1 - side, i]
                 if least < zero < most:
@@ -510,7 +530,7 @@ def continuous(block: Block, options: Options, wave: Wave) -> Motion:
             continue
         if wave.shape[c] != known:
             gain, moved, highest = continuous_cycle(
-                block, wave, c, wave.cycle[c], wave.begin[wave.cycle[c]], options.wants_peak
+                block, wave, c, wave.cycle[c], wave.pieces[wave.cycle[c], BEGIN], options.wants_peak
             )
             known = wave.shape[c]
         later = repeats - 1.0

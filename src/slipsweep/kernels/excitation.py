@@ -17,9 +17,19 @@ import numpy as np
 
 from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
 from slipsweep.kernels.jit import scalar
+from slipsweep.waveforms import TERMS
 
 #: Relative size of the last Newton step of `offset_at`: its square is below rounding.
 _TOLERANCE = 1e-8
+
+
+#: Columns of a table of pieces: the phases at which a piece begins and ends, the same counted from its
+#: anchor (one of the two is 0), w at its beginning, its end and its anchor, the degree of its polynomial
+#: (0 on a plateau, 1 on a straight line), 1 where w jumps up at its beginning, and 1 where it is a quarter
+#: of a sine about its peak, whose closed forms are shorter than its series.
+START, END, BEGIN, FINISH, FIRST, LAST, TOP, DEGREE, JUMPS, ARC = range(10)
+#: c₁, c₂, …; and those of the sum's first and second integral from the anchor, τ² and τ³ on.
+COEFFICIENTS, ONCE, TWICE = range(10, 10 + 3 * TERMS, TERMS)
 
 
 class Wave(NamedTuple):
@@ -27,24 +37,13 @@ class Wave(NamedTuple):
 
     The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike
     (none where `repeats` is 0), then the remaining ones; phases are counted as if the plain cycle
-    came once.  Every array of floats has a row a piece but for the last five.
+    came once.
 
     Attributes
     ----------
-    start, end : ndarray
-        Phases at which pieces begin and end.
-    begin, finish : ndarray
-        The same counted from the anchor; one of the two is 0.
-    first, last, top : ndarray
-        w at the beginning, at the end and at the anchor.
-    degree : ndarray of int
-        Of the polynomial: 0 on a plateau, 1 on a straight line.
-    coefficients, once, twice : ndarray, shape (pieces, terms)
-        c₁, c₂, …; and those of the sum's first and second integral from the anchor, τ² and τ³ on.
-    arc : ndarray of bool
-        Whether it is a quarter of a sine about its peak, whose closed forms are shorter than its series.
-    jumps : ndarray of bool
-        Whether w jumps up at the beginning.
+    pieces : ndarray, shape (pieces, columns)
+        Columns `START` to `ARC` and, each `TERMS` wide, `COEFFICIENTS`, `ONCE` and `TWICE`: one array,
+        because a function that is handed many spends its time, and its compilation, on handing them on.
     cycle : ndarray of int, shape (cycles in the table + 1,)
         First piece of every cycle.
     shape : ndarray of int, shape (cycles in the table,)
@@ -61,19 +60,7 @@ class Wave(NamedTuple):
         Whether what follows the plain cycle is one more of it.
     """
 
-    start: np.ndarray
-    end: np.ndarray
-    begin: np.ndarray
-    finish: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
-    top: np.ndarray
-    degree: np.ndarray
-    coefficients: np.ndarray
-    once: np.ndarray
-    twice: np.ndarray
-    arc: np.ndarray
-    jumps: np.ndarray
+    pieces: np.ndarray
     cycle: np.ndarray
     shape: np.ndarray
     stretch: np.ndarray
@@ -87,46 +74,46 @@ class Wave(NamedTuple):
 @scalar
 def from_top(wave: Wave, p: int, tau: float) -> float:
     """w − top on piece p, τ from its anchor."""
-    if wave.arc[p]:
-        return -wave.top[p] * versine(tau)
+    if wave.pieces[p, ARC] > 0.0:
+        return -wave.pieces[p, TOP] * versine(tau)
     sum_ = 0.0
-    for k in range(wave.degree[p] - 1, -1, -1):
-        sum_ = (sum_ + wave.coefficients[p, k]) * tau
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        sum_ = (sum_ + wave.pieces[p, COEFFICIENTS + k]) * tau
     return sum_
 
 
 @scalar
 def slope(wave: Wave, p: int, tau: float) -> float:
     """dw/dτ on piece p."""
-    if wave.arc[p]:
-        return -wave.top[p] * math.sin(tau)
+    if wave.pieces[p, ARC] > 0.0:
+        return -wave.pieces[p, TOP] * math.sin(tau)
     sum_ = 0.0
-    for k in range(wave.degree[p] - 1, -1, -1):
-        sum_ = sum_ * tau + (k + 1.0) * wave.coefficients[p, k]
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        sum_ = sum_ * tau + (k + 1.0) * wave.pieces[p, COEFFICIENTS + k]
     return sum_
 
 
 @scalar
 def integral(wave: Wave, p: int, start: float, end: float) -> float:
     """∫ (w − top) dτ over a part of piece p."""
-    if wave.arc[p]:
-        return -wave.top[p] * (angle_minus_sine(end) - angle_minus_sine(start))
+    if wave.pieces[p, ARC] > 0.0:
+        return -wave.pieces[p, TOP] * (angle_minus_sine(end) - angle_minus_sine(start))
     sum_start, sum_end = 0.0, 0.0
-    for k in range(wave.degree[p] - 1, -1, -1):
-        sum_start, sum_end = (sum_start + wave.once[p, k]) * start, (sum_end + wave.once[p, k]) * end
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        sum_start, sum_end = (sum_start + wave.pieces[p, ONCE + k]) * start, (sum_end + wave.pieces[p, ONCE + k]) * end
     return sum_end * end - sum_start * start
 
 
 @scalar
 def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
-    if wave.arc[p]:
+    if wave.pieces[p, ARC] > 0.0:
         sine_part = angle_minus_sine(start)
         rest = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
-        return -wave.top[p] * (angle_minus_sine(end) - sine_part), -wave.top[p] * rest
+        return -wave.pieces[p, TOP] * (angle_minus_sine(end) - sine_part), -wave.pieces[p, TOP] * rest
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
-    for k in range(wave.degree[p] - 1, -1, -1):
-        once, twice = wave.once[p, k], wave.twice[p, k]
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        once, twice = wave.pieces[p, ONCE + k], wave.pieces[p, TWICE + k]
         once_start, once_end = (once_start + once) * start, (once_end + once) * end
         twice_start, twice_end = (twice_start + twice) * start, (twice_end + twice) * end
     once_start *= start
@@ -136,20 +123,20 @@ def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, floa
 @scalar
 def plane(wave: Wave, p: int, amplitude: float, tau: float) -> float:
     """The plane's acceleration on piece p, τ from its anchor."""
-    return amplitude * (wave.top[p] + from_top(wave, p, tau))
+    return amplitude * (wave.pieces[p, TOP] + from_top(wave, p, tau))
 
 
 @scalar
 def held_gain(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> float:
     """∫ (x − b) dτ for a held b on piece p: the gain of V."""
-    return (amplitude * wave.top[p] - held) * (end - start) + amplitude * integral(wave, p, start, end)
+    return (amplitude * wave.pieces[p, TOP] - held) * (end - start) + amplitude * integral(wave, p, start, end)
 
 
 @scalar
 def held_integrals(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
     """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on piece p: gains of V and W from rest."""
     width = end - start
-    excess = amplitude * wave.top[p] - held
+    excess = amplitude * wave.pieces[p, TOP] - held
     first, second = integrals(wave, p, start, end)
     return excess * width + amplitude * first, 0.5 * excess * width * width + amplitude * second
 
@@ -157,19 +144,19 @@ def held_integrals(wave: Wave, p: int, amplitude: float, held: float, start: flo
 @scalar
 def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
     """τ at which the plane's acceleration is x on piece p (the nearer end, if x lies beyond)."""
-    far = wave.begin[p] + wave.finish[p]  # one of them is 0
-    wanted = (x - amplitude * wave.top[p]) / amplitude
-    farthest = wave.first[p] + wave.last[p] - 2.0 * wave.top[p]
+    far = wave.pieces[p, BEGIN] + wave.pieces[p, FINISH]  # one of them is 0
+    wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
+    farthest = wave.pieces[p, FIRST] + wave.pieces[p, LAST] - 2.0 * wave.pieces[p, TOP]
     share = wanted / farthest if farthest != 0.0 else 0.0
     if not share > 0.0:
         return 0.0
     if share >= 1.0:
         return far
-    if wave.degree[p] == 1:
+    if int(wave.pieces[p, DEGREE]) == 1:
         return far * share
-    if wave.arc[p]:
+    if wave.pieces[p, ARC] > 0.0:
         return math.copysign(inverse_versine(abs(wanted)), far)
-    tau = far * (math.sqrt(share) if wave.coefficients[p, 0] == 0.0 else share)
+    tau = far * (math.sqrt(share) if wave.pieces[p, COEFFICIENTS + 0] == 0.0 else share)
     low, high = 0.0, far  # from the anchor on
     for _ in range(100):
         over = from_top(wave, p, tau) - wanted
@@ -190,4 +177,4 @@ def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
 @scalar
 def phase_at(wave: Wave, p: int, tau: float) -> float:
     """The phase of τ on piece p, in the table's count."""
-    return wave.start[p] + (tau - wave.begin[p])
+    return wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])

@@ -14,7 +14,7 @@ from slipsweep.equations import CONTINUOUS
 from slipsweep.kernels import cycle
 from slipsweep.kernels.block import NO_VALUE, Block, Options, block_at, response
 from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS
-from slipsweep.kernels.excitation import Wave, held_integrals, phase_at, plane
+from slipsweep.kernels.excitation import BEGIN, END, FINISH, START, Wave, held_integrals, phase_at, plane
 from slipsweep.kernels.jit import scalar
 from slipsweep.kernels.train import beginning, first_pulse
 
@@ -40,9 +40,12 @@ def ground_history(block: Block, options: Options, wave: Wave, phases: np.ndarra
             c = table_cycle(wave, n)
             phi = phases[at] - 2.0 * math.pi * (n - c)
             p = wave.cycle[c]
-            while p + 1 < wave.cycle[c + 1] and wave.end[p] <= phi:
+            while p + 1 < wave.cycle[c + 1] and wave.pieces[p, END] <= phi:
                 p += 1
-            tau = min(max(wave.begin[p] + (phi - wave.start[p]), wave.begin[p]), wave.finish[p])
+            tau = min(
+                max(wave.pieces[p, BEGIN] + (phi - wave.pieces[p, START]), wave.pieces[p, BEGIN]),
+                wave.pieces[p, FINISH],
+            )
             history[at, GROUND] = plane(wave, p, block.amplitude, tau)
 
 
@@ -72,7 +75,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
     longest = 0
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
-    legs = np.zeros((longest * MOST_LEGS + wave.start.size + 2, LEG_COLUMNS))
+    legs = np.zeros((longest * MOST_LEGS + wave.pieces.shape[0] + 2, LEG_COLUMNS))
     at, velocity, displacement = 0, 0.0, 0.0
     k, repeat = first_pulse(block, wave, 0), 0
     stretches = wave.height.size
@@ -124,17 +127,17 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
         c = table_cycle(wave, n)
         offset = 2.0 * math.pi * (n - c)
         for p in range(max(wave.cycle[c], first), wave.cycle[c + 1]):
-            start = began if p == first and n == c else wave.begin[p]
+            start = began if p == first and n == c else wave.pieces[p, BEGIN]
             start_phase = phase_at(wave, p, start) + offset
-            while at < phases.size and phases[at] < wave.end[p] + offset:
+            while at < phases.size and phases[at] < wave.pieces[p, END] + offset:
                 since = max(phases[at] - start_phase, 0.0)
-                gained, moved = cycle.slip_integrals(block, wave, p, start, min(start + since, wave.finish[p]))
+                gained, moved = cycle.slip_integrals(block, wave, p, start, min(start + since, wave.pieces[p, FINISH]))
                 history[at, BLOCK] = response(block, history[at, GROUND])
                 history[at, VELOCITY] = velocity + gained
                 history[at, DISPLACEMENT] = displacement + velocity * since + moved
                 at += 1
-            gained, moved = cycle.slip_integrals(block, wave, p, start, wave.finish[p])
-            displacement += velocity * (wave.finish[p] - start) + moved
+            gained, moved = cycle.slip_integrals(block, wave, p, start, wave.pieces[p, FINISH])
+            displacement += velocity * (wave.pieces[p, FINISH] - start) + moved
             velocity += gained
         if c == wave.lead:
             first = 0 if wave.cycle[c] == 0 else min(first, wave.cycle[c])

@@ -58,7 +58,23 @@ from slipsweep.kernels.block import (
     starting_acceleration,
     whole_lanes,
 )
-from slipsweep.kernels.excitation import Wave, from_top, offset_at, phase_at, plane
+from slipsweep.kernels.excitation import (
+    BEGIN,
+    COEFFICIENTS,
+    DEGREE,
+    END,
+    FINISH,
+    FIRST,
+    JUMPS,
+    LAST,
+    START,
+    TOP,
+    Wave,
+    from_top,
+    offset_at,
+    phase_at,
+    plane,
+)
 from slipsweep.kernels.excitation import slope as w_slope
 from slipsweep.kernels.jit import in_lanes, scalar
 from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
@@ -105,8 +121,8 @@ class Steps(NamedTuple):
 
 def steps_of(wave: Wave, steps_per_cycle: int) -> Steps:
     """Steps of all pieces of a wave, `steps_per_cycle` at least in a cycle."""
-    pieces = wave.first.size
-    length = wave.finish - wave.begin
+    pieces = wave.pieces.shape[0]
+    length = wave.pieces[:, FINISH] - wave.pieces[:, BEGIN]
     count = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
     offset = np.empty(pieces, np.int64)
     parts: list[np.ndarray] = []
@@ -129,14 +145,14 @@ def steps_of(wave: Wave, steps_per_cycle: int) -> Steps:
 def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
     """w at every half step of piece p."""
     # counted from the anchor, so that mirrored pieces have mirrored nodes
-    tau = np.arange(2 * count + 1) * ((wave.finish[p] - wave.begin[p]) / (2 * count))
-    tau = -tau[::-1] if wave.finish[p] == 0.0 else tau
+    tau = np.arange(2 * count + 1) * ((wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]) / (2 * count))
+    tau = -tau[::-1] if wave.pieces[p, FINISH] == 0.0 else tau
     nodes = np.zeros(tau.size)
-    for k in range(wave.degree[p] - 1, -1, -1):
-        nodes = (nodes + wave.coefficients[p, k]) * tau
-    nodes += wave.top[p]
-    nodes[0], nodes[-1] = wave.first[p], wave.last[p]
-    side = math.copysign(1.0, wave.top[p])
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        nodes = (nodes + wave.pieces[p, COEFFICIENTS + k]) * tau
+    nodes += wave.pieces[p, TOP]
+    nodes[0], nodes[-1] = wave.pieces[p, FIRST], wave.pieces[p, LAST]
+    side = math.copysign(1.0, wave.pieces[p, TOP])
     return side * np.maximum(side * nodes, 0.0)
 
 
@@ -158,15 +174,15 @@ def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarr
 @scalar
 def node(steps: Steps, p: int, i: int) -> float:
     """τ on piece p at which step i begins."""
-    return (i if steps.wave.begin[p] == 0.0 else i - steps.counts[p]) * steps.length[p]
+    return (i if steps.wave.pieces[p, BEGIN] == 0.0 else i - steps.counts[p]) * steps.length[p]
 
 
 @scalar
 def kind_of(wave: Wave, p: int) -> int:
     """Whether Üg > 0 does not fall on piece p, falls, or Üg < 0."""
-    if wave.top[p] < 0.0:
+    if wave.pieces[p, TOP] < 0.0:
         return BELOW
-    return RISES if wave.last[p] >= wave.first[p] else FALLS
+    return RISES if wave.pieces[p, LAST] >= wave.pieces[p, FIRST] else FALLS
 
 
 #: A state: V, W, the block's acceleration b, the largest and the least V; whether (1.0 or 0.0) the block
@@ -267,11 +283,11 @@ def rest(block: Block, state: np.ndarray) -> None:
 @scalar
 def layer_of(block: Block, wave: Wave, p: int, state: np.ndarray) -> tuple[float, float]:
     """τ at which the layer of friction on piece p ends (or begins, where |Üg| falls), and its length."""
-    outwards = wave.finish[p] == 0.0
-    near = wave.begin[p] if outwards else wave.finish[p]
-    if state[LAYER] <= block.amplitude * min(abs(wave.first[p]), abs(wave.last[p])):
+    outwards = wave.pieces[p, FINISH] == 0.0
+    near = wave.pieces[p, BEGIN] if outwards else wave.pieces[p, FINISH]
+    if state[LAYER] <= block.amplitude * min(abs(wave.pieces[p, FIRST]), abs(wave.pieces[p, LAST])):
         return near, 0.0
-    end = offset_at(wave, p, block.amplitude, math.copysign(state[LAYER], wave.top[p]))
+    end = offset_at(wave, p, block.amplitude, math.copysign(state[LAYER], wave.pieces[p, TOP]))
     return end, abs(end - near)
 
 
@@ -307,7 +323,7 @@ def tau_within(steps: Steps, p: int, k: int, amplitude: float, x: float) -> floa
     low, high, w_low, w_high = node(steps, p, k), node(steps, p, k + 1), steps.nodes[at], steps.nodes[at + 2]
     if w_low == w_high:
         return low
-    wanted = (x - amplitude * wave.top[p]) / amplitude
+    wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
     rises = w_high > w_low
     tau = low + (high - low) * min(max((x / amplitude - w_low) / (w_high - w_low), 0.0), 1.0)
     for _ in range(60):
@@ -407,8 +423,8 @@ def rise_step(
                 tau, located = tau_within(steps, p, k, amplitude, x), True
             follows = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
             state[FOLLOWS] = 1.0 if follows else 0.0
-            turn = wave.finish[p]
-            if x < state[TOUCH] < amplitude * wave.last[p]:
+            turn = wave.pieces[p, FINISH]
+            if x < state[TOUCH] < amplitude * wave.pieces[p, LAST]:
                 turn = offset_at(wave, p, amplitude, state[TOUCH])
             begin_slide(wave, p, tau, x, held, turn, state)
         cut, x_cut, switches = end, x_end, False
@@ -504,7 +520,7 @@ def rise_steps(
 @scalar
 def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
     """What the beginning of piece p, after a jump upwards or a fall, asks of the block."""
-    x = block.amplitude * wave.first[p]
+    x = block.amplitude * wave.pieces[p, FIRST]
     rises = kind_of(wave, p) == RISES
     if state[SLIDES] > 0.0:
         if block.rise == LITERAL:
@@ -516,15 +532,15 @@ def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
         held = starting_acceleration(block, x)
         if held < x:
             state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
-            begin_slide(wave, p, wave.begin[p], x, held, offset_at(wave, p, block.amplitude, held), state)
+            begin_slide(wave, p, wave.pieces[p, BEGIN], x, held, offset_at(wave, p, block.amplitude, held), state)
 
 
 @scalar
 def asks_anew(wave: Wave, p: int) -> bool:
     """Whether piece p, of Üg > 0, begins by a jump upwards or rises after a fall."""
-    if wave.jumps[p]:
+    if wave.pieces[p, JUMPS] > 0.0:
         return True
-    return kind_of(wave, p) == RISES and p > 0 and kind_of(wave, p - 1) == FALLS and wave.first[p] > 0.0
+    return kind_of(wave, p) == RISES and p > 0 and kind_of(wave, p - 1) == FALLS and wave.pieces[p, FIRST] > 0.0
 
 
 @scalar
@@ -534,18 +550,16 @@ def through_stretch(
     """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of stretch k; flags, if there is no value."""
     wave = steps.wave
     for q in range(p, wave.stretch[k, 1]):
-        x = block.amplitude * wave.first[q]
+        x = block.amplitude * wave.pieces[q, FIRST]
         first = 0
         if q > p or x >= block.yield_acceleration:
-            tau = wave.begin[q]
+            tau = wave.pieces[q, BEGIN]
             if asks_anew(wave, q):
                 arrive(block, wave, q, state)
         else:
             x = block.yield_acceleration
-            first = min(
-                max(int((tau - wave.begin[q]) / (wave.finish[q] - wave.begin[q]) * steps.counts[q]), 0),
-                steps.counts[q] - 1,
-            )
+            share = (tau - wave.pieces[q, BEGIN]) / (wave.pieces[q, FINISH] - wave.pieces[q, BEGIN])
+            first = min(max(int(share * steps.counts[q]), 0), steps.counts[q] - 1)
         if kind_of(wave, q) == RISES:
             rise_steps(block, rule, options, steps, q, first, tau, x, state)
         elif state[SLIDES] > 0.0:
@@ -560,15 +574,15 @@ def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, 
     """From the beginning of piece q (t5) to τ on piece p, integrating on."""
     wave = steps.wave
     state[RESTED] = math.inf
-    for piece in range(q, min(p + 1, wave.first.size)):
+    for piece in range(q, min(p + 1, wave.pieces.shape[0])):
         h, whole = steps.length[piece], steps.counts[piece]
         if piece == p:
-            whole = int((tau - wave.begin[piece]) / h)
+            whole = int((tau - wave.pieces[piece, BEGIN]) / h)
         hold_steps(rule, block.amplitude, steps.nodes, steps.offset[piece], whole, h, state)
         if piece == p and state[SLIDES] > 0.0 and tau > node(steps, piece, whole):
             hold_step(block, rule, wave, piece, node(steps, piece, whole), tau, state)
         if state[SLIDES] == 0.0:
-            state[RESTED] = wave.end[piece]
+            state[RESTED] = wave.pieces[piece, END]
             return
 
 
@@ -580,17 +594,19 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
     p, tau = beginning(block, wave, k)
     if velocity > 0.0:
         state[VELOCITY] = state[PEAK] = state[LEAST] = velocity
-        state[HELD] = starting_acceleration(block, max(block.amplitude * wave.first[p], block.yield_acceleration))
+        state[HELD] = starting_acceleration(
+            block, max(block.amplitude * wave.pieces[p, FIRST], block.yield_acceleration)
+        )
         state[SLIDES], state[FOLLOWS] = 1.0, 1.0 if block.rise == LITERAL else 0.0
     validity = through_stretch(block, rule, options, steps, k, p, tau, state)
     if validity:
         return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, validity)
     if state[SLIDES] > 0.0:
         q, last = wave.stretch[k, 1], following >= wave.height.size
-        p, tau = wave.first.size, 0.0
+        p, tau = wave.pieces.shape[0], 0.0
         if not last:
             p, tau = beginning(block, wave, following)
-        started = wave.start[q] if q < wave.start.size else wave.end[q - 1]
+        started = wave.pieces[q, START] if q < wave.pieces.shape[0] else wave.pieces[q - 1, END]
         if options.recoupling == INTEGRATE:
             recouple(block, rule, steps, q, p, tau, state)
         else:
@@ -613,7 +629,7 @@ def continuous_step(
     """From τ = start to end on piece p with Eq. 4 throughout, finer in a layer of friction."""
     layer, length = layer_of(block, wave, p, state)
     edge = min(max(layer, start), end)
-    outwards = wave.finish[p] == 0.0
+    outwards = wave.pieces[p, FINISH] == 0.0
     finest = max(_SHARE_OF_CYCLE / options.steps_per_cycle * length, _LEAST_STEP)
     for first, last, within in ((start, edge, outwards), (edge, end, not outwards)):
         parts = 1 if last > first else 0
@@ -637,7 +653,7 @@ def continuous_step(
 @scalar
 def sided_slip(block: Block, wave: Wave, p: int, x: float) -> float:
     """D at Üg = x on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
-    return slip(block, math.copysign(x, wave.top[p]))
+    return slip(block, math.copysign(x, wave.pieces[p, TOP]))
 
 
 #: The first rows of the lanes' states, and the rows of the lanes beside the block's: D (or E) at the last node,
@@ -760,12 +776,12 @@ def lockstep_fall(
 def until_next(block: Block, wave: Wave, p: int) -> float:
     """Phase from the beginning of piece p to where Üg next comes to Üy on the rise, or jumps past it."""
     waited = 0.0
-    for q in range(p, wave.first.size):
-        if block.amplitude * max(wave.first[q], wave.last[q]) > block.yield_acceleration:
-            if block.amplitude * wave.first[q] >= block.yield_acceleration:
+    for q in range(p, wave.pieces.shape[0]):
+        if block.amplitude * max(wave.pieces[q, FIRST], wave.pieces[q, LAST]) > block.yield_acceleration:
+            if block.amplitude * wave.pieces[q, FIRST] >= block.yield_acceleration:
                 return waited
-            return waited + (offset_at(wave, q, block.amplitude, block.yield_acceleration) - wave.begin[q])
-        waited += wave.finish[q] - wave.begin[q]
+            return waited + (offset_at(wave, q, block.amplitude, block.yield_acceleration) - wave.pieces[q, BEGIN])
+        waited += wave.pieces[q, FINISH] - wave.pieces[q, BEGIN]
     return math.inf
 
 
@@ -778,7 +794,7 @@ def stick_slip_cycle(
     literally(rule)
     columns = states.reshape((_STATE_SIZE, TILE))
     wave = steps.wave
-    pieces = wave.first.size
+    pieces = wave.pieces.shape[0]
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
         kind = kind_of(wave, p)
         before = BELOW if p == 0 else kind_of(wave, p - 1)
@@ -798,8 +814,8 @@ def stick_slip_cycle(
             lockstep_fall(count, rule, options, steps, p, cells, where, lanes, states)
         elif before != BELOW:
             pause, q = 0.0, p
-            while q < pieces and wave.top[q] < 0.0:
-                pause += wave.finish[q] - wave.begin[q]
+            while q < pieces and wave.pieces[q, TOP] < 0.0:
+                pause += wave.pieces[q, FINISH] - wave.pieces[q, BEGIN]
                 q += 1
             for j in range(count):
                 if states[_SLIDES + j] > 0.0:
@@ -812,7 +828,7 @@ def stick_slip_cycle(
                     states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
                     if left > 0.0:
                         set_aside(lanes, states, j)
-        if kind == BELOW and p + 1 < pieces and wave.top[p + 1] > 0.0:
+        if kind == BELOW and p + 1 < pieces and wave.pieces[p + 1, TOP] > 0.0:
             for j in range(count):
                 if states[_SLIDES + j] > 0.0:
                     set_aside(lanes, states, j)
@@ -879,7 +895,7 @@ def continuous_cycle(
         starting = False
         for j in range(count):
             starting = starting | (states[_SLIDES + j] == 0.0)
-        at, side = steps.offset[p], math.copysign(1.0, wave.top[p])
+        at, side = steps.offset[p], math.copysign(1.0, wave.pieces[p, TOP])
         h = steps.length[p]
         for j in range(count):
             lanes[_ASKED + j] = lane_slip(lanes, j, lanes[AMPLITUDE + j] * nodes[at], side, g)
@@ -945,7 +961,7 @@ def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int,
         lanes[_GAIN + j] = 0.0
     stride = 1 if rule == SIMPSON else 2
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
-        if wave.top[p] > 0.0:
+        if wave.pieces[p, TOP] > 0.0:
             at, last = steps.offset[p], 2 * steps.counts[p]
             for k in range(0, last + 1, stride):
                 # what the step before k and that behind it give the node

@@ -19,7 +19,7 @@ from slipsweep.kernels.block import (
     Options,
     stays_below_yield,
 )
-from slipsweep.kernels.excitation import Wave, offset_at
+from slipsweep.kernels.excitation import BEGIN, END, FIRST, LAST, Wave, offset_at
 from slipsweep.kernels.jit import scalar
 
 
@@ -61,10 +61,10 @@ def first_pulse(block: Block, wave: Wave, k: int) -> int:
 def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
     """Where in stretch k the plane's acceleration comes to Üy or jumps past it: a piece, and τ on it."""
     p = wave.stretch[k, 0]
-    while block.amplitude * max(wave.first[p], wave.last[p]) <= block.yield_acceleration:
+    while block.amplitude * max(wave.pieces[p, FIRST], wave.pieces[p, LAST]) <= block.yield_acceleration:
         p += 1
-    if block.amplitude * wave.first[p] >= block.yield_acceleration:
-        return p, wave.begin[p]
+    if block.amplitude * wave.pieces[p, FIRST] >= block.yield_acceleration:
+        return p, wave.pieces[p, BEGIN]
     return p, offset_at(wave, p, block.amplitude, block.yield_acceleration)
 
 
@@ -138,7 +138,7 @@ def train_of(
             if before == 0.0 and velocity == 0.0:
                 displacement += left * now.displacement
                 # what follows is one more of the same, if the end of the shaking comes too late to matter
-                if wave.alike and now.rested <= wave.end[wave.cycle[wave.lead + 1] - 1]:
+                if wave.alike and now.rested <= wave.pieces[wave.cycle[wave.lead + 1] - 1, END]:
                     return Motion(displacement + now.displacement, peak, validity)
                 break
             if now.least > 0.0:
@@ -161,7 +161,7 @@ def train_of(
                 seen_velocity, seen_displacement, seen_at = velocity, displacement, done
                 next_look *= 2
         if validity & NO_VALUE == 0:
-            now, after = pulses(block, options, wave, table, after, wave.start.size, velocity)
+            now, after = pulses(block, options, wave, table, after, wave.pieces.shape[0], velocity)
             validity |= now.validity
             displacement += now.displacement
             peak = max(peak, now.peak)
