@@ -177,12 +177,22 @@ class _Compiler(numba.core.compiler.Compiler):
 
 
 class _Part(JITCodeLibrary):
-    """What a kernel is made of: never machine code by itself, since nothing calls it but kernels with copies of it."""
+    """What a kernel is made of: no machine code by itself, since nothing calls it but kernels, which have copies.
+
+    Making none, and leaving all but numba's cheap passes to the kernel, takes two fifths off the first
+    compilation (29.6 s to 17.4 s); without any passes the kernels come out slower.
+    """
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager(
+            loop_vectorize=False, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
+        )
+        passes.run(self._final_module, builder)
 
     def get_pointer_to_function(self, name: str) -> int:
         return 0
