@@ -59,8 +59,8 @@ Fault: TypeAlias = Callable[[Path, random.Random, Values], int]
 
 _COMMAND = """
 import sys
-from slipsweep import blocks, store
-store.BLOCK_CELLS = int(sys.argv[1])
+from slipsweep import blocks
+blocks.BLOCK_CELLS = int(sys.argv[1])
 blocks.cells_shared = lambda *arguments: int(sys.argv[1])
 from slipsweep.cli import main
 sys.exit(main(["run", "a.toml", "-q", *sys.argv[2:]]))
@@ -308,7 +308,7 @@ def limited_file_size(folder: Path, rng: random.Random, expected: Values) -> int
 _REVOKING = """
 import contextlib, io, json, os, sys, tempfile
 from pathlib import Path
-from slipsweep import store
+from slipsweep import blocks
 from slipsweep.cli import main
 text = Path("a.toml").read_text()
 with tempfile.TemporaryDirectory() as folder:
@@ -317,7 +317,7 @@ with tempfile.TemporaryDirectory() as folder:
 if os.getuid() == 0:
     os.setgid(65534)
     os.setuid(65534)
-store.BLOCK_CELLS = int(sys.argv[1])
+blocks.BLOCK_CELLS = int(sys.argv[1])
 for name, mode in json.loads(sys.argv[2]):
     path = Path(name)
     before = path.stat().st_mode

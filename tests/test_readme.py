@@ -233,6 +233,7 @@ def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
         ("## `[[cases]]`", spec.Case),
         ("## `[model]`", spec.Model),
         ("## `[excitation]`", spec.Excitation),
+        ("## `[excitation.harmonics]`", spec.Harmonics),
         ("## `[solver]`", spec.Solver),
         ("## `[output]`", spec.Output),
         ("## `[uncertainty]`", spec.Uncertainty),
@@ -246,7 +247,9 @@ def test_keys_are_those_of_the_schema(heading: str, table: Any) -> None:
         assert list(axes) == list(spec.Axes.model_fields)
     for name, field in table.model_fields.items():
         default = keys[name][2].strip("`")
-        if field.default is not None:
+        if field.is_required():
+            assert default == "–", name
+        elif field.default is not None:
             assert default.replace('"', "'") == (repr(field.default)), name
 
 

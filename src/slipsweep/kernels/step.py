@@ -295,12 +295,13 @@ def layer_of(block: Block, wave: Wave, p: int, state: np.ndarray) -> tuple[float
 def longest_step(block: Block, options: Options, wave: Wave, p: int, tau: float, x: float, state: np.ndarray) -> float:
     """The longest step from τ on that resolves a slide just begun and a layer of friction on the rise.
 
-    It grows with the time since the slide's onset.
+    It grows with the time since the slide's onset, but not before the short slides end that stop soon after
+    the peak: over steps of one length the rectangle's errors on the way up and down cancel.
     """
     share, longest = _SHARE_OF_CYCLE / options.steps_per_cycle, math.inf
     phi = phase_at(wave, p, tau)
     if phi < state[REACH]:
-        longest = share * max(state[LENGTH], phi - state[ONSET])
+        longest = share * max(state[LENGTH], 0.25 * (phi - state[ONSET]))
     if x < state[LAYER]:
         longest = min(longest, share * layer_of(block, wave, p, state)[1])
     return max(longest, _LEAST_STEP)
@@ -313,7 +314,7 @@ def begin_slide(wave: Wave, p: int, tau: float, x: float, held: float, turn: flo
     state[SLIDES] = 1.0
     phi, length = phase_at(wave, p, tau), turn - tau
     state[ONSET], state[LENGTH] = phi, length
-    state[REACH] = phi + _SHORTEST if length < _SHORTEST else -math.inf
+    state[REACH] = phi + 4.0 * _SHORTEST if length < _SHORTEST else -math.inf
 
 
 @scalar
