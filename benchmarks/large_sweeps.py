@@ -170,7 +170,7 @@ def overhead(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
 def workers(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
     """The step solver on processes: one worker, two, and threads of one process."""
     lengths = [4, 4, 8, 1] if tiny else [50, 50, 400, 1]
-    more = '[solver]\nmethod = "step"\nrule = "simpson"\nsteps_per_cycle = 1024\n'
+    more = '[solver]\nmethod = "step"\nrule = "simpson"\nsteps_per_cycle = 4096\n'
     sweep = sweep_file(folder / "step.toml", lengths, more)
     options = {"--workers 1": ["--workers", "1"], "--workers 2": ["--workers", "2"], "threads": []}
     run(sweep)
@@ -196,7 +196,7 @@ def workers(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
     text = (
         f"### {np.prod(lengths):,} cells by the step solver, on processes\n\n"
         + table(["", "s", "of it start-up", "times as fast as one worker", "without start-up"], rows)
-        + f"\nSimpson's rule, 1024 steps a cycle, on a machine of {cores()} cores.\n"
+        + f"\nSimpson's rule, 4096 steps a cycle, on a machine of {cores()} cores.\n"
     )
     return text, {"one_s": seconds[one], "two_s": seconds["--workers 2"]}
 

@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from slipsweep.elementary import versine
 from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     EVENT_TOLERANCE,
@@ -43,7 +44,9 @@ from slipsweep.kernels.block import (
     starting_acceleration,
 )
 from slipsweep.kernels.excitation import (
+    ARC,
     BEGIN,
+    COEFFICIENTS,
     DEGREE,
     END,
     FINISH,
@@ -117,6 +120,24 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> tuple[f
     )
 
 
+@scalar
+def at_nodes(wave: Wave, p: int, amplitude: float, start: float, width: float, x: np.ndarray) -> None:
+    """Fill in |Üg| at the nodes of the quadrature from `start` on: power by power, so that the nodes are lanes."""
+    top = wave.pieces[p, TOP]
+    if wave.pieces[p, ARC] > 0.0:
+        for node in range(NODES.size):
+            x[node] = amplitude * (1.0 - versine(start + width * NODES[node]))
+        return
+    for node in range(NODES.size):
+        x[node] = 0.0
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        coefficient = wave.pieces[p, COEFFICIENTS + k]
+        for node in range(NODES.size):
+            x[node] = (x[node] + coefficient) * (start + width * NODES[node])
+    for node in range(NODES.size):
+        x[node] = amplitude * abs(top + x[node])
+
+
 @summed
 def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) -> tuple[float, float, float, float]:
     """What Eq. 4 takes the block behind the plane over a part of piece p.
@@ -136,17 +157,18 @@ def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) ->
     e_foldings = decay * abs(x_end - x_start)
     near, far = (start, end) if rising else (end, start)
     first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
+    values = np.empty(NODES.size)
     for bound in PANEL_BOUNDS:
         until = far
         if e_foldings > bound:
             until = offset_at(wave, p, amplitude, math.copysign(least + bound / decay, wave.pieces[p, TOP]))
         width = until - near
+        at_nodes(wave, p, amplitude, near, width, values)
         for node in range(NODES.size):
-            tau = near + width * NODES[node]
-            x = abs(plane(wave, p, amplitude, tau))
+            x = values[node]
             mu = friction(block, x)
             weight = abs(width) * WEIGHTS[node]
-            left = end - tau
+            left = end - (near + width * NODES[node])
             lag, lag_x = weight * (mu_s - mu), weight * x * (kept - mu)
             first += lag
             second += left * lag
