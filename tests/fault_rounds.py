@@ -459,8 +459,12 @@ def can_be_done(name: str) -> str:
         return "only root mounts a small file system, on Linux"
     if fault in (worker_killed, killed_with_workers) and not Path("/proc/self/stat").exists():
         return "finds the workers in /proc"
-    if fault is revoked_rights and os.getuid() == 0 and sys.platform != "linux":
-        return "root gives its rights away as on Linux"
+    if fault is revoked_rights and os.getuid() == 0:
+        if sys.platform != "linux":
+            return "root gives its rights away as on Linux"
+        installed = (Path(sys.prefix), Path(store.__file__).parent)
+        if any(folder.stat().st_mode & 0o5 != 0o5 for path in installed for folder in (path, *path.parents)):
+            return "root gives its rights away, and others may not read this installation"
     return ""
 
 

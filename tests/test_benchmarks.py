@@ -34,6 +34,8 @@ def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
     [pytest.param(name, marks=pytest.mark.slow if name == "large_sweeps" else ()) for name in WRITES],
 )
 def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if name == "records":
+        pytest.importorskip("pynewmarkdisp")  # of the extra `bench`
     # the outside solvers that compile take most of a minute
     monkeypatch.setitem(sys.modules, "diffrax", None)
     monkeypatch.setitem(sys.modules, "CyRK", None)
