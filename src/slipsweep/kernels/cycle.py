@@ -86,7 +86,7 @@ STATE_SIZE = 8
 
 #: Kinds of legs, and the columns of a record of them, which `history` samples: kind, piece, phase on
 #: it and in the table at the start, phase at the end, b, V and W.
-STICK, HOLD, FOLLOW, ATTENUATE = range(4)
+HOLD, FOLLOW, ATTENUATE = range(3)
 LEG_COLUMNS = 8
 
 

@@ -6,8 +6,7 @@ not out of a subtraction of two numbers near 1, and keep their digits however sm
 (near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
 smooth waves are cut so short that the series are exact to rounding (`slipsweep.waveforms`, which
 fills the table): one form for all waveforms.  Only the series of a plain sine has a name, and is
-evaluated by it (a slide of many pulses takes a fifth of the time).  Times the amplitude A it is the plane's
-acceleration x.
+evaluated by its shorter closed forms.  Times the amplitude A it is the plane's acceleration x.
 """
 
 import math
