@@ -22,6 +22,7 @@ from slipsweep.kernels.block import (
     DECAY_RATE,
     DELTA_MU,
     EQ4_BELOW_YIELD,
+    EVENT_TOLERANCE,
     INTEGRATE,
     LANE_ROWS,
     MONOTONE,
@@ -71,11 +72,12 @@ _X, _LEVEL, _START, _V, _W, _HELD, _RATE, _MOMENT, _PSI, _LEFT, _PEAK, _CONVERGE
 )
 #: What a first pulse leaves to the pulses after it: V carried on, W up to then, W if it were the
 #: last, t1 and the largest V; and, of a pulse
-#: entered in motion, V as it is slowest, what V gains, and how many such pulses follow each other.
-_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _SLOWEST, _GAIN, _MOST = range(
-    (LANE_ROWS + 13) * TILE, (LANE_ROWS + 21) * TILE, TILE
+#: entered in motion, whether a hold brings it through, V as that is slowest, V and W at the peak, what V
+#: gains, and how many such pulses follow each other.
+_CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _THROUGH, _SLOWEST, _AT_PEAK, _TO_PEAK, _GAIN, _MOST = range(
+    (LANE_ROWS + 13) * TILE, (LANE_ROWS + 24) * TILE, TILE
 )
-_LANES_SIZE = (LANE_ROWS + 21) * TILE
+_LANES_SIZE = (LANE_ROWS + 24) * TILE
 
 #: Rows of a tile's blocks beside the lanes': the codes, and the way a cell goes.
 _MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
@@ -109,6 +111,9 @@ _QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) fo
 #: result squared again).  A lane that has taken it stays where it is, whatever its neighbours do.
 _LANE_TOLERANCE = 1e-7
 _MOST_ITERATIONS = 16
+
+#: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
+_MOST_PULSES = 64
 
 
 @in_lanes
@@ -467,7 +472,7 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
             for row in range(0, _LANES_SIZE, TILE):
                 lanes[row + used] = lanes[row + lane]
             used += 1
-    fill_up(used, LANE_ROWS + 21, lanes)
+    fill_up(used, _LANES_SIZE // TILE, lanes)
     return used
 
 
@@ -487,13 +492,14 @@ def lane_carried(options: Options, lanes: np.ndarray) -> None:
     lane_rise(_FOLLOWS, options.g, lanes)
     for j in range(STRIP):
         amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j], lanes[_CARRIED + j]
-        slowest = rising_phase(held, amplitude)
+        slowest = rising_phase(min(held, lanes[_X + j]), amplitude)
         lanes[_SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
         # held until past its slowest, or else Eq. 4 itself slows it
-        through = (held < amplitude) & (lanes[_X + j] >= held)
-        lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if through else 0.0
+        through = (held >= amplitude) | (lanes[_X + j] >= held)
+        lanes[_THROUGH + j] = lanes[_CONVERGED + j] if through else 0.0
         lanes[_W + j] += -carried * began
         lanes[_V + j] += carried
+        lanes[_AT_PEAK + j], lanes[_TO_PEAK + j] = lanes[_V + j], lanes[_W + j]
     lane_fall(options.wants_peak, lanes)
     for j in range(STRIP):
         # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
@@ -541,14 +547,126 @@ def lane_carried(options: Options, lanes: np.ndarray) -> None:
         slides = sliding_on if stops else lane_series(lanes, j, braked, gain, most - 1.0)
         period = lanes[_MOVED + j] + again + (slides if most > 0.0 else 0.0)
         tail = lanes[_MOVED + j] + lane_series(lanes, j, braked, gain, rest - 1.0)
-        lanes[_W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if rest > 0.0 else lanes[_LAST + j])
         # the slides through all reach t5, as the first does
-        alike = (lanes[_CONVERGED + j] > 0.0) & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
-        solved = ((most == 0.0) | alike) & (lanes[_X + j] > 0.0) & ((not stops) | (psi < lanes[_ONSET + j]))
-        lanes[_CONVERGED + j] = 1.0 if solved else 0.0
+        gets_over = (lanes[_LEVEL + j] < lanes[AMPLITUDE + j]) & (lanes[_CONVERGED + j] * lanes[_THROUGH + j] > 0.0)
+        alike = gets_over & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
+        repeats = ((most == 0.0) | alike) & (lanes[_X + j] > 0.0) & ((not stops) | (psi < lanes[_ONSET + j]))
+        lanes[_W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if rest > 0.0 else lanes[_LAST + j])
         highest = lanes[_PEAK + j] + max(gain, 0.0) * max(rest - 1.0, 0.0)
         lanes[_PEAK + j] = max(lanes[_HIGHEST + j], highest if most > 0.0 else 0.0)
+        # -1: each pulse has to be followed
+        lanes[_CONVERGED + j] = 1.0 if repeats else -1.0
         lanes[_CODE + j] = NOT_RECOUPLED
+    if later <= _MOST_PULSES:
+        for j in range(STRIP):
+            if lanes[_CONVERGED + j] < 0.0:
+                follow_pulses(options, lanes, j)
+
+
+@scalar
+def held_stop(lanes: np.ndarray, j: int, velocity: float) -> float:
+    """ψ at which the hold from Üy on, entered with `velocity`, stops before its slowest; NaN if not found."""
+    amplitude, held, began = lanes[AMPLITUDE + j], lanes[_LEVEL + j], lanes[BEGAN + j]
+    psi = began
+    for _ in range(_MOST_ITERATIONS):
+        over = velocity + held_motion(amplitude, held, began, psi)[0]
+        step = over / (amplitude - held - amplitude * versine(psi))
+        psi -= step
+        if abs(step) <= EVENT_TOLERANCE * (psi - began):
+            return psi
+    return math.nan
+
+
+@summed
+def followed_to_peak(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float]:
+    """V and W gained from rest at ψ = `start` to the peak by Eq. 4."""
+    rate, moment = 0.0, 0.0
+    for node in range(_LANE_NODES.size):
+        left = 1.0 - _LANE_NODES[node]
+        x = lanes[AMPLITUDE + j] * (1.0 - versine(start * left))
+        weighted = _LANE_WEIGHTS[node] * lane_slip(lanes, j, x, g)
+        rate += weighted
+        moment += left * weighted
+    return -start * rate, start * start * moment
+
+
+@scalar
+def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float, float]:
+    """b at the peak, and V and W gained there, of a lane that starts to slide at ψ = `start`, beyond t1; or NaN."""
+    amplitude = lanes[AMPLITUDE + j]
+    asked, slope = lane_response_and_slope(lanes, j, amplitude * (1.0 - versine(start)), g)
+    level = max(lanes[YIELD + j], asked)
+    at_peak, slope_at_peak = lane_response_and_slope(lanes, j, amplitude, g)
+    if at_peak <= level:
+        return level, *held_motion(amplitude, level, start, 0.0)
+    psi = start
+    if slope <= 0.0 or asked < level:  # as in `lane_switch`
+        x, step = amplitude - (at_peak - level) / slope_at_peak, math.inf
+        for _ in range(_MOST_ITERATIONS):
+            if abs(step) <= EVENT_TOLERANCE * min(x, amplitude - x):
+                break
+            asked, slope = lane_response_and_slope(lanes, j, x, g)
+            step = (asked - level) / slope
+            x -= step
+        else:
+            return math.nan, math.nan, math.nan
+        psi = max(rising_phase(x, amplitude), start)
+    held_on = held_motion(amplitude, level, start, psi)
+    followed = followed_to_peak(lanes, j, psi, g)
+    return at_peak, held_on[0] + followed[0], held_on[1] - held_on[0] * psi + followed[1]
+
+
+@scalar
+def fall_stop(amplitude: float, held: float, at_peak: float, highest: float, top: float) -> float:
+    """ψ after the peak at which V = `at_peak` there, largest at ψ = `top`, is used up by the hold; NaN if not found."""
+    psi = top + math.sqrt(2.0 * highest / (amplitude * (top - angle_minus_sine(top))))  # beyond it
+    for _ in range(_MOST_ITERATIONS):
+        psi = min(psi, _HALF_PI)
+        over = at_peak + held_motion(amplitude, held, 0.0, psi)[0]
+        step = over / (amplitude - held - amplitude * versine(psi))
+        psi -= step
+        if abs(step) <= EVENT_TOLERANCE * psi:
+            return psi
+    return math.nan
+
+
+@scalar
+def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
+    """All cycles of a lane of `lane_carried` that stops between t1 and Üg = b, so that no pulse is like another.
+
+    It restarts at once; the other pulses are those that `lane_carried` knows.
+    """
+    amplitude, began, carried = lanes[AMPLITUDE + j], lanes[BEGAN + j], lanes[_CARRIED + j]
+    moved, highest, velocity = lanes[_MOVED + j], lanes[_HIGHEST + j], carried
+    for later in range(options.cycles - 2, -1, -1):
+        if velocity > 0.0 and lanes[_SLOWEST + j] + velocity - carried > 0.0:
+            if lanes[_THROUGH + j] == 0.0:
+                return
+            held, at_peak = lanes[_HELD + j], lanes[_AT_PEAK + j] + (velocity - carried)
+            moved += lanes[_TO_PEAK + j] - (velocity - carried) * began
+        else:
+            stop = began
+            if velocity > 0.0:
+                stop = held_stop(lanes, j, velocity)
+                moved += velocity * (stop - began) + held_motion(amplitude, lanes[_LEVEL + j], began, stop)[1]
+            if stop <= lanes[_ONSET + j]:
+                moved += lanes[_MOVED + j] if later > 0 else lanes[_LAST + j]
+                velocity = carried
+                continue
+            held, at_peak, gained = restart(lanes, j, stop, options.g)
+            moved += gained
+        top = -rising_phase(held, amplitude)
+        peak = at_peak + held_motion(amplitude, held, 0.0, top)[0]
+        left = at_peak + held_motion(amplitude, held, 0.0, _HALF_PI)[0]
+        end = _HALF_PI if left > 0.0 else fall_stop(amplitude, held, at_peak, peak, top)
+        moved += at_peak * end + held_motion(amplitude, held, 0.0, end)[1]
+        left = max(left, 0.0)
+        velocity = max(left - held * pause_of(began), 0.0) if later > 0 else 0.0
+        moved += slid(left, velocity, held)
+        highest = max(highest, peak)
+    # NaN where an iteration has not converged
+    if moved >= 0.0:
+        lanes[_W + j], lanes[_PEAK + j], lanes[_CONVERGED + j] = moved, highest, 1.0
 
 
 @scalar
