@@ -270,6 +270,32 @@ def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cyc
     assert int(result.validity) & Validity.NOT_RECOUPLED
 
 
+def test_pulses_that_stop_anew() -> None:
+    """Carried on, the block stops between t1 and Üg = b and restarts at once, elsewhere in every pulse."""
+    cells = [(10.51, 0.2, 0.661), (11.53, 0.214, 1.057), (13.2, 0.243, 1.114), (16.6, 0.3, 1.625), (19.7, 0.371, 2.305)]
+    for theta, mu_s, amplitude in cells:
+        cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0}
+        grown = []
+        for cycles in range(1, 9):
+            expected = reference.solve(**cell, cycles=cycles)
+            result = slipsweep.sweep(**cell, cycles=cycles, solver="cycle")
+            for name in ("permanent_displacement", "peak_relative_velocity"):
+                right = float(getattr(expected, name))
+                assert abs(float(result[name]) / right - 1) <= 1e-12, f"{name} of {cell}, {cycles} cycles"
+            grown.append(float(result.permanent_displacement))
+        assert np.ptp(np.diff(grown)) > 0.1 * grown[0], f"cycles of {cell} are alike"
+
+
+def test_pulses_that_stop_anew_as_event_by_event() -> None:
+    """A sweep follows them by what its lanes know of a pulse, a time history from event to event."""
+    theta, mu_s = 10.508, 0.2
+    amplitude = np.linspace(0.055, 0.12, 131) * strategies.G
+    swept = slipsweep.sweep(theta=theta, mu_s=mu_s, amplitude=amplitude, frequency=1.0, cycles=20)
+    for value, u in zip(amplitude, swept.permanent_displacement.values.ravel(), strict=True):
+        history = slipsweep.simulate(theta=theta, mu_s=mu_s, amplitude=value, frequency=1.0, cycles=20)
+        assert abs(u / float(history.relative_displacement[-1]) - 1) <= 1e-11
+
+
 @strategies.reproducible
 @given(
     cell=strategies.given_friction(),

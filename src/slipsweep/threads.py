@@ -21,9 +21,9 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 import numba
 
 #: Cells of the cycle solver that one call of a kernel takes: long enough to hide the call
-#: (some 20 µs), short enough that Ctrl-C is heard and that threads finish together.
+#: (some 20 µs), short enough that Ctrl-C is heard.
 MOST_CELLS_PER_CALL = 65536
-LEAST_CELLS_PER_CALL = 1024
+LEAST_CELLS_PER_CALL = 2048
 
 
 def thread_count() -> int:
@@ -58,20 +58,22 @@ def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1)
         What a cell takes, in cells of the cycle solver.
     """
     threads = thread_count()
-    share = -(-cells // (4 * threads))
-    size = max(min(max(share, LEAST_CELLS_PER_CALL // work_per_cell), MOST_CELLS_PER_CALL // work_per_cell), 1)
-    starts = iter(range(0, cells, size))
+    least, most = max(LEAST_CELLS_PER_CALL // work_per_cell, 1), max(MOST_CELLS_PER_CALL // work_per_cell, 1)
+    taken = 0
     taking, over = threading.Lock(), threading.Event()
 
     def take_parts() -> None:
+        nonlocal taken
         while not over.is_set():
             with taking:
-                first = next(starts, None)
-            if first is None:
+                # ever smaller ones, so that the threads finish together
+                first = taken
+                last = taken = min(first + min(max((cells - first) // (2 * threads), least), most), cells)
+            if first == last:
                 return
-            work(first, min(first + size, cells))
+            work(first, last)
 
-    if min(threads, -(-cells // size)) <= 1:
+    if threads == 1 or cells <= least:
         take_parts()
         return
     with ThreadPoolExecutor(threads) as pool:

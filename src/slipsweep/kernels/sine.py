@@ -37,11 +37,11 @@ from slipsweep.kernels.block import (
     Motion,
     Options,
     block_at,
-    block_of,
     cell_of,
+    decay_rate_of,
     friction,
+    interface_of,
     lane_friction,
-    lane_of,
     lane_response,
     lane_slip,
     opposite,
@@ -79,9 +79,9 @@ _CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _THROUGH, _SLOWEST, _AT_PEAK, _TO_PEA
 )
 _LANES_SIZE = (LANE_ROWS + 24) * TILE
 
-#: Rows of a tile's blocks beside the lanes': the codes, and the way a cell goes.
-_MODE, _VALIDITY, _WAY = range(LANE_ROWS * TILE, (LANE_ROWS + 3) * TILE, TILE)
-_BLOCKS_SIZE = (LANE_ROWS + 3) * TILE
+#: Rows of a tile's blocks beside the lanes': the codes, the way a cell goes, μmin, and E at Üg = Üy and at the peak.
+_MODE, _VALIDITY, _WAY, _LEAST_FRICTION, _AT_START, _AT_END = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
+_BLOCKS_SIZE = (LANE_ROWS + 6) * TILE
 
 #: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak;
 #: held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other,
@@ -255,27 +255,29 @@ def drift_integral(block: Block) -> float:
 
 
 @in_lanes
-def way_of(block: Block, options: Options, at_start: float, at_end: float) -> int:
-    """Which way a cell goes, given E at Üg = Üy and at the peak."""
-    decay = block.decay_rate / block.g
-    start, end = block.yield_acceleration, block.amplitude
+def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
+    """Which way a cell goes."""
+    at_start, at_end, mode = blocks[_AT_START + j], blocks[_AT_END + j], blocks[_MODE + j]
+    decay = blocks[DECAY_RATE + j] / options.g
+    start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
     gentle = decay * end <= _LANE_E_FOLDINGS
     # either E is convex, hence D concave, and as D > 0 at the peak it stays positive once it is;
     # or 0 < dE/dx < 1, by bounds with the largest friction and normal acceleration
-    tan_theta, most = block.tan_theta, block.mu_s + block.delta_mu
-    convex = block.decay_rate >= 2.0 * tan_theta
-    rises = most * (decay * (block.g + end * tan_theta) - tan_theta) < eq.limit_denominator(block.mu_s, tan_theta)
-    lags = most * (tan_theta - block.decay_rate) <= tan_theta * (block.mu_s - tan_theta)
+    tan_theta, mu_s = blocks[TAN_THETA + j], blocks[MU_S + j]
+    most = mu_s + blocks[DELTA_MU + j]
+    convex = blocks[DECAY_RATE + j] >= 2.0 * tan_theta
+    rises = most * (decay * (options.g + end * tan_theta) - tan_theta) < eq.limit_denominator(mu_s, tan_theta)
+    lags = most * (tan_theta - blocks[DECAY_RATE + j]) <= tan_theta * (mu_s - tan_theta)
     smooth = (options.rise == MONOTONE) & (at_end < end) & (convex | (rises & lags))
     sticks_or_follows = _STICKS if at_start >= start else _FOLLOWS
     way = sticks_or_follows if gentle else _OTHER
     way = _YIELD_GOVERNS if (at_start < start) & (at_end <= start) else way
     way = way if smooth else _OTHER
     way = _YIELD_GOVERNS if options.rise == NEWMARK else way
-    way = way if block.sliding_mode == STICK_SLIP else _OTHER
+    way = way if mode == STICK_SLIP else _OTHER
     early = gentle & (start <= _SHORT_SINE * end) & (not options.wants_peak)
-    way = _CONTINUOUS if (block.sliding_mode == CONTINUOUS) & early else way
-    return way if block.sliding_mode > STUCK else _STAYS
+    way = _CONTINUOUS if (mode == CONTINUOUS) & early else way
+    return way if mode > STUCK else _STAYS
 
 
 @in_lanes
@@ -769,15 +771,42 @@ def solve_strip(way: int, options: Options, lanes: np.ndarray) -> None:
 
 
 @scalar
+def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
+    """Blocks of a strip of a tile in lanes, with their codes and the way each goes.
+
+    Neighbours are mostly alike, and what none of them needs is left out: λ and t1 of those that stay,
+    E of those that do not stick and slip (5 against 9 ns a cell of a design chart).
+    """
+    g, slides, sticks = options.g, 0, 0
+    for j in range(STRIP):
+        cell = cell_of(cells, j)
+        yield_acceleration, _, _, minimum_friction, delta_mu, mode, validity = interface_of(cell, options.rise, g)
+        blocks[AMPLITUDE + j], blocks[YIELD + j] = cell.amplitude, yield_acceleration
+        blocks[MU_S + j], blocks[TAN_THETA + j] = cell.mu_s, cell.tan_theta
+        blocks[DELTA_MU + j], blocks[_LEAST_FRICTION + j] = delta_mu, minimum_friction
+        blocks[_MODE + j], blocks[_VALIDITY + j] = mode, validity
+        blocks[_WAY + j] = _STAYS
+        slides += 1 if mode > STUCK else 0
+        sticks += 1 if mode == STICK_SLIP else 0
+    if slides == 0:
+        return
+    for j in range(STRIP):
+        least = blocks[_LEAST_FRICTION + j]
+        blocks[DECAY_RATE + j] = decay_rate_of(cell_of(cells, j), blocks[DELTA_MU + j], least, g)
+        blocks[BEGAN + j] = rising_phase(blocks[YIELD + j], blocks[AMPLITUDE + j])
+    if sticks > 0 and options.rise != NEWMARK:
+        for j in range(STRIP):
+            blocks[_AT_START + j] = lane_response(blocks, j, blocks[YIELD + j], g)
+            blocks[_AT_END + j] = lane_response(blocks, j, blocks[AMPLITUDE + j], g)
+    for j in range(STRIP):
+        blocks[_WAY + j] = way_of(blocks, j, options)
+
+
+@scalar
 def sort_cells(cells: np.ndarray, count: int, options: Options, blocks: np.ndarray) -> None:
-    """Blocks of a tile in lanes, with their codes and the way each goes."""
-    for j in range(count):
-        block = block_of(cell_of(cells, j), options.rise, options.g)
-        lane_of(block, blocks, j)
-        blocks[_MODE + j], blocks[_VALIDITY + j] = block.sliding_mode, block.validity
-        at_start = lane_response(blocks, j, block.yield_acceleration, options.g)
-        at_end = lane_response(blocks, j, block.amplitude, options.g)
-        blocks[_WAY + j] = way_of(block, options, at_start, at_end)
+    """`sort_strip` for a tile."""
+    for first in range(0, count, STRIP):
+        sort_strip(cells[first:], options, blocks[first:])
 
 
 @scalar
@@ -819,22 +848,19 @@ def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
             lanes[row + lane] = lanes[row]
 
 
-@scalar
-def collect(
-    used: int, way: int, options: Options, lanes: np.ndarray, where: np.ndarray, blocks: np.ndarray,
-    motion: np.ndarray, codes: np.ndarray,
+@in_lanes
+def enter(
+    lanes: np.ndarray, lane: int, way: int, options: Options, blocks: np.ndarray, motion: np.ndarray,
+    codes: np.ndarray, j: int,
 ) -> None:  # fmt: skip
-    """Results of the lanes that have converged; the other cells are to go the long way."""
-    for lane in range(used):
-        j = where[lane]
-        if lanes[_CONVERGED + lane] > 0.0:
-            motion[0, j] = lanes[_W + lane]
-            if options.wants_peak:
-                motion[1, j] = lanes[_PEAK + lane]
-            codes[1, j] |= int(lanes[_CODE + lane]) | (EQ4_BELOW_YIELD if way == _YIELD_GOVERNS else 0)
-            blocks[_WAY + j] = way
-        else:
-            blocks[_WAY + j] = _OTHER
+    """Enter the result of a lane that has converged as cell j; else the cell is to go the long way."""
+    solved = lanes[_CONVERGED + lane] > 0.0
+    flags = int(lanes[_CODE + lane]) | (EQ4_BELOW_YIELD if way == _YIELD_GOVERNS else 0)
+    motion[0, j] = lanes[_W + lane]
+    if options.wants_peak:
+        motion[1, j] = lanes[_PEAK + lane]
+    codes[1, j] |= flags if solved else 0
+    blocks[_WAY + j] = way if solved else _OTHER
 
 
 @scalar
@@ -854,16 +880,20 @@ def solve_way(
         solve_strip(way, options, lanes[first:])
     where, lane = np.empty(used, np.int64), 0
     for run in range(count):
-        if blocks[_WAY + runs[run]] == way:
-            for j in range(runs[run], runs[run + 1]):
-                where[lane] = j
-                lane += 1
-    collect(used, way, options, lanes, where, blocks, motion, codes)
+        first, last = runs[run], runs[run + 1]
+        if blocks[_WAY + first] == way:
+            # by slices, which numba knows to begin at 0: then this is a loop in SIMD
+            found, cells, moved, coded = lanes[lane:], blocks[first:], motion[:, first:last], codes[:, first:last]
+            for j in range(last - first):
+                enter(found, j, way, options, cells, moved, coded, j)
+                where[lane + j] = first + j
+            lane += last - first
     if way == _STICKS:
         used = fill_carried(used, lanes, where)
         for first in range(0, used, STRIP):
             lane_carried(options, lanes[first:])
-        collect(used, way, options, lanes, where, blocks, motion, codes)
+        for lane in range(used):
+            enter(lanes, lane, way, options, blocks, motion, codes, where[lane])
 
 
 @scalar
