@@ -287,7 +287,7 @@ def stays_below_yield(block: Block, start: float, end: float) -> bool:
 
 #: Rows of lanes, blocks laid out for SIMD loops: row + j is cell j.  A solver's own rows
 #: follow from `LANE_ROWS` on.
-AMPLITUDE, YIELD, MU_S, TAN_THETA, DELTA_MU, DECAY_RATE, BEGAN = range(0, 7 * TILE, TILE)
+AMPLITUDE, YIELD, MU_S, TAN_THETA, DELTA_MU, DECAY, BEGAN = range(0, 7 * TILE, TILE)
 LANE_ROWS = 7
 
 #: Lanes that are solved together, until the last of their iterations has settled: neighbours take as many.
@@ -307,23 +307,23 @@ def lane_of(block: Block, lanes: np.ndarray, j: int) -> None:
     """Lay a block out as lane j."""
     lanes[AMPLITUDE + j], lanes[YIELD + j] = block.amplitude, block.yield_acceleration
     lanes[MU_S + j], lanes[TAN_THETA + j] = block.mu_s, block.tan_theta
-    lanes[DELTA_MU + j], lanes[DECAY_RATE + j] = block.delta_mu, block.decay_rate
+    lanes[DELTA_MU + j], lanes[DECAY + j] = block.delta_mu, block.decay_rate / block.g
     lanes[BEGAN + j] = rising_phase(block.yield_acceleration, block.amplitude)
 
 
 @in_lanes
-def lane_friction(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """μ(x) of a lane."""
-    return eq.friction_coefficient(x, lanes[MU_S + j], lanes[DELTA_MU + j], lanes[DECAY_RATE + j], g)
+def lane_friction(lanes: np.ndarray, j: int, x: float) -> float:
+    """μ(x) of a lane: Eq. 6 for λ/g, so that no g is divided by."""
+    return eq.friction_coefficient(x, lanes[MU_S + j], lanes[DELTA_MU + j], lanes[DECAY + j], 1.0)
 
 
 @in_lanes
 def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
     """E(x) of a lane."""
-    return eq.block_acceleration(x, lane_friction(lanes, j, x, g), lanes[MU_S + j], lanes[TAN_THETA + j], g)
+    return eq.block_acceleration(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j], g)
 
 
 @in_lanes
 def lane_slip(lanes: np.ndarray, j: int, x: float, g: float) -> float:
     """D(x) of a lane, x ≥ 0."""
-    return eq.lag(x, lane_friction(lanes, j, x, g), lanes[MU_S + j], lanes[TAN_THETA + j], g)
+    return eq.lag(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j], g)

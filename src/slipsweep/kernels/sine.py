@@ -19,7 +19,7 @@ from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
-    DECAY_RATE,
+    DECAY,
     DELTA_MU,
     EQ4_BELOW_YIELD,
     EVENT_TOLERANCE,
@@ -258,16 +258,16 @@ def drift_integral(block: Block) -> float:
 def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
     """Which way a cell goes."""
     at_start, at_end, mode = blocks[_AT_START + j], blocks[_AT_END + j], blocks[_MODE + j]
-    decay = blocks[DECAY_RATE + j] / options.g
+    decay = blocks[DECAY + j]
     start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
     gentle = decay * end <= _LANE_E_FOLDINGS
     # either E is convex, hence D concave, and as D > 0 at the peak it stays positive once it is;
     # or 0 < dE/dx < 1, by bounds with the largest friction and normal acceleration
     tan_theta, mu_s = blocks[TAN_THETA + j], blocks[MU_S + j]
     most = mu_s + blocks[DELTA_MU + j]
-    convex = blocks[DECAY_RATE + j] >= 2.0 * tan_theta
+    convex = decay * options.g >= 2.0 * tan_theta
     rises = most * (decay * (options.g + end * tan_theta) - tan_theta) < eq.limit_denominator(mu_s, tan_theta)
-    lags = most * (tan_theta - blocks[DECAY_RATE + j]) <= tan_theta * (mu_s - tan_theta)
+    lags = most * (tan_theta - decay * options.g) <= tan_theta * (mu_s - tan_theta)
     smooth = (options.rise == MONOTONE) & (at_end < end) & (convex | (rises & lags))
     sticks_or_follows = _STICKS if at_start >= start else _FOLLOWS
     way = sticks_or_follows if gentle else _OTHER
@@ -284,9 +284,9 @@ def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
 def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
     """E and dE/dx of a lane (x > 0)."""
     tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]
-    mu = lane_friction(lanes, j, x, g)
+    mu = lane_friction(lanes, j, x)
     n = eq.normal_acceleration(x, tan_theta, g)
-    slope = 1.0 - tan_theta * (mu_s - tan_theta - mu) - n * mu * lanes[DECAY_RATE + j] / g
+    slope = 1.0 - tan_theta * (mu_s - tan_theta - mu) - n * mu * lanes[DECAY + j]
     return x - eq.lag(x, mu, mu_s, tan_theta, g), slope
 
 
@@ -728,7 +728,7 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
         # the whole quarter: ∫ D in _V, a quarter of the drift in _X; up to Üg = Üy: _RATE, _MOMENT
         amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
         most = mu_s + lanes[DELTA_MU + j]
-        plain, with_sine = quarter_integrals(lanes[DECAY_RATE + j] * amplitude / g)
+        plain, with_sine = quarter_integrals(lanes[DECAY + j] * amplitude)
         lanes[_X + j] = amplitude * tan_theta * (mu_s - tan_theta - most * with_sine)
         lanes[_V + j] = g * (_HALF_PI * mu_s - most * plain) + lanes[_X + j]
         lanes[_RATE + j] = lanes[_MOMENT + j] = 0.0
@@ -792,7 +792,7 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
         return
     for j in range(STRIP):
         least = blocks[_LEAST_FRICTION + j]
-        blocks[DECAY_RATE + j] = decay_rate_of(cell_of(cells, j), blocks[DELTA_MU + j], least, g)
+        blocks[DECAY + j] = decay_rate_of(cell_of(cells, j), blocks[DELTA_MU + j], least, g) / g
         blocks[BEGAN + j] = rising_phase(blocks[YIELD + j], blocks[AMPLITUDE + j])
     if sticks > 0 and options.rise != NEWMARK:
         for j in range(STRIP):

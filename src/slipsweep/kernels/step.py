@@ -939,14 +939,14 @@ def continuous_cycle(
 @in_lanes
 def lane_slip(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> float:
     """D of a lane at Üg = x on one side of Üg = 0."""
-    excess = lanes[MU_S + j] - lane_friction(lanes, j, x, g)
+    excess = lanes[MU_S + j] - lane_friction(lanes, j, x)
     return side * (g * excess + x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j]))
 
 
 @in_lanes
 def lane_shared(lanes: np.ndarray, j: int, x: float, g: float) -> float:
     """The part of D that is the same on both sides of Üg = 0, x > 0; the other, ±g (μs − μ), changes its sign."""
-    excess = lanes[MU_S + j] - lane_friction(lanes, j, x, g)
+    excess = lanes[MU_S + j] - lane_friction(lanes, j, x)
     return x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j])
 
 
