@@ -40,14 +40,22 @@ class Results(NamedTuple):
     validity: np.ndarray
 
 
+class Runs(NamedTuple):
+    """Cells of a tile that follow each other along the last dimension: `count` runs, of which run r begins with
+    cell `first[r]` (the last ends with cell `first[count] - 1`), at period `period[r]` and result `result[r]`.
+    """
+
+    first: np.ndarray
+    period: np.ndarray
+    result: np.ndarray
+
+
 @scalar
-def gather(
-    grid: Grid, first: int, count: int, inputs: tuple[np.ndarray, ...], cells: np.ndarray, offsets: np.ndarray
-) -> None:
-    """Fill `cells` (7 rows of a tile) and the offsets of 1/ω and of the results for `count` cells from `first` on."""
+def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], cells: np.ndarray, runs: Runs) -> int:
+    """Fill `cells` (7 rows of a tile) and `runs` for `count` cells of a grid from `begin` on; the number of runs."""
     dimensions = grid.shape.size
     index = np.empty(dimensions, np.int64)
-    rest = first
+    rest = begin
     for axis in range(dimensions - 1, -1, -1):
         index[axis] = rest % grid.shape[axis]
         rest //= grid.shape[axis]
@@ -56,7 +64,7 @@ def gather(
         for axis in range(dimensions):
             position[row] += index[axis] * grid.strides[row, axis]
     last = dimensions - 1
-    done = 0
+    done, found = 0, 0
     while done < count:
         run = min(count - done, grid.shape[last] - index[last])
         for row in range(7):
@@ -69,10 +77,8 @@ def gather(
             else:
                 for j in range(run):
                     cells[to + j] = values[at + j * stride]
-        for row in range(2):
-            at, stride = position[7 + row], grid.strides[7 + row, last]
-            for j in range(run):
-                offsets[row, done + j] = at + j * stride
+        runs.first[found], runs.period[found], runs.result[found] = done, position[7], position[8]
+        found += 1
         done += run
         # carry to the next run along the last dimension
         for row in range(9):
@@ -85,69 +91,77 @@ def gather(
             index[axis] = 0
             index[axis - 1] += 1
             axis -= 1
+    runs.first[found] = count
+    return found
+
+
+@scalar
+def empty_runs() -> Runs:
+    """Room for the runs of a tile."""
+    return Runs(np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64), np.empty(TILE, np.int64))
 
 
 @scalar
 def scatter(
-    grid: Grid,
-    count: int,
-    offsets: np.ndarray,
-    periods: np.ndarray,
-    motion: np.ndarray,
-    codes: np.ndarray,
-    results: Results,
+    grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.ndarray, codes: np.ndarray, results: Results
 ) -> None:
-    """Spread the solved cells over their frequencies: u = W/ω², v = V/ω (the scaling law)."""
-    step, stride = grid.frequency_stride, grid.result_stride
-    if results.displacement.size and grid.frequencies == 1:
-        for j in range(count):
-            period = periods[offsets[0, j]]
-            results.displacement[offsets[1, j]] = motion[0, j] * (period * period)
-    elif results.displacement.size:
-        for j in range(count):
-            at_period, at, w = offsets[0, j], offsets[1, j], motion[0, j]
-            for k in range(grid.frequencies):
-                period = periods[at_period + k * step]
-                results.displacement[at + k * stride] = w * (period * period)
-    if results.velocity.size:
-        for j in range(count):
-            at_period, at, v = offsets[0, j], offsets[1, j], motion[1, j]
-            for k in range(grid.frequencies):
-                results.velocity[at + k * stride] = v * periods[at_period + k * step]
-    if results.mode.size:
-        for j in range(count):
-            for k in range(grid.frequencies):
-                results.mode[offsets[1, j] + k * stride] = codes[0, j]
-    if results.validity.size:
-        for j in range(count):
-            for k in range(grid.frequencies):
-                results.validity[offsets[1, j] + k * stride] = codes[1, j]
+    """Spread the solved cells of `count` runs over their frequencies: u = W/ω², v = V/ω (the scaling law)."""
+    frequencies, step, stride = grid.frequencies, grid.frequency_stride, grid.result_stride
+    period_stride, cell_stride = grid.strides[7, -1], grid.strides[8, -1]
+    for run in range(count):
+        begin, end = runs.first[run], runs.first[run + 1]
+        period, result = runs.period[run], runs.result[run]
+        if results.displacement.size and frequencies == 1 and period_stride == 0 and cell_stride == 1:
+            # slices, which numba knows to begin at 0: a loop in SIMD
+            moved, target = motion[0, begin:end], results.displacement[result : result + end - begin]
+            scale = periods[period] * periods[period]
+            for j in range(end - begin):
+                target[j] = moved[j] * scale
+        elif results.displacement.size:
+            for j in range(end - begin):
+                w, from_, to = motion[0, begin + j], period + j * period_stride, result + j * cell_stride
+                for k in range(frequencies):
+                    second = periods[from_ + k * step]
+                    results.displacement[to + k * stride] = w * (second * second)
+        if results.velocity.size:
+            for j in range(end - begin):
+                v, from_, to = motion[1, begin + j], period + j * period_stride, result + j * cell_stride
+                for k in range(frequencies):
+                    results.velocity[to + k * stride] = v * periods[from_ + k * step]
+        if results.mode.size:
+            for j in range(end - begin):
+                for k in range(frequencies):
+                    results.mode[result + j * cell_stride + k * stride] = codes[0, begin + j]
+        if results.validity.size:
+            for j in range(end - begin):
+                for k in range(frequencies):
+                    results.validity[result + j * cell_stride + k * stride] = codes[1, begin + j]
 
 
 def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results,
 ) -> None:  # fmt: skip
-    cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
+    cells, runs = np.empty(7 * TILE), empty_runs()
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        gather(grid, begin, count, inputs, cells, offsets)
+        found = gather(grid, begin, count, inputs, cells, runs)
         sine.solve_cells(cells, count, options, wave, motion, codes)
-        scatter(grid, count, offsets, periods, motion, codes, results)
+        scatter(grid, runs, found, periods, motion, codes, results)
 
 
 def _wave_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results,
 ) -> None:  # fmt: skip
-    cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
+    cells, runs = np.empty(7 * TILE), empty_runs()
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        gather(grid, begin, count, inputs, cells, offsets)
+        found = gather(grid, begin, count, inputs, cells, runs)
         cycle.solve_cells(cells, count, options, wave, motion, codes)
-        scatter(grid, count, offsets, periods, motion, codes, results)
+        scatter(grid, runs, found, periods, motion, codes, results)
 
 
 def _step_grid_of(rule: int) -> Kernel:
@@ -156,13 +170,13 @@ def _step_grid_of(rule: int) -> Kernel:
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
         steps: step.Steps, results: Results,
     ) -> None:  # fmt: skip
-        cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
+        cells, runs = np.empty(7 * TILE), empty_runs()
         motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
-            gather(grid, begin, count, inputs, cells, offsets)
+            found = gather(grid, begin, count, inputs, cells, runs)
             step.solve_cells(cells, count, rule, options, steps, motion, codes)
-            scatter(grid, count, offsets, periods, motion, codes, results)
+            scatter(grid, runs, found, periods, motion, codes, results)
 
     return Kernel(step_grid)
 
@@ -183,22 +197,22 @@ def _parameter_grid(
     mode: np.ndarray,
     validity: np.ndarray,
 ) -> None:
-    cells = np.empty(7 * TILE)
-    offsets = np.empty((2, TILE), np.int64)
+    cells, runs = np.empty(7 * TILE), empty_runs()
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        gather(grid, begin, count, inputs, cells, offsets)
-        for j in range(count):
-            block = block_of(cell_of(cells, j), options.rise, options.g)
-            place = offsets[1, j]
-            parameters[0, place] = block.yield_acceleration
-            parameters[1, place] = block.limiting_acceleration
-            parameters[2, place] = block.acceleration_ratio
-            parameters[3, place] = block.minimum_friction
-            parameters[4, place] = block.delta_mu
-            parameters[5, place] = block.decay_rate
-            mode[place] = block.sliding_mode
-            validity[place] = block.validity
+        found = gather(grid, begin, count, inputs, cells, runs)
+        for run in range(found):
+            for j in range(runs.first[run], runs.first[run + 1]):
+                block = block_of(cell_of(cells, j), options.rise, options.g)
+                place = runs.result[run] + (j - runs.first[run]) * grid.strides[8, -1]
+                parameters[0, place] = block.yield_acceleration
+                parameters[1, place] = block.limiting_acceleration
+                parameters[2, place] = block.acceleration_ratio
+                parameters[3, place] = block.minimum_friction
+                parameters[4, place] = block.delta_mu
+                parameters[5, place] = block.decay_rate
+                mode[place] = block.sliding_mode
+                validity[place] = block.validity
 
 
 #: Friction parameters of every cell (rows as in `variables.FRICTION_PARAMETERS`).
