@@ -146,6 +146,7 @@ def test_blocks_are_brought_to_the_disk_before_the_next(
     whole = tmp_path / "a.nc"
     run(whole, split=split)
     monkeypatch.setattr(store, "_SYNC_BYTES", 1)
+    monkeypatch.setattr(store, "_SYNC_SECONDS", 0)
     synced: list[tuple[str, bool]] = []
     sync = parts.sync
 

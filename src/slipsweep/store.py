@@ -53,7 +53,8 @@ _WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 #: Dimension of the samples of a record.
 RECORD_DIM = "record_sample"
 
-#: Bytes that are written, and seconds that pass, before what is written is brought to the disk itself.
+#: Bytes that are written, or seconds that pass, before they are brought to the disk itself; the
+#: journal follows after as many seconds.
 _SYNC_BYTES = 32_000_000
 _SYNC_SECONDS = 1.0
 
@@ -366,10 +367,13 @@ def _write_blocks(
             target.write(number, cut[number], table, arrays)
             work.add(number, digest.result())
             unsynced += sum(values.nbytes for values in arrays.values())
-            if unsynced >= _SYNC_BYTES or time.monotonic() - synced >= _SYNC_SECONDS:
+            due = time.monotonic() - synced >= _SYNC_SECONDS
+            if due or unsynced >= _SYNC_BYTES:
                 target.sync(drop=unsynced >= _SYNC_BYTES)
+                unsynced = 0
+            if due:
                 work.sync()
-                unsynced, synced = 0, time.monotonic()
+                synced = time.monotonic()
 
     def examine(arrays: dict[str, NDArray[Any]]) -> str:
         tally.add(arrays)
