@@ -4,7 +4,11 @@ A file appears under its name only when it is complete.  Results are stored cont
 uncompressed: then each value has its place in the file before any is known, and once the empty
 file is on the disk a block is written without a change to anything but its own bytes.  A run that
 is killed leaves a file that can be read and gone on with (`slipsweep.parts`), and no value is
-written twice.  (On a grid of 20 million cells nothing compressed wrote 2.1 GB/s; zlib on the two
+written twice.
+
+Fresh memory is what writing costs: the netCDF4 library alone takes from 1 to 5 s of processor for
+1.9 GB, nearly all of it for the pages of the file.  So a run has few of them at a time, and solves
+into the arrays of blocks that are written.  (On a grid of 20 million cells nothing compressed wrote 2.1 GB/s; zlib on the two
 flag variables 1.7 GB/s for 16 % of the bytes; zlib on everything 0.1 GB/s for 58 %.)
 """
 
@@ -14,6 +18,7 @@ import os
 import re
 import shutil
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -55,7 +60,7 @@ RECORD_DIM = "record_sample"
 
 #: Bytes that are written, or seconds that pass, before they are brought to the disk itself; the
 #: journal follows after as many seconds.
-_SYNC_BYTES = 32_000_000
+_SYNC_BYTES = 64_000_000
 _SYNC_SECONDS = 1.0
 
 #: Name of a block's file in a folder that `run` made.
@@ -348,17 +353,17 @@ def _write_blocks(
 ) -> None:
     """Write blocks and put them on record, each while the next is being solved.
 
-    Checksums and counts are made beside the writing.  What is written is brought to the disk itself
-    by the writer, before it goes on: as long as it waits the next block is solved, and no more of
-    the file than `_SYNC_BYTES` and a block is ever in memory.  The system then has few pages to find
-    for it, and finds them again: it took 0.6 s of processor to write 1.9 GB so, and from 1 to 5 s
-    where a second thread did the waiting, or none.
+    Checksums and counts are made beside the writing.  So is what is written brought to the disk
+    itself, but the writer waits for that before it has more brought there: no more of the file than
+    some blocks is in memory at a time.  The system finds their pages again and again: it took 0.7 s
+    of processor to write 1.9 GB so, and from 1 to 5 s where all of the file stayed in memory.
     """
     pending: Future[None] | None = None
+    syncing: Future[None] | None = None
     unsynced, synced = 0, time.monotonic()
 
     def write(number: int, table: Table) -> None:
-        nonlocal unsynced, synced
+        nonlocal syncing, unsynced, synced
         with _writing(work.output):
             arrays = {
                 name: _rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
@@ -369,18 +374,22 @@ def _write_blocks(
             unsynced += sum(values.nbytes for values in arrays.values())
             due = time.monotonic() - synced >= _SYNC_SECONDS
             if due or unsynced >= _SYNC_BYTES:
-                target.sync(drop=unsynced >= _SYNC_BYTES)
-                unsynced = 0
-            if due:
-                work.sync()
-                synced = time.monotonic()
+                if syncing is not None:
+                    syncing.result()
+                syncing = syncer.submit(bring, unsynced >= _SYNC_BYTES, due)
+                unsynced, synced = 0, time.monotonic() if due else synced
 
     def examine(arrays: dict[str, NDArray[Any]]) -> str:
         tally.add(arrays)
         return parts.checksum(arrays)
 
+    def bring(drop: bool, journal: bool) -> None:
+        target.sync(drop)
+        if journal:
+            work.sync()
+
     # leaving them waits, for the writer first: a block that is being written is finished
-    with ThreadPoolExecutor(1) as examiner, ThreadPoolExecutor(1) as writer:
+    with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as examiner, ThreadPoolExecutor(1) as writer:
         for number, table in found:
             if pending is not None:
                 pending.result()
@@ -389,8 +398,9 @@ def _write_blocks(
         if pending is not None:
             pending.result()
         with _writing(work.output):
-            target.sync()
-            work.sync()
+            if syncing is not None:
+                syncing.result()
+            bring(drop=False, journal=True)
 
 
 class _OneFile:
@@ -483,7 +493,7 @@ class _Files:
 
     def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
         self.spec, self.data, self.command = spec, data, command
-        self.unsynced: list[Path] = []
+        self.unsynced: deque[Path] = deque()
 
     def __enter__(self) -> Self:
         return self
@@ -531,9 +541,8 @@ class _Files:
 
     def sync(self, drop: bool = False) -> None:
         """Have all that is written on the disk itself, and with `drop` no longer in memory."""
-        for path in self.unsynced:
-            parts.sync(path, drop)
-        self.unsynced.clear()
+        while self.unsynced:
+            parts.sync(self.unsynced.popleft(), drop)
         parts.sync(self.data)
 
     def _name(self, number: int) -> Path:
