@@ -8,8 +8,9 @@ written twice.
 
 Fresh memory is what writing costs: the netCDF4 library alone takes from 1 to 5 s of processor for
 1.9 GB, nearly all of it for the pages of the file.  So a run has few of them at a time, and solves
-into the arrays of blocks that are written.  (On a grid of 20 million cells nothing compressed wrote 2.1 GB/s; zlib on the two
-flag variables 1.7 GB/s for 16 % of the bytes; zlib on everything 0.1 GB/s for 58 %.)
+into the arrays of blocks that are written.  (On a grid of 20 million cells nothing compressed
+wrote 2.1 GB/s; zlib on the two flag variables 1.7 GB/s for 16 % of the bytes; zlib on everything
+0.1 GB/s for 58 %.)
 """
 
 import itertools
