@@ -1,5 +1,6 @@
 """Faults in the middle of a run: whatever is done to it, --resume ends in the undisturbed result or in one message."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -86,6 +87,84 @@ def test_damaged_blocks_are_solved_anew(tmp_path: Path, undisturbed: dict[str, b
     solved = solved_on_resume(tmp_path / "a.nc")
     assert solved == expected or (fault == "truncated" and {*range(30, 60)} < {*solved})
     assert values(tmp_path / "a.nc") == undisturbed
+
+
+def test_a_journal_that_ends_anywhere_promises_its_whole_lines_only(tmp_path: Path) -> None:
+    folder = parts.Folder(tmp_path / "a.nc")
+    folder.path.mkdir()
+    manifest = parts.Manifest(parts.identity(spec.parse(SWEEP, "a"), False), 4000, False)
+    sums = {
+        number: parts.checksum({"a": np.arange(9.0) * number, "b": np.full((3, 2), number, np.int8)})
+        for number in (0, 7, 12)
+    }
+    with parts.opened(tmp_path / "a.nc") as work:
+        work.clear()
+        work.begin(manifest)
+        for number, digest in sums.items():
+            work.add(number, digest)
+    journal = folder.path / "journal"
+    content = journal.read_text()
+    for end in range(len(content) + 1):
+        journal.write_text(content[:end])
+        read = parts.Folder(tmp_path / "a.nc")
+        read.read()
+        assert read.finished == dict(list(sums.items())[: content[:end].count("\n")])
+
+
+def test_every_changed_bit_changes_the_checksum() -> None:
+    arrays: dict[str, np.ndarray] = {"a": np.linspace(0, 1, 40), "b": np.arange(40, dtype=np.int16)}
+    expected = parts.checksum(arrays)
+    for name, array in arrays.items():
+        for at in range(8 * array.nbytes):
+            content = bytearray(array.tobytes())
+            content[at // 8] ^= 1 << at % 8
+            assert parts.checksum(arrays | {name: np.frombuffer(content, array.dtype)}) != expected
+    assert parts.checksum({"b": arrays["b"], "a": arrays["a"]}) != expected
+    assert parts.checksum({"a": arrays["a"].view(np.int64), "b": arrays["b"]}) != expected
+
+
+def test_blocks_of_a_version_with_other_checksums_are_refused(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
+    path = tmp_path / "a.nc"
+    folder = stopped(path)
+    content = json.loads((folder / "manifest.json").read_text().partition("\n")[2])
+    del content["identity"]["checksums"]
+    text = json.dumps(content)
+    (folder / "manifest.json").write_text(f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}")
+    (folder / "journal").write_text("".join(f"{number} {'0f' * 32}\n" for number in range(30)))
+    before = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
+    with pytest.raises(InputError, match="holds 30 finished blocks of an interrupted run"):
+        run(path)
+    with pytest.raises(InputError, match=r"cannot go on with the blocks in .*: checksums was None, is CRC-32"):
+        run(path, resume=True)
+    assert before == {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_blocks_are_brought_to_the_disk_before_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: dict[str, bytes], split: bool
+) -> None:
+    whole = tmp_path / "a.nc"
+    run(whole, split=split)
+    monkeypatch.setattr(store, "_SYNC_BYTES", 1)
+    monkeypatch.setattr(store, "_SYNC_SECONDS", 0)
+    synced: list[tuple[str, bool]] = []
+    sync = parts.sync
+
+    def counted(path: Path, drop: bool = False) -> None:
+        synced.append((path.name, drop))
+        sync(path, drop)
+
+    monkeypatch.setattr(parts, "sync", counted)
+    run(tmp_path / "b.nc", split=split)
+    # each block, and after it the journal that tells of it
+    dropped = [name for name, drop in synced if drop]
+    assert dropped == ([f"block-{number:06}.nc" for number in range(60)] if split else 60 * ["data.nc"])
+    assert sum(name == "journal" for name, _ in synced) >= 60
+    if not split:
+        assert values(tmp_path / "b.nc") == undisturbed
+    else:
+        for name in sorted(entry.name for entry in whole.iterdir()):
+            assert values(tmp_path / "b.nc" / name) == values(whole / name)
 
 
 def test_blocks_of_another_sweep_are_refused_with_the_difference(

@@ -1,6 +1,7 @@
 """Blocks, and netCDF files: what they hold, and that they are complete or not there."""
 
 import errno
+import itertools
 import os
 import shutil
 import subprocess
@@ -98,6 +99,27 @@ def test_blocks_cut_the_frequency_axis_last() -> None:
         "case": 7,
     }
     assert blocks.block_lengths(shape, 400_000)["frequency"] == 1000
+
+
+@pytest.mark.parametrize("most", [7, 96, 1000])
+def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> None:
+    names = ", ".join(f'"{name}"' for name in variables.RESULTS)
+    checked = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml")
+    cut = dict(enumerate(blocks.grid_blocks(checked.shape, most)))
+    whole = blocks.plan_of(checked.arguments()).solve()
+    places: list[set[int]] = []
+    previous: tuple[int, Table] | None = None
+    for found in blocks.solve_here(checked, cut):
+        # a block is as it was solved until the next but one is asked for, whatever their sizes
+        for number, table in filter(None, (previous, found)):
+            for name, result in table.data_vars.items():
+                expected = whole[name].values[tuple(cut[number][dim] for dim in result.dims)]
+                np.testing.assert_array_equal(result.values, expected, err_msg=name)
+        places.append({result.values.ctypes.data for result in found[1].data_vars.values()})
+        previous = found
+    assert len(places) == len(cut)
+    assert all(now == before for before, now in zip(places, places[2:], strict=False))
+    assert not any(now & before for before, now in itertools.pairwise(places))
 
 
 def test_workers_share_a_sweep_evenly_within_the_memory() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.resources import size_text
@@ -23,7 +24,8 @@ Block: TypeAlias = dict[str, slice]
 Progress: TypeAlias = Callable[[int], None]
 
 #: What solves blocks, given with their numbers: yields each with its number, in any order.
-#: A block's results are let go of before the next is asked for, but for one.
+#: A block's results are let go of before the next is asked for, but for one: whose memory may be
+#: used for those of the next but one.
 Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
 
 #: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
@@ -144,8 +146,32 @@ def solve_here(
     int, Table
         The number of a block, and its results with their coordinates.
     """
-    for number, block in blocks.items():
-        yield number, plan_of(spec.arguments(block)).solve(progress)
+    # one set of arrays is being written while the other is solved into
+    for (number, block), memory in zip(blocks.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
+        yield number, plan_of(spec.arguments(block)).solve(progress, memory.rewound().empty)
+
+
+class _Memory:
+    """Memory that is used again for each block: the system takes 0.2 to 1 µs for every 4 KB that are new."""
+
+    def __init__(self) -> None:
+        self.pieces: list[NDArray[np.uint8]] = []
+        self.used = 0
+
+    def rewound(self) -> "_Memory":
+        """Itself, with nothing of it in use."""
+        self.used = 0
+        return self
+
+    def empty(self, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+        """As `np.empty`; what an earlier block had at this place is overwritten."""
+        nbytes = math.prod(shape) * np.dtype(dtype).itemsize
+        if self.used == len(self.pieces):
+            self.pieces.append(np.empty(nbytes, np.uint8))
+        elif self.pieces[self.used].nbytes < nbytes:
+            self.pieces[self.used] = np.empty(nbytes, np.uint8)
+        self.used += 1
+        return self.pieces[self.used - 1][:nbytes].view(dtype).reshape(shape)
 
 
 def plan_of(arguments: Mapping[str, Any]) -> "Plan":

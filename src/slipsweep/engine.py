@@ -38,6 +38,9 @@ MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_m
 
 Array = NDArray[np.float64]
 
+#: Makes the array of a result, of a shape and dtype: `np.empty`, or what hands out memory again.
+Empty = Callable[[tuple[int, ...], str], NDArray[Any]]
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -104,6 +107,7 @@ def solve(
     arrays: Mapping[str, Array],
     wanted: tuple[str, ...],
     progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
 ) -> dict[str, NDArray[Any]]:
     """Solve a grid.
 
@@ -121,6 +125,8 @@ def solve(
         Names from `MOTION_RESULTS`; nothing else is computed.
     progress : callable, optional
         Called with a number of result cells as they are finished, from any thread.
+    empty : callable
+        Makes the arrays of the results.
 
     Returns
     -------
@@ -129,7 +135,7 @@ def solve(
     """
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
-    results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     grid = layout(shape, scaled, [*inputs, frequency])
     targets = Results(
         *(results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS)
@@ -165,12 +171,13 @@ def friction_parameters(
     arrays: Mapping[str, Array],
     wanted: tuple[str, ...],
     progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
 ) -> dict[str, NDArray[Any]]:
     """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion.
 
     Parameters and results as in `solve`; there is no frequency.
     """
-    results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     options = problem.options(False)
     parts = list(slabs(shape, _FRICTION_CELLS))
 

@@ -82,9 +82,9 @@ class Task:
             np.dtype(RESULT_DTYPES.get(name, "float64")).itemsize for name in self.names
         )
 
-    def solve(self, progress: Callable[[int], None] | None = None) -> Arrays:
-        """Compute the results; `progress` is told of cells as they are finished."""
-        return self.solver(self.problem, tuple(self.sizes.values()), self.inputs, self.names, progress)
+    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Arrays:
+        """Compute the results; `progress` is told of cells as they are finished, `empty` makes the arrays."""
+        return self.solver(self.problem, tuple(self.sizes.values()), self.inputs, self.names, progress, empty)
 
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
@@ -115,8 +115,8 @@ class Plan:
     names: tuple[str, ...]
     attrs: dict[str, Any]
 
-    def solve(self, progress: Callable[[int], None] | None = None) -> Table:
-        """Compute everything at once.
+    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
+        """Compute everything at once; `progress` and `empty` as in `engine.solve`.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class Plan:
         sizes = max((task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()))
         check_memory(sizes, sum(task.nbytes for task in self.tasks))
         # all tasks cover the same cells: one of them counts
-        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None))
+        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
 
     def empty(self) -> Table:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""

@@ -95,11 +95,12 @@ def _solve(
     arrays: Mapping[str, Array],
     wanted: tuple[str, ...],
     progress: Callable[[int], None] | None = None,
+    empty: engine.Empty = np.empty,
 ) -> dict[str, np.ndarray]:
     """Solve a grid; parameters but for the record, and results, as those of `engine.solve`."""
     factor, polarity = arrays["time_scale"], arrays["polarity"]
     inputs = engine.cell_inputs({**arrays, "amplitude": arrays["scale"]}, len(shape))
-    results = {name: np.empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     # the dimensions that the kernel sees: along time_scale the laws of scaling serve, along polarity another history
     own = tuple(max(values.shape[axis] for values in inputs) for axis in range(len(shape)))
     rows = {str(at): values for at, values in enumerate(inputs)}
