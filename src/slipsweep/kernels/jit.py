@@ -20,8 +20,8 @@ from numba.core.registry import CPUDispatcher
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-#: Passes of numba's compiler that find nothing to do here: no closures, `with`, `literally`, overloads to
-#: inline, array expressions or arguments that are None.
+#: Passes of numba's compiler that find nothing to do here: no closures, `with`, overloads to inline,
+#: array expressions or arguments that are None.
 _IDLE_PASSES = (
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
@@ -29,7 +29,6 @@ _IDLE_PASSES = (
     untyped_passes.RewriteDynamicRaises,
     untyped_passes.MakeFunctionToJitFunction,
     untyped_passes.InlineInlinables,
-    untyped_passes.FindLiterallyCalls,
     untyped_passes.LiteralUnroll,
     untyped_passes.LiteralPropagationSubPipelinePass,
     typed_passes.InlineOverloads,
@@ -112,9 +111,11 @@ class _Part(CPUDispatcher):
         return self._for_python(*args, **kwargs)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """As numba's, for `1` as for any integer: one compilation, not one for each constant."""
-        kws = {name: types.unliteral(value) for name, value in kws.items()}
-        return super().get_call_template([types.unliteral(value) for value in args], kws)
+        """As numba's, but compiled once for all integers, not once for each constant that is handed in."""
+        if "literally" not in self.py_func.__code__.co_names:
+            args = [types.unliteral(value) for value in args]
+            kws = {name: types.unliteral(value) for name, value in kws.items()}
+        return super().get_call_template(args, kws)
 
 
 def _part(**options: Any) -> Callable[[_Function], _Function]:
