@@ -15,7 +15,8 @@ would not be noticed.  `_Disk` takes its place:
   Where there is no lock to be had (some network folders) each compiles for itself.
 * Where no folder can be written, kernels are compiled in memory.
 * A kernel calls its own copies of the functions it is made of (`_Sealed`), so that the process
-  that compiled it computes the same bits as those that load it.
+  that compiled it computes the same bits as those that load it.  They have no machine code
+  besides (`kernels.jit`).
 
 `NUMBA_CACHE_DIR` moves the folder, as it does for numba; `NUMBA_DISABLE_JIT` is honoured.
 """

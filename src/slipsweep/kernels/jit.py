@@ -87,23 +87,30 @@ class _Compiler(Compiler):
 
 
 class _Part(CPUDispatcher):
-    """A jitted function that is compiled for the kernels that call it, apart for Python."""
+    """A jitted function that is compiled for the kernels that call it, and once more for Python."""
 
-    def __init__(self, py_func: Callable[..., Any], targetoptions: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        py_func: Callable[..., Any],
+        locals: dict[str, Any] | None = None,  # numba's name, which unpickling hands over
+        targetoptions: dict[str, Any] | None = None,
+    ) -> None:
         inner = {
             "nopython": True,
             "boundscheck": None,
-            # an array belongs to whoever makes it: counting references to it here would only cost
+            # an array belongs to whoever makes it: to count references to it beside cost a sixteenth of the first
+            # run, and half the time of the general walk.  A function that makes one in another way than
+            # these is refused by numba
             "_nrt": not {"empty", "zeros"}.isdisjoint(py_func.__code__.co_names),
             "no_cpython_wrapper": True,
             "no_cfunc_wrapper": True,
         }
-        super().__init__(py_func, targetoptions=targetoptions | inner, pipeline_class=_Compiler)
-        self._options = targetoptions
+        super().__init__(py_func, locals, (targetoptions or {}) | inner, pipeline_class=_Compiler)
 
     @functools.cached_property
     def _for_python(self) -> Callable[..., Any]:
-        jitted: Callable[..., Any] = njit(**self._options)(self.py_func)
+        options = {name: self.targetoptions[name] for name in ("error_model", "fastmath")}
+        jitted: Callable[..., Any] = njit(**options)(self.py_func)
         return jitted
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
@@ -122,7 +129,9 @@ def _part(**options: Any) -> Callable[[_Function], _Function]:
     """Decorator of functions that kernels are made of, with options of `numba.njit`."""
 
     def decorate(function: Any) -> Any:
-        return function if numba.config.DISABLE_JIT else _Part(function, {"error_model": "numpy", **options})
+        if numba.config.DISABLE_JIT:
+            return function
+        return _Part(function, targetoptions={"error_model": "numpy", **options})
 
     return decorate
 
