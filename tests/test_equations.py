@@ -1,10 +1,16 @@
 """The paper's equations against each other."""
 
 import math
+import pickle
+import subprocess
+import sys
+from typing import Any
 
+import numba
 import pytest
 
 from slipsweep import equations as eq
+from slipsweep.kernels.block import opposite
 
 MU_S, TAN_THETA, G = 0.38, math.tan(math.radians(5.0)), 9.81
 
@@ -29,3 +35,24 @@ def test_eq12_brakes_evenly_and_not_backwards() -> None:
     kd = eq.attenuation_coefficient(1.5, G)
     assert eq.attenuated_velocity(0.3, kd, 0.1, G) == pytest.approx(0.3 - 1.5 * 0.1, rel=1e-14)
     assert eq.attenuated_velocity(0.3, kd, 0.5, G) == 0.0
+
+
+@numba.njit(error_model="numpy")
+def _lag(x: Any, mu: Any) -> Any:
+    return eq.lag(x, mu, MU_S, TAN_THETA, G)
+
+
+def test_equations_answer_python_and_jitted_functions_alike() -> None:
+    """In either order, and for whole numbers, too: the same function, compiled for each of them."""
+    whole = [_lag(2, 0), eq.lag(2, 0, MU_S, TAN_THETA, G), eq.lag.py_func(2, 0, MU_S, TAN_THETA, G)]  # type: ignore[attr-defined]
+    assert whole == pytest.approx([whole[0]] * 3, rel=1e-14)
+    fractions = [eq.lag(0.7, friction=0.2, mu_s=MU_S, tan_theta=TAN_THETA, g=G), _lag(0.7, 0.2)]
+    assert fractions == pytest.approx([G * (MU_S - 0.2) + 0.7 * TAN_THETA * (MU_S - TAN_THETA - 0.2)] * 2, rel=1e-14)
+    assert [opposite(-1.0, 2.0), opposite(1.0, 2.0)] == [True, False]
+
+
+def test_equations_go_to_other_processes() -> None:
+    program = "import pickle, sys; print(pickle.loads(sys.stdin.buffer.read())(4.0, 2.0))"
+    pickled = pickle.dumps(eq.acceleration_ratio)
+    other = subprocess.run([sys.executable, "-c", program], input=pickled, capture_output=True, check=True)
+    assert other.stdout == b"2.0\n"

@@ -15,13 +15,15 @@ would not be noticed.  `_Disk` takes its place:
   Where there is no lock to be had (some network folders) each compiles for itself.
 * Where no folder can be written, kernels are compiled in memory.
 * A kernel calls its own copies of the functions it is made of (`_Sealed`), so that the process
-  that compiled it computes the same bits as those that load it.
+  that compiled it computes the same bits as those that load it.  They have no machine code
+  besides (`kernels.jit`).
 
 `NUMBA_CACHE_DIR` moves the folder, as it does for numba; `NUMBA_DISABLE_JIT` is honoured.
 """
 
 import contextlib
 import functools
+import gc
 import hashlib
 import os
 import pickle
@@ -176,45 +178,16 @@ class _Compiler(numba.core.compiler.Compiler):
         super().__init__(typingctx, targetctx, library, *arguments)
 
 
-class _Part(JITCodeLibrary):
-    """What a kernel is made of: no machine code by itself, since nothing calls it but kernels, which have copies.
-
-    Making none took the first compilation of a sweep from 29.6 s to 25.1 s, and leaving all but numba's
-    cheap passes to the kernel took it from 21.3 s to 17.4 s; without any passes the kernels come out slower.
-    """
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
-        self._finalized = True
-
-    def _optimize_final_module(self) -> None:
-        passes, builder = self._codegen._module_pass_manager(
-            loop_vectorize=False, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
-        )
-        passes.run(self._final_module, builder)
-
-    def get_pointer_to_function(self, name: str) -> int:
-        return 0
-
-    @property
-    def codegen(self) -> Any:
-        return _Nowhere
-
-
-class _Nowhere:
-    """Where the environment of a function that has no machine code is put."""
-
-    @staticmethod
-    def set_env(name: str, environment: Any) -> None:
-        pass
-
-
-class PartCompiler(numba.core.compiler.Compiler):
-    """numba's compiler, for functions that only kernels call."""
-
-    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
-        super().__init__(typingctx, targetctx, _Part(targetctx.codegen(), "part"), *arguments)
+@contextlib.contextmanager
+def _no_collections() -> Iterator[None]:
+    """Leave reference cycles alone: a compiler's many objects, nearly all alive, cost 1.3 s of looking for some."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 class Kernel:
@@ -245,7 +218,7 @@ class Kernel:
             return jitted
         signature = tuple(numba.typeof(arg) for arg in args)
         folder = cache_folder()
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _no_collections():
             # numba's advice is for us, not for those who run a sweep
             warnings.simplefilter("ignore", numba.NumbaWarning)
             if folder is None:

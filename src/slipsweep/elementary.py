@@ -10,8 +10,10 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from slipsweep.kernels.jit import elementary
 
 #: Added to a float of magnitude below 2^51 it leaves the nearest integer in the low bits.
 _ROUND = 6755399441055744.0
@@ -26,8 +28,6 @@ _HALF_PI = 0.5 * math.pi
 _QUARTER_PI = 0.25 * math.pi
 #: Bit pattern of √½.
 _SQRT_HALF_BITS = 4604544271217802189
-
-elementary = njit(error_model="numpy", fastmath={"contract", "nsz"}, forceinline=True)
 
 
 @intrinsic

@@ -9,9 +9,8 @@ were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 
 import math
 
-from numba import njit
-
 from slipsweep.elementary import exp, log
+from slipsweep.kernels.jit import in_lanes
 from slipsweep.variables import SlidingMode
 
 STUCK = int(SlidingMode.STUCK)
@@ -21,25 +20,20 @@ CONTINUOUS = int(SlidingMode.CONTINUOUS)
 #: Friction that remains at the peak of a continuous slide: "zero, or very close to it".
 CONTINUOUS_MINIMUM_FRICTION = 0.01
 
-#: Inlined into their callers, loops over cells, which LLVM then vectorises.  `contract` lets the
-#: compiler fuse a*b + c, `arcp` divide by g once; nothing that assumes away NaN or infinity,
-#: which are results here.
-equation = njit(error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True)
 
-
-@equation
+@in_lanes
 def coulomb_yield_acceleration(mu_s: float, tan_theta: float, g: float) -> float:
     """Üy of a Coulomb interface, g tan(φs − θ), m/s²."""
     return g * (mu_s - tan_theta) / (1.0 + mu_s * tan_theta)
 
 
-@equation
+@in_lanes
 def normal_acceleration(ground_acceleration: float, tan_theta: float, g: float) -> float:
     """Eqs. 2 and 3: normal force over m cos θ, n(t) = g + Üg tan θ, m/s²."""
     return g + ground_acceleration * tan_theta
 
 
-@equation
+@in_lanes
 def mobilised_friction(
     ground_acceleration: float, block_acceleration: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -48,7 +42,7 @@ def mobilised_friction(
     return mu_s - tan_theta - (abs(ground_acceleration) - abs(block_acceleration) - g * tan_theta) / n
 
 
-@equation
+@in_lanes
 def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
     """Eq. 4 as what the block falls short of the plane's acceleration, |Üg| − |Ü|, m/s².
 
@@ -58,7 +52,7 @@ def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: flo
     return g * (mu_s - friction) + ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
 
 
-@equation
+@in_lanes
 def relative_acceleration(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -66,19 +60,19 @@ def relative_acceleration(
     return math.copysign(1.0, ground_acceleration) * lag(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
-@equation
+@in_lanes
 def block_acceleration(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
     """Eq. 4: response of the sliding block to the plane's acceleration, m/s²."""
     return ground_acceleration - relative_acceleration(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
-@equation
+@in_lanes
 def original_friction_coefficient(ground_acceleration: float, mu_s: float, decay_rate: float, g: float) -> float:
     """Eq. 5: the original friction law, which starts from the static coefficient."""
     return friction_coefficient(ground_acceleration, mu_s, 0.0, decay_rate, g)
 
 
-@equation
+@in_lanes
 def friction_coefficient(
     ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> float:
@@ -86,56 +80,56 @@ def friction_coefficient(
     return (mu_s + delta_mu) * exp(-decay_rate * abs(ground_acceleration) / g)
 
 
-@equation
+@in_lanes
 def limit_denominator(mu_s: float, tan_theta: float) -> float:
     """Denominator of Eq. 7; where it is not positive the interface has no limit."""
     return 1.0 - tan_theta * (mu_s - tan_theta)
 
 
-@equation
+@in_lanes
 def limiting_acceleration(yield_acceleration: float, mu_s: float, tan_theta: float, g: float) -> float:
     """Eq. 7: the largest acceleration the interface transmits (Eq. 4 with μ = 0, Ü = Üy), m/s²."""
     return (yield_acceleration + g * mu_s) / limit_denominator(mu_s, tan_theta)
 
 
-@equation
+@in_lanes
 def acceleration_ratio(amplitude: float, limiting_acceleration: float) -> float:
     """Eq. 8: ξ, the plane's peak acceleration over the limiting one."""
     return amplitude / limiting_acceleration
 
 
-@equation
+@in_lanes
 def minimum_friction(mu_s: float, ratio: float) -> float:
     """Eq. 9: friction that remains at the peak, μs² ξ in stick-slip, 0.01 in continuous sliding."""
     return mu_s * mu_s * ratio if ratio <= 1.0 else CONTINUOUS_MINIMUM_FRICTION
 
 
-@equation
+@in_lanes
 def delta_mu(mu_s: float, ratio: float) -> float:
     """Eqs. 10 (continuous, ξ > 1) and 11 (stick-slip, ξ ≤ 1): friction above static."""
     # without a branch, which would keep loops over cells from becoming SIMD
     return mu_s * (max(ratio, 1.0 / ratio) - 1.0)
 
 
-@equation
+@in_lanes
 def decay_rate(amplitude: float, mu_s: float, delta_mu: float, minimum_friction: float, g: float) -> float:
     """Eq. 6 solved for λ with μ = μmin at the peak of the motion."""
     return g / amplitude * log((mu_s + delta_mu) / minimum_friction)
 
 
-@equation
+@in_lanes
 def attenuation_coefficient(peak_block_acceleration: float, g: float) -> float:
     """Eq. 12: Kd = Ümax / g."""
     return peak_block_acceleration / g
 
 
-@equation
+@in_lanes
 def attenuated_velocity(velocity: float, attenuation_coefficient: float, duration: float, g: float) -> float:
     """Eq. 12: relative velocity after `duration` of attenuation, not below zero, m/s."""
     return max(velocity - g * attenuation_coefficient * duration, 0.0)
 
 
-@equation
+@in_lanes
 def sliding_mode(amplitude: float, yield_acceleration: float, limiting_acceleration: float) -> int:
     """Mode of the motion: stuck up to the yield acceleration, continuous beyond Eq. 7, else stick-slip."""
     slides = CONTINUOUS if amplitude > limiting_acceleration else STICK_SLIP

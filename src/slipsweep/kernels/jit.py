@@ -1,27 +1,151 @@
-"""How the kernels' inner functions are compiled.
+"""How the functions that kernels are made of are compiled.
 
-They are called from jitted code only: the wrappers that Python and C would call are left out (first
-compilation 13.5 s instead of 16.3 s), and so is machine code of their own (`compiled.PartCompiler`).  Called
-from Python they crash: the way in from there is `grid`, or a jitted function of one's own.
+A kernel has a copy of every function it calls, optimised for it (`compiled`).  What numba makes of a function
+besides, so that it can be called by itself, is nearly all of the time that the first run ever takes; a `_Part`
+is compiled for its callers only.  Called from Python it is compiled once more, as any jitted function is.
+What that comes to, in seconds of processor for the first `slipsweep run sweeps/paper.toml`, is said at each step.
 """
 
 import functools
+from collections.abc import Callable
+from typing import Any, TypeVar
 
-from numba import njit
+import numba
+from numba import njit, types
+from numba.core import typed_passes, untyped_passes
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager
+from numba.core.registry import CPUDispatcher
 
-from slipsweep.compiled import PartCompiler
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
-_inner = functools.partial(
-    njit, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=PartCompiler
+#: Passes of numba's compiler that find nothing to do here: no closures, `with`, overloads to inline,
+#: array expressions or arguments that are None.
+_IDLE_PASSES = (
+    untyped_passes.WithLifting,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.DeadBranchPrune,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.InlineInlinables,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    typed_passes.InlineOverloads,
+    typed_passes.NopythonRewrites,
+    typed_passes.NoPythonSupportedFeatureValidation,
+    typed_passes.DumpParforDiagnostics,
 )
+
+
+class _Library(JITCodeLibrary):
+    """Intermediate code of a part: no machine code, and of the optimisations numba's cheap passes only.
+
+    The kernel has the rest; without any passes the kernels come out slower.
+    """
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager(
+            loop_vectorize=False, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
+        )
+        passes.run(self._final_module, builder)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        return _Nowhere
+
+
+class _Nowhere:
+    """Where the environment of a function that has no machine code is put."""
+
+    @staticmethod
+    def set_env(name: str, environment: Any) -> None:
+        pass
+
+
+class _Compiler(Compiler):
+    """numba's compiler, for functions that only jitted ones call."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
+        super().__init__(typingctx, targetctx, _Library(targetctx.codegen(), "part"), *arguments)
+
+    def define_pipelines(self) -> list[Any]:
+        """The passes of numba's own pipeline but for the idle ones (13.1 s → 12.0 s)."""
+        pipeline = PassManager("part")
+        every = DefaultPassBuilder.define_nopython_pipeline(self.state).passes
+        pipeline.passes.extend(one for one in every if one[0] not in _IDLE_PASSES)
+        pipeline.finalize()
+        return [pipeline]
+
+
+class _Part(CPUDispatcher):
+    """A jitted function that is compiled for the kernels that call it, and once more for Python."""
+
+    def __init__(
+        self,
+        py_func: Callable[..., Any],
+        locals: dict[str, Any] | None = None,  # numba's name, which unpickling hands over
+        targetoptions: dict[str, Any] | None = None,
+    ) -> None:
+        inner = {
+            "nopython": True,
+            "boundscheck": None,
+            # an array belongs to whoever makes it: to count references to it beside cost a sixteenth of the first
+            # run, and half the time of the general walk.  A function that makes one in another way than
+            # these is refused by numba
+            "_nrt": not {"empty", "zeros"}.isdisjoint(py_func.__code__.co_names),
+            "no_cpython_wrapper": True,
+            "no_cfunc_wrapper": True,
+        }
+        super().__init__(py_func, locals, (targetoptions or {}) | inner, pipeline_class=_Compiler)
+
+    @functools.cached_property
+    def _for_python(self) -> Callable[..., Any]:
+        options = {name: self.targetoptions[name] for name in ("error_model", "fastmath")}
+        jitted: Callable[..., Any] = njit(**options)(self.py_func)
+        return jitted
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call from Python."""
+        return self._for_python(*args, **kwargs)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """As numba's, but compiled once for all integers, not once for each constant that is handed in."""
+        if "literally" not in self.py_func.__code__.co_names:
+            args = [types.unliteral(value) for value in args]
+            kws = {name: types.unliteral(value) for name, value in kws.items()}
+        return super().get_call_template(args, kws)
+
+
+def _part(**options: Any) -> Callable[[_Function], _Function]:
+    """Decorator of functions that kernels are made of, with options of `numba.njit`."""
+
+    def decorate(function: Any) -> Any:
+        if numba.config.DISABLE_JIT:
+            return function
+        return _Part(function, targetoptions={"error_model": "numpy", **options})
+
+    return decorate
+
 
 #: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once; nothing that assumes
 #: away NaN or infinity, which are results here.
-scalar = _inner(fastmath={"contract", "arcp"})
+scalar = _part(fastmath={"contract", "arcp"})
 
 #: The same for sums over quadrature nodes, whose order the compiler may then choose (SIMD).
-summed = _inner(fastmath={"contract", "arcp", "reassoc", "nsz"})
+summed = _part(fastmath={"contract", "arcp", "reassoc", "nsz"})
 
 #: The same for what stands in loops over cells: LLVM vectorises a loop only if everything
 #: in it is inlined, which it does not do by itself with functions as long as these.
-in_lanes = _inner(fastmath={"contract", "arcp"}, forceinline=True)
+in_lanes = _part(fastmath={"contract", "arcp"}, forceinline=True)
+
+#: The same for elementary functions, which have no division to share.
+elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)

@@ -367,7 +367,10 @@ def follow_up(
 def mendez(cell: Cell, options: Options, history: History) -> Response:
     """The paper's model, pulse by pulse; `cell.amplitude` is the scale."""
     scale = cell.amplitude
-    largest = scale * max(history.peak.max() if history.peak.size else 0.0, -history.lowest)
+    highest = 0.0
+    for peak in history.peak:
+        highest = max(highest, peak)
+    largest = scale * max(highest, -history.lowest)
     block = block_of(_at_peak(cell, largest), options.rise, options.g)
     validity = block.validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED)
     # n = g + Üg tan θ is least where the plane's acceleration is lowest

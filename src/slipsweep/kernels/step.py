@@ -862,7 +862,9 @@ def stick_slip_lanes(
             states[_DISPLACEMENT + j] = before + times * (states[_DISPLACEMENT + j] - before)
         if c == wave.lead and wave.alike:
             break
-    highest = wave.height.max() if wave.height.size else 0.0
+    highest = 0.0
+    for height in wave.height:
+        highest = max(highest, height)
     for j in range(count):
         block = block_at(cells, where[j], options)
         if lanes[_ALONE + j] > 0.0:
