@@ -18,7 +18,6 @@ from slipsweep import threads
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
 from slipsweep.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
 from slipsweep.waveforms import Waveform, wave_of
@@ -146,15 +145,20 @@ def solve(
     wave = wave_of(problem.waveform, problem.cycles)
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
-    shaking: Wave | step.Steps
     if solver_of(problem) == "step":
-        kernel, shaking = STEP_KERNELS[options.rule], step.steps_of(wave, problem.steps_per_cycle)
+        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, problem.steps_per_cycle)
         work_per_cell += problem.steps_per_cycle // 16
-    else:
-        kernel, shaking = CYCLE_KERNEL if problem.waveform.is_sine else WAVE_KERNEL, wave
 
     def work(first: int, last: int) -> None:
-        kernel(grid, first, last, rows, periods, options, shaking, targets)
+        if solver_of(problem) == "step":
+            kernel(grid, first, last, rows, periods, options, steps, targets)
+        else:
+            stretches = np.array([[first, last]])
+            if problem.waveform.is_sine:
+                rest = np.empty(((last - first + 1) // 2, 2), np.int64)
+                stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
+            if stretches.size:
+                WAVE_KERNEL(grid, stretches, rows, periods, options, wave, targets)
         if progress is not None:
             progress((last - first) * grid.frequencies)
 

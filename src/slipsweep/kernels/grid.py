@@ -69,14 +69,16 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], c
         run = min(count - done, grid.shape[last] - index[last])
         for row in range(7):
             values, at, stride = inputs[row], position[row], grid.strides[row, last]
-            to = row * TILE + done
+            # by loops: an assignment to a slice brings 30 functions of numba's, 2 s of the first compilation
+            target = cells[row * TILE + done : row * TILE + done + run]
             if stride == 0:
-                cells[to : to + run] = values[at]
-            elif stride == 1:
-                cells[to : to + run] = values[at : at + run]
-            else:
+                value = values[at]
                 for j in range(run):
-                    cells[to + j] = values[at + j * stride]
+                    target[j] = value
+            else:
+                source = values[at : at + (run - 1) * stride + 1]
+                for j in range(run):
+                    target[j] = source[j * stride]
         runs.first[found], runs.period[found], runs.result[found] = done, position[7], position[8]
         found += 1
         done += run
@@ -99,6 +101,12 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], c
 def empty_runs() -> Runs:
     """Room for the runs of a tile."""
     return Runs(np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64), np.empty(TILE, np.int64))
+
+
+@scalar
+def place_of(grid: Grid, runs: Runs, run: int, j: int) -> int:
+    """Where the result of cell j of a tile stands, which lies in a run."""
+    return runs.result[run] + (j - runs.first[run]) * grid.strides[8, -1]
 
 
 @scalar
@@ -140,28 +148,39 @@ def scatter(
 
 def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results,
-) -> None:  # fmt: skip
+    results: Results, rest: np.ndarray,
+) -> int:  # fmt: skip
     cells, runs = np.empty(7 * TILE), empty_runs()
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
+    left = np.empty(TILE, np.bool_)
+    stretches = 0
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         found = gather(grid, begin, count, inputs, cells, runs)
-        sine.solve_cells(cells, count, options, wave, motion, codes)
+        others = sine.solve_cells(cells, count, options, motion, codes, left)
         scatter(grid, runs, found, periods, motion, codes, results)
+        for j in range(count if others > 0 else 0):
+            if left[j] and stretches > 0 and rest[stretches - 1, 1] == begin + j:
+                rest[stretches - 1, 1] += 1
+            elif left[j]:
+                rest[stretches, 0], rest[stretches, 1] = begin + j, begin + j + 1
+                stretches += 1
+    return stretches
 
 
 def _wave_grid(
-    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results,
 ) -> None:  # fmt: skip
     cells, runs = np.empty(7 * TILE), empty_runs()
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
-    for begin in range(first, last, TILE):
-        count = min(TILE, last - begin)
-        found = gather(grid, begin, count, inputs, cells, runs)
-        cycle.solve_cells(cells, count, options, wave, motion, codes)
-        scatter(grid, runs, found, periods, motion, codes, results)
+    for stretch in range(stretches.shape[0]):
+        last = stretches[stretch, 1]
+        for begin in range(stretches[stretch, 0], last, TILE):
+            count = min(TILE, last - begin)
+            found = gather(grid, begin, count, inputs, cells, runs)
+            cycle.solve_cells(cells, count, options, wave, motion, codes)
+            scatter(grid, runs, found, periods, motion, codes, results)
 
 
 def _step_grid_of(rule: int) -> Kernel:
@@ -181,7 +200,10 @@ def _step_grid_of(rule: int) -> Kernel:
     return Kernel(step_grid)
 
 
-#: Kernels of the stepping solver by its rule; of the cycle solver for any waveform; and its short way for the sine.
+#: Kernels of the stepping solver by its rule; of the cycle solver for any waveform, for stretches of cells
+#: (rows: the first, and the first after it); and its short way for the sine, which leaves some cells to that: their
+#: number of stretches is returned, and `rest` holds them.  Most sweeps of a sine leave none, and a third of
+#: the first compilation is spared.
 STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (step.RECTANGLE, step.TRAPEZOID, step.SIMPSON)}
 WAVE_KERNEL = Kernel(_wave_grid)
 CYCLE_KERNEL = Kernel(_sine_grid)
@@ -204,7 +226,7 @@ def _parameter_grid(
         for run in range(found):
             for j in range(runs.first[run], runs.first[run + 1]):
                 block = block_of(cell_of(cells, j), options.rise, options.g)
-                place = runs.result[run] + (j - runs.first[run]) * grid.strides[8, -1]
+                place = place_of(grid, runs, run, j)
                 parameters[0, place] = block.yield_acceleration
                 parameters[1, place] = block.limiting_acceleration
                 parameters[2, place] = block.acceleration_ratio

@@ -45,7 +45,7 @@ from slipsweep.kernels.block import (
     stays_below_yield,
 )
 from slipsweep.kernels.cycle import next_break, onset, rising_leg, straight_lag
-from slipsweep.kernels.grid import Grid, gather
+from slipsweep.kernels.grid import Grid, empty_runs, gather, place_of
 from slipsweep.kernels.jit import scalar
 from slipsweep.kernels.linear import held_integrals, held_stop
 
@@ -521,17 +521,17 @@ def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], options: Options, history: History,
     motion: np.ndarray, counts: np.ndarray, validity: np.ndarray,
 ) -> None:  # fmt: skip
-    cells, offsets = np.empty(7 * TILE), np.empty((2, TILE), np.int64)
+    cells, runs = np.empty(7 * TILE), empty_runs()
     for begin in range(first, last, TILE):
-        count = min(TILE, last - begin)
-        gather(grid, begin, count, inputs, cells, offsets)
-        for j in range(count):
-            cell = cell_of(cells, j)
-            answer = newmark(cell, options, history) if options.rise == NEWMARK else mendez(cell, options, history)
-            place = offsets[1, j]
-            motion[0, place], motion[1, place] = answer.displacement, answer.peak_velocity
-            counts[0, place], counts[1, place], counts[2, place] = answer.slips, answer.stick_slips, answer.continuous
-            validity[place] = answer.validity
+        found = gather(grid, begin, min(TILE, last - begin), inputs, cells, runs)
+        for run in range(found):
+            for j in range(runs.first[run], runs.first[run + 1]):
+                cell = cell_of(cells, j)
+                answer = newmark(cell, options, history) if options.rise == NEWMARK else mendez(cell, options, history)
+                place = place_of(grid, runs, run, j)
+                motion[0, place], motion[1, place] = answer.displacement, answer.peak_velocity
+                counts[0, place], counts[1, place] = answer.slips, answer.stick_slips
+                counts[2, place], validity[place] = answer.continuous, answer.validity
 
 
 #: Responses of every cell to one record: displacement and peak velocity, counts, flags.

@@ -5,8 +5,8 @@ follow Eq. 4 to the peak, hold again and stop before the next pulse; or they sli
 continuously with a friction that decays gently.  The functions below are that way, phase by
 phase, for many cells at a time, in loops that LLVM turns into SIMD (Newton with a fixed
 number of iterations, quadrature nodes outside, cells inside).  A cell whose iteration has
-not converged, or that goes another way, is solved as any waveform is, by `cycle`; in continuous sliding
-by symmetry from one quarter of the cycle (`continuous`).
+not converged, or that goes another way, is left to `cycle`, which solves any waveform; in continuous
+sliding it is solved here, by symmetry from one quarter of the cycle (`continuous`).
 """
 
 import math
@@ -51,7 +51,6 @@ from slipsweep.kernels.block import (
     whole_lanes,
 )
 from slipsweep.kernels.cycle import (
-    LEG_COLUMNS,
     MOST_LEGS,
     NODES,
     PANEL_BOUNDS,
@@ -59,9 +58,7 @@ from slipsweep.kernels.cycle import (
     WEIGHTS,
     answer,
     next_break,
-    train,
 )
-from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.jit import in_lanes, scalar, summed
 
 _HALF_PI = 0.5 * math.pi
@@ -898,9 +895,12 @@ def solve_way(
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, motion: np.ndarray, codes: np.ndarray
-) -> None:
-    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
+    cells: np.ndarray, count: int, options: Options, motion: np.ndarray, codes: np.ndarray, left: np.ndarray
+) -> int:
+    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
+
+    Those that are to go from event to event, as any waveform does, are marked in `left`; their number.
+    """
     blocks, lanes, runs = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE + 1, np.int64)
     fill_up(count, 7, cells)
     sort_cells(cells, whole_lanes(count), options, blocks)
@@ -910,11 +910,14 @@ def solve_cells(
     found = runs_of(blocks, count, runs)
     for way in (_YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS):
         solve_way(way, runs, found, options, blocks, lanes, motion, codes)
-    no_legs = np.empty((0, LEG_COLUMNS))
+    others = 0
     for j in range(count):
-        if blocks[_WAY + j] == _OTHER:
+        left[j] = blocks[_WAY + j] == _OTHER
+        if left[j]:
             block = block_at(cells, j, options)
             if block.sliding_mode == CONTINUOUS:
                 answer(continuous(block, options.cycles, options.wants_peak), j, motion, codes)
+                left[j] = False
             else:
-                answer(train(block, options, wave, no_legs), j, motion, codes)
+                others += 1
+    return others
