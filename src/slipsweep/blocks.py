@@ -144,7 +144,8 @@ def solve_here(
     Yields
     ------
     int, Table
-        The number of a block, and its results with their coordinates.
+        The number of a block, and its results with their coordinates: its own until the next but
+        one is asked for, whose arrays take their memory.
     """
     # one set of arrays is being written while the other is solved into
     for (number, block), memory in zip(blocks.items(), itertools.cycle((_Memory(), _Memory())), strict=False):

@@ -237,7 +237,6 @@ class Folder:
         self.manifest = manifest
         content = json.dumps(vars(manifest), indent=1)
         self._write("manifest.json", f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}")
-        self.keep({})
         sync(self.path.parent)
 
     def keep(self, finished: Mapping[int, str]) -> None:
@@ -253,6 +252,7 @@ class Folder:
     def sync(self) -> None:
         """Have the journal on the disk itself."""
         sync(self.path / "journal")
+        sync(self.path)
 
     def close(self) -> None:
         """Put on record that all blocks are there, hence that data which are missing have become the output."""

@@ -340,6 +340,7 @@ def _ready(
         if kept:
             work.keep(kept)
         else:
+            target.close()
             work.clear()
             manifest.nbytes = target.create()
             work.begin(manifest)
@@ -416,9 +417,18 @@ class _OneFile:
         return self
 
     def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, if it is open.
+
+        Left to itself it would be closed when garbage is looked for, by any thread: the netCDF
+        library crashes where another is writing meanwhile.
+        """
         if self.file is not None:
             with suppress(RuntimeError, OSError):  # every block has been flushed
                 self.file.close()
+            self.file = None
 
     def create(self) -> int:
         """Make the file, with all but the blocks in it; return its size."""
@@ -501,6 +511,9 @@ class _Files:
 
     def __exit__(self, *error: object) -> None:
         pass
+
+    def close(self) -> None:
+        """Every file is closed when it is written."""
 
     def create(self) -> int:
         """Make the folder."""
