@@ -47,6 +47,7 @@ def percentiles(errors: np.ndarray) -> tuple[float, float]:
 def cycle_solver(tiny: bool) -> str:
     """Cells of a 3-D grid, and of each regime alone."""
     grids = {"design chart": design_grid(*((4, 4, 8) if tiny else (60, 50, 200)))}
+    grids["finer design chart"] = design_grid(*((4, 4, 16) if tiny else (100, 100, 400)))
     grids |= {regime: regime_cells(regime, 64 if tiny else 200_000) for regime in REGIMES}
 
     def run(grid: dict[str, Any]) -> Callable[[], object]:

@@ -4,7 +4,7 @@ One policy, here and nowhere else:
 
 * Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, so
   no numba threading layer is ever started and none can abort.
-* A call from the main thread of a process spreads its cells over Python threads.
+* A call from the main thread of a process spreads its cells over Python threads, itself among them.
 * A call from any other thread (dask's threaded scheduler, a dask.distributed worker, a
   user's own pool) computes on that thread: whoever started it already shares the cores.
 * The number of threads is the least of the processor affinity, `NUMBA_NUM_THREADS` and
@@ -16,7 +16,7 @@ One policy, here and nowhere else:
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 
 import numba
 
@@ -64,23 +64,25 @@ def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1)
 
     def take_parts() -> None:
         nonlocal taken
-        while not over.is_set():
-            with taking:
-                # ever smaller ones, so that the threads finish together
-                first = taken
-                last = taken = min(first + min(max((cells - first) // (2 * threads), least), most), cells)
-            if first == last:
-                return
-            work(first, last)
-
-    if threads == 1 or cells <= least:
-        take_parts()
-        return
-    with ThreadPoolExecutor(threads) as pool:
         try:
-            futures = [pool.submit(take_parts) for _ in range(threads)]
-            done, _ = wait(futures, return_when=FIRST_EXCEPTION)
-        finally:  # whatever ended the wait, Ctrl-C too: the threads find no more to do
+            while not over.is_set():
+                with taking:
+                    # ever smaller ones, so that the threads finish together
+                    first = taken
+                    last = taken = min(first + min(max((cells - first) // (2 * threads), least), most), cells)
+                if first == last:
+                    return
+                work(first, last)
+        except BaseException:
             over.set()
-    for future in done:
+            raise
+
+    others = min(threads - 1, (cells - 1) // least)
+    with ThreadPoolExecutor(max(others, 1)) as pool:  # starts as many threads as are submitted to
+        try:
+            futures = [pool.submit(take_parts) for _ in range(others)]
+            take_parts()
+        finally:  # whatever ended it, Ctrl-C too: the other threads find no more to do
+            over.set()
+    for future in futures:
         future.result()
