@@ -43,24 +43,28 @@ class Results(NamedTuple):
 class Runs(NamedTuple):
     """Cells of a tile that follow each other along the last dimension: `count` runs, of which run r begins with
     cell `first[r]` (the last ends with cell `first[count] - 1`), at period `period[r]` and result `result[r]`.
+
+    `at` and `position` are room for those of a cell along the dimensions and in the nine flat arrays.
     """
 
     first: np.ndarray
     period: np.ndarray
     result: np.ndarray
+    at: np.ndarray
+    position: np.ndarray
 
 
 @scalar
 def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], cells: np.ndarray, runs: Runs) -> int:
     """Fill `cells` (7 rows of a tile) and `runs` for `count` cells of a grid from `begin` on; the number of runs."""
     dimensions = grid.shape.size
-    index = np.empty(dimensions, np.int64)
+    index, position = runs.at, runs.position
     rest = begin
     for axis in range(dimensions - 1, -1, -1):
         index[axis] = rest % grid.shape[axis]
         rest //= grid.shape[axis]
-    position = np.zeros(9, np.int64)
     for row in range(9):
+        position[row] = 0
         for axis in range(dimensions):
             position[row] += index[axis] * grid.strides[row, axis]
     last = dimensions - 1
@@ -98,9 +102,12 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], c
 
 
 @scalar
-def empty_runs() -> Runs:
+def empty_runs(grid: Grid) -> Runs:
     """Room for the runs of a tile."""
-    return Runs(np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64), np.empty(TILE, np.int64))
+    return Runs(
+        np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64), np.empty(TILE, np.int64),
+        np.empty(grid.shape.size, np.int64), np.empty(9, np.int64),
+    )  # fmt: skip
 
 
 @scalar
@@ -150,19 +157,22 @@ def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     results: Results, rest: np.ndarray,
 ) -> int:  # fmt: skip
-    cells, runs = np.empty(7 * TILE), empty_runs()
+    cells, runs = np.empty(7 * TILE), empty_runs(grid)
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
-    left = np.empty(TILE, np.bool_)
+    room = sine.Room(
+        np.empty(sine.BLOCKS_SIZE), np.empty(sine.LANES_SIZE), np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64),
+        np.empty(TILE, np.bool_),
+    )  # fmt: skip
     stretches = 0
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         found = gather(grid, begin, count, inputs, cells, runs)
-        others = sine.solve_cells(cells, count, options, motion, codes, left)
+        others = sine.solve_cells(cells, count, options, room, motion, codes)
         scatter(grid, runs, found, periods, motion, codes, results)
         for j in range(count if others > 0 else 0):
-            if left[j] and stretches > 0 and rest[stretches - 1, 1] == begin + j:
+            if room.left[j] and stretches > 0 and rest[stretches - 1, 1] == begin + j:
                 rest[stretches - 1, 1] += 1
-            elif left[j]:
+            elif room.left[j]:
                 rest[stretches, 0], rest[stretches, 1] = begin + j, begin + j + 1
                 stretches += 1
     return stretches
@@ -172,7 +182,7 @@ def _wave_grid(
     grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results,
 ) -> None:  # fmt: skip
-    cells, runs = np.empty(7 * TILE), empty_runs()
+    cells, runs = np.empty(7 * TILE), empty_runs(grid)
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
@@ -189,7 +199,7 @@ def _step_grid_of(rule: int) -> Kernel:
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
         steps: step.Steps, results: Results,
     ) -> None:  # fmt: skip
-        cells, runs = np.empty(7 * TILE), empty_runs()
+        cells, runs = np.empty(7 * TILE), empty_runs(grid)
         motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
@@ -219,7 +229,7 @@ def _parameter_grid(
     mode: np.ndarray,
     validity: np.ndarray,
 ) -> None:
-    cells, runs = np.empty(7 * TILE), empty_runs()
+    cells, runs = np.empty(7 * TILE), empty_runs(grid)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         found = gather(grid, begin, count, inputs, cells, runs)

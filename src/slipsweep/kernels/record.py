@@ -521,7 +521,7 @@ def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], options: Options, history: History,
     motion: np.ndarray, counts: np.ndarray, validity: np.ndarray,
 ) -> None:  # fmt: skip
-    cells, runs = np.empty(7 * TILE), empty_runs()
+    cells, runs = np.empty(7 * TILE), empty_runs(grid)
     for begin in range(first, last, TILE):
         found = gather(grid, begin, min(TILE, last - begin), inputs, cells, runs)
         for run in range(found):

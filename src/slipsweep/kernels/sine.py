@@ -10,6 +10,7 @@ sliding it is solved here, by symmetry from one quarter of the cycle (`continuou
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,11 +75,27 @@ _X, _LEVEL, _START, _V, _W, _HELD, _RATE, _MOMENT, _PSI, _LEFT, _PEAK, _CONVERGE
 _CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _THROUGH, _SLOWEST, _AT_PEAK, _TO_PEAK, _GAIN, _MOST = range(
     (LANE_ROWS + 13) * TILE, (LANE_ROWS + 24) * TILE, TILE
 )
-_LANES_SIZE = (LANE_ROWS + 24) * TILE
+LANES_SIZE = (LANE_ROWS + 24) * TILE
 
 #: Rows of a tile's blocks beside the lanes': the codes, the way a cell goes, μmin, and E at Üg = Üy and at the peak.
 _MODE, _VALIDITY, _WAY, _LEAST_FRICTION, _AT_START, _AT_END = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
-_BLOCKS_SIZE = (LANE_ROWS + 6) * TILE
+BLOCKS_SIZE = (LANE_ROWS + 6) * TILE
+
+
+class Room(NamedTuple):
+    """Where the cells of a tile are worked on.
+
+    One for all tiles: a function that makes no array need not count references to any, a nanosecond a cell.
+    `runs` has the cells at which runs of one way start, `where` the cells of the lanes, and `left` is true
+    for cells that are to go from event to event.
+    """
+
+    blocks: np.ndarray
+    lanes: np.ndarray
+    runs: np.ndarray
+    where: np.ndarray
+    left: np.ndarray
+
 
 #: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak;
 #: held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other,
@@ -468,10 +485,10 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
     for lane in range(count):
         if lanes[_CONVERGED + lane] < 0.0:
             where[used] = where[lane]
-            for row in range(0, _LANES_SIZE, TILE):
+            for row in range(0, LANES_SIZE, TILE):
                 lanes[row + used] = lanes[row + lane]
             used += 1
-    fill_up(used, _LANES_SIZE // TILE, lanes)
+    fill_up(used, LANES_SIZE // TILE, lanes)
     return used
 
 
@@ -814,10 +831,16 @@ def runs_of(blocks: np.ndarray, count: int, runs: np.ndarray) -> int:
     run by run.
     """
     runs[0], found = 0, 1
-    for j in range(1, count):
-        if blocks[_WAY + j] != blocks[_WAY + j - 1]:
-            runs[found] = j
-            found += 1
+    for first in range(1, count, STRIP):
+        size = min(STRIP, count - first)
+        before, after = blocks[_WAY + first - 1 :], blocks[_WAY + first :]
+        changes = 0
+        for j in range(size):
+            changes += 1 if after[j] != before[j] else 0
+        for j in range(size if changes > 0 else 0):
+            if after[j] != before[j]:
+                runs[found] = first + j
+                found += 1
     runs[found] = count
     return found
 
@@ -861,11 +884,9 @@ def enter(
 
 
 @scalar
-def solve_way(
-    way: int, runs: np.ndarray, count: int, options: Options, blocks: np.ndarray, lanes: np.ndarray,
-    motion: np.ndarray, codes: np.ndarray,
-) -> None:  # fmt: skip
-    """Solve the cells of a tile that go one way."""
+def solve_way(way: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Solve the cells of a tile, which has `count` runs, that go one way."""
+    blocks, lanes, runs, where = room.blocks, room.lanes, room.runs, room.where
     used = 0
     for run in range(count):
         if blocks[_WAY + runs[run]] == way:
@@ -875,7 +896,7 @@ def solve_way(
     fill_up(used, LANE_ROWS, lanes)
     for first in range(0, used, STRIP):
         solve_strip(way, options, lanes[first:])
-    where, lane = np.empty(used, np.int64), 0
+    lane = 0
     for run in range(count):
         first, last = runs[run], runs[run + 1]
         if blocks[_WAY + first] == way:
@@ -883,7 +904,9 @@ def solve_way(
             found, cells, moved, coded = lanes[lane:], blocks[first:], motion[:, first:last], codes[:, first:last]
             for j in range(last - first):
                 enter(found, j, way, options, cells, moved, coded, j)
-                where[lane + j] = first + j
+            if way == _STICKS:
+                for j in range(last - first):
+                    where[lane + j] = first + j
             lane += last - first
     if way == _STICKS:
         used = fill_carried(used, lanes, where)
@@ -895,29 +918,30 @@ def solve_way(
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, motion: np.ndarray, codes: np.ndarray, left: np.ndarray
+    cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
 ) -> int:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
 
-    Those that are to go from event to event, as any waveform does, are marked in `left`; their number.
+    Those that are to go from event to event, as any waveform does, are marked in `room.left`; their number.
     """
-    blocks, lanes, runs = np.empty(_BLOCKS_SIZE), np.empty(_LANES_SIZE), np.empty(TILE + 1, np.int64)
+    blocks, left = room.blocks, room.left
     fill_up(count, 7, cells)
     sort_cells(cells, whole_lanes(count), options, blocks)
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[_MODE + j]), int(blocks[_VALIDITY + j])
         motion[0, j] = motion[1, j] = 0.0 if blocks[_MODE + j] == STUCK else math.nan
-    found = runs_of(blocks, count, runs)
+    found = runs_of(blocks, count, room.runs)
     for way in (_YIELD_GOVERNS, _FOLLOWS, _STICKS, _CONTINUOUS):
-        solve_way(way, runs, found, options, blocks, lanes, motion, codes)
+        solve_way(way, found, options, room, motion, codes)
     others = 0
     for j in range(count):
+        others += 1 if blocks[_WAY + j] == _OTHER else 0
+    for j in range(count if others > 0 else 0):
         left[j] = blocks[_WAY + j] == _OTHER
         if left[j]:
             block = block_at(cells, j, options)
             if block.sliding_mode == CONTINUOUS:
                 answer(continuous(block, options.cycles, options.wants_peak), j, motion, codes)
                 left[j] = False
-            else:
-                others += 1
+                others -= 1
     return others
