@@ -493,8 +493,8 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
 
 
 @scalar
-def lane_carried(options: Options, lanes: np.ndarray) -> None:
-    """All cycles of lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
+def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
+    """All cycles of `count` lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
 
     Then they hold E(Üy) ≥ Üg from Üy on and slide through, and each pulse is entered with V greater by
     the same gain.  Where that is a loss, one of two things ends it, and the motion repeats: a pulse that
@@ -574,7 +574,7 @@ def lane_carried(options: Options, lanes: np.ndarray) -> None:
         lanes[_CONVERGED + j] = 1.0 if repeats else -1.0
         lanes[_CODE + j] = NOT_RECOUPLED
     if later <= _MOST_PULSES:
-        for j in range(STRIP):
+        for j in range(count):
             if lanes[_CONVERGED + j] < 0.0:
                 follow_pulses(options, lanes, j)
 
@@ -911,7 +911,7 @@ def solve_way(way: int, count: int, options: Options, room: Room, motion: np.nda
     if way == _STICKS:
         used = fill_carried(used, lanes, where)
         for first in range(0, used, STRIP):
-            lane_carried(options, lanes[first:])
+            lane_carried(min(used - first, STRIP), options, lanes[first:])
         for lane in range(used):
             enter(lanes, lane, way, options, blocks, motion, codes, where[lane])
 
