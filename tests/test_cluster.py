@@ -236,7 +236,7 @@ def test_a_killed_scheduler_leaves_a_run_that_can_be_gone_on_with(
         rf"slipsweep: error: the scheduler at {address} was lost; (\d+) of 24 blocks are kept; go on with --resume\n"
     )
     found = re.fullmatch(expected, errors)
-    assert found
+    assert found, errors
     assert (status, output) == (1, "")
     assert 3 <= int(found[1]) < 24
     assert not (tmp_path / "a.nc").exists()

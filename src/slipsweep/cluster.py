@@ -231,12 +231,14 @@ class _Run:
     def _result(self, future: "Future", number: int) -> Table:
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
+        from distributed.comm import CommClosedError
 
         try:
             results: Table = future.result()
         except (InputError, RunError, MemoryError):
             raise
-        except FutureCancelledError:
+        except (FutureCancelledError, CommClosedError):
+            # the second, where the client itself has not yet seen it; from workers results come by the scheduler
             raise self._lost() from None
         except KilledWorker as error:
             raise RunError(
