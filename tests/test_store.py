@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slipsweep
-from slipsweep import blocks, plans, spec, store, variables
+from slipsweep import blocks, netcdf, plans, spec, store, variables
 from slipsweep.errors import InputError, RunError
 from slipsweep.tables import Table, Variable
 
@@ -269,7 +269,7 @@ def test_the_tally_counts_modes_and_flags(tmp_path: Path) -> None:
     assert report.tally.cells == values["validity"].size == 5 * 3 * 40 * 4
     assert report.tally.modes == {mode: np.sum(values["sliding_mode"] == mode) for mode in variables.SlidingMode}
     assert report.tally.flags == {flag: np.sum(values["validity"] & flag != 0) for flag in variables.Validity}
-    assert store.read_contents(tmp_path / "a.nc").tally == report.tally
+    assert netcdf.read_contents(tmp_path / "a.nc").tally == report.tally
     assert report.nbytes == (tmp_path / "a.nc").stat().st_size
 
 
@@ -282,7 +282,7 @@ def test_tables_in_memory_are_written_by_the_same_rules(tmp_path: Path) -> None:
         {"relative_velocity": Variable(("time",), np.array([0.0, 1.0]), variables.HISTORY["relative_velocity"])},
         {"permanent_displacement": 0.5},
     )
-    store.write_table(table, tmp_path / "a.nc", title="History", command="x")
+    netcdf.write_table(table, tmp_path / "a.nc", title="History", command="x")
     with xr.open_dataset(tmp_path / "a.nc") as read:
         expected = xr.Dataset(
             {"relative_velocity": ("time", [0.0, 1.0])}, {"time": ("time", [0.0, 0.1]), "theta": ((), 5.0)}
@@ -296,13 +296,13 @@ def test_tables_in_memory_are_written_by_the_same_rules(tmp_path: Path) -> None:
 def test_other_files_have_no_contents(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.nc").write_bytes(content)
     with pytest.raises(InputError, match=r"a\.nc: not a netCDF file"):
-        store.read_contents(tmp_path / "a.nc")
+        netcdf.read_contents(tmp_path / "a.nc")
 
 
 def test_netcdf_of_others_has_no_contents(tmp_path: Path) -> None:
     netCDF4.Dataset(tmp_path / "a.nc", "w").close()
     with pytest.raises(InputError, match=r"a\.nc: not written by slipsweep"):
-        store.read_contents(tmp_path / "a.nc")
+        netcdf.read_contents(tmp_path / "a.nc")
     with pytest.raises(InputError, match=r'a\.nc: no attribute "sweep"'):
         spec.load(tmp_path / "a.nc")
 

@@ -13,7 +13,7 @@ from processes import slipsweep as command
 from scipy import stats
 
 import slipsweep
-from slipsweep import spec, store, uncertainty_figures
+from slipsweep import netcdf, spec, uncertainty_figures
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.slices import Result
@@ -555,7 +555,7 @@ def test_cases_keep_their_labels(tmp_path: Path) -> None:
     assert checked.sampling is not None
     arguments = {name: value for name, value in checked.arguments().items() if name != "variables"}
     table = plan_samples(checked.sampling, **arguments).solve()
-    store.write_statistics(checked, table, tmp_path / "cases.nc", command="slipsweep run")
+    netcdf.write_statistics(checked, table, tmp_path / "cases.nc", command="slipsweep run")
     with netCDF4.Dataset(tmp_path / "cases.nc") as file:
         assert list(file["label"][:]) == ["north", "süd"]
         assert file["displacement_quantile"].dimensions == ("amplitude", "frequency", "case", "quantile")
@@ -602,7 +602,7 @@ def test_the_share_without_a_value_is_shown(tmp_path: Path) -> None:
     assert checked.sampling is not None
     arguments = {name: value for name, value in checked.arguments().items() if name != "variables"}
     whole = plan_samples(checked.sampling, **arguments).solve()
-    store.write_statistics(checked, whole, tmp_path / "steep.nc", command="slipsweep run")
+    netcdf.write_statistics(checked, whole, tmp_path / "steep.nc", command="slipsweep run")
     with Result(tmp_path / "steep.nc") as result:
         names = ["exceedance_probability", "displacement_quantile", "valueless_share"]
         table = result.select(names, {"amplitude": slice(None), "quantile": slice(None)}, {"frequency": 1})

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep import store
+from slipsweep import netcdf, outputs
 from slipsweep.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.errors import InputError
 from slipsweep.history import history_table
@@ -128,7 +128,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     InputError
         The file cannot be read, or holds no displacement over amplitude and frequency.
     """
-    with store.open_result(path) as file:
+    with netcdf.open_result(path) as file:
         file.set_auto_mask(False)
         if "exceedance_probability" in file.variables:
             raise InputError(f"{path}: holds statistics of uncertain inputs, which slipsweep chart draws")
@@ -147,7 +147,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
         for dim, length in lengths.items():
             order = np.argsort(file[dim][:], kind="stable") if dim in file.variables else np.arange(length)
             keep[dim] = order[evenly(length, left[dim])]
-        names = store.coordinate_names(file) & {*PARAMETERS}
+        names = netcdf.coordinate_names(file) & {*PARAMETERS}
         coords = {
             name: Variable(
                 file[name].dimensions,
@@ -317,7 +317,7 @@ def write_page(
     RunError
         Writing failed.
     """
-    store.check_output(output, overwrite)
+    outputs.check_output(output, overwrite)
     script = _bokeh().resources.Resources(mode="inline", components=["bokeh"]).render()
     # the page without its arrays, and its figures and notes
     overhead = len(script.encode()) + 150_000
@@ -333,7 +333,7 @@ def write_page(
             break
     histories = compute_histories(excerpt, int(min(room - taken, _HISTORIES_BYTES)))
     text = page(excerpt, histories, path.name, script)
-    with store.complete_or_absent(output, overwrite) as temporary:
+    with outputs.complete_or_absent(output, overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return excerpt
 

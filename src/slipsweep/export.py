@@ -14,7 +14,7 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep import store
+from slipsweep import netcdf, outputs
 from slipsweep.blocks import grid_blocks
 from slipsweep.errors import InputError, RunError
 from slipsweep.suggest import did_you_mean
@@ -128,12 +128,12 @@ def export(
         raise InputError(f"{path}: the name must end in one of {', '.join(SUFFIXES)}")
     if path.suffix == ".parquet":
         _check_pyarrow(path)
-    store.check_output(path, overwrite)
-    with store.open_result(source) as file:
+    outputs.check_output(path, overwrite)
+    with netcdf.open_result(source) as file:
         columns, shape = _columns(file, source, variables, words)
         make = _csv if path.suffix == ".csv" else _parquet
         attributes = {name: str(file.getncattr(name)) for name in file.ncattrs()}
-        with store.complete_or_absent(path, overwrite) as temporary:
+        with outputs.complete_or_absent(path, overwrite) as temporary:
             try:
                 with make(temporary, columns, attributes) as write:
                     for block in grid_blocks(shape, block_cells) if shape else [{}]:
@@ -147,7 +147,7 @@ def export(
 
 def count_rows(source: Path, variables: Sequence[str] | None = None) -> int:
     """Return the number of rows that `export` makes; arguments and errors are its."""
-    with store.open_result(source) as file:
+    with netcdf.open_result(source) as file:
         return math.prod(_columns(file, source, variables, False)[1].values())
 
 
@@ -155,10 +155,10 @@ def _columns(
     file: netCDF4.Dataset, source: Path, wanted: Sequence[str] | None, words: bool
 ) -> tuple[list[Column], dict[str, int]]:
     """Choose the columns, coordinates first, and the grid they span."""
-    coordinates = store.coordinate_names(file)
+    coordinates = netcdf.coordinate_names(file)
     results = [name for name in file.variables if name not in coordinates]
     # the samples of a record are no cells: they are exported if asked for
-    cells = [name for name in results if store.RECORD_DIM not in file[name].dimensions]
+    cells = [name for name in results if netcdf.RECORD_DIM not in file[name].dimensions]
     chosen = list(dict.fromkeys(cells if wanted is None else wanted))
     for name in chosen:
         if name not in results:

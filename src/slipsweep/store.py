@@ -1,10 +1,9 @@
-"""Results on disk: a sweep computed and written block by block, netCDF files made and read.
+"""A sweep computed and written block by block.
 
-A file appears under its name only when it is complete.  Results are stored contiguous and
-uncompressed: then each value has its place in the file before any is known, and once the empty
-file is on the disk a block is written without a change to anything but its own bytes.  A run that
-is killed leaves a file that can be read and gone on with (`slipsweep.parts`), and no value is
-written twice.
+Results are stored contiguous and uncompressed: then each value has its place in the file before any
+is known, and once the empty file is on the disk a block is written without a change to anything but
+its own bytes.  A run that is killed leaves a file that can be read and gone on with
+(`slipsweep.parts`), and no value is written twice.
 
 Fresh memory is what writing costs: the netCDF4 library alone takes from 1 to 5 s of processor for
 1.9 GB, nearly all of it for the pages of the file.  So a run has few of them at a time, and solves
@@ -13,18 +12,15 @@ wrote 2.1 GB/s; zlib on the two flag variables 1.7 GB/s for 16 % of the bytes; z
 0.1 GB/s for 58 %.)
 """
 
-import itertools
 import math
 import os
-import re
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
@@ -34,7 +30,6 @@ from numpy.typing import NDArray
 
 from slipsweep import parts
 from slipsweep.blocks import (
-    BLOCK_CELLS,
     Block,
     Progress,
     Solved,
@@ -46,141 +41,16 @@ from slipsweep.blocks import (
     solve_here,
 )
 from slipsweep.errors import InputError, RunError
-from slipsweep.parts import sync
-from slipsweep.records import Record
+from slipsweep.netcdf import Tally, new_file, rounded, stored_tally, write_head
+from slipsweep.outputs import appear, check_output, writing
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table, Variable
-from slipsweep.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode, Validity
-
-#: Results that are whole numbers, -1 where there is no value.
-_WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
-
-#: Dimension of the samples of a record.
-RECORD_DIM = "record_sample"
 
 #: Bytes that are written, or seconds that pass, before they are brought to the disk itself; the
 #: journal follows after as many seconds.
 _SYNC_BYTES = 64_000_000
 _SYNC_SECONDS = 1.0
-
-#: Name of a block's file in a folder that `run` made.
-_BLOCK_FILE = re.compile(r"block-\d{6,}\.nc")
-
-
-# ------------------------------------------------------------------- complete or not there
-
-
-def check_output(path: Path, overwrite: bool, folder: bool = False) -> None:
-    """Refuse an output (a file, or a `folder` of blocks) that cannot be written, or exists and may not be replaced.
-
-    Raises
-    ------
-    InputError
-    """
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist")
-    if folder and path.exists() and not (path.is_dir() and all(map(_BLOCK_FILE.fullmatch, os.listdir(path)))):
-        raise InputError(f"{path}: exists and is not a folder of blocks")
-    if not folder and path.exists() and not path.is_file():
-        raise InputError(f"{path}: exists and is not a file")
-    if path.exists() and not overwrite:
-        raise InputError(f"{path}: exists already; give --overwrite to replace it, or another name with -o")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: the folder {path.parent} is not writable")
-
-
-@contextmanager
-def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
-    """Yield a temporary name beside `path`; what is written there becomes `path` on success.
-
-    On any error or interruption the temporary file is removed and `path` stays as it was.
-
-    Raises
-    ------
-    RunError
-        The file cannot be written, or another process made `path` in the meantime.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        yield temporary
-        with _writing(path):
-            _appear(temporary, path, overwrite)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _appear(temporary: Path, path: Path, overwrite: bool) -> None:
-    """Give a finished file, or folder of files, its name."""
-    sync(temporary)
-    if temporary.is_dir():
-        if overwrite and path.is_dir():
-            shutil.rmtree(path)
-        elif path.exists():
-            raise RunError(f"{path}: was made by another process during the run; it is left alone")
-        temporary.replace(path)
-    elif overwrite:
-        temporary.replace(path)
-    else:
-        _rename_to_new(temporary, path)
-    sync(path.parent)
-
-
-def _rename_to_new(temporary: Path, path: Path) -> None:
-    """Rename, but never over a file that has appeared since `check_output`."""
-    try:
-        os.link(temporary, path)
-    except FileExistsError:
-        raise RunError(f"{path}: was made by another process during the run; it is left alone") from None
-    except OSError:  # a file system without hard links
-        temporary.replace(path)
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """Turn what the system and the netCDF library raise into one message."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:
-        if isinstance(error, RunError):
-            raise
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        # all that the netCDF library says of a full disk is "HDF error"
-        free = size_text(shutil.disk_usage(path.parent).free)
-        raise RunError(f"{path}: writing failed: {reason}; is the disk full? ({free} free)") from error
-
-
-# ------------------------------------------------------------------------- running a sweep
-
-
-@dataclass
-class Tally:
-    """Counts of cells, and among them of each sliding mode and each flag (None: not stored)."""
-
-    cells: int = 0
-    modes: dict[SlidingMode, int] | None = None
-    flags: dict[Validity, int] | None = None
-
-    def add(self, results: Mapping[str, NDArray[Any]]) -> None:
-        """Count one block; `results` holds its arrays by variable name."""
-        if "sliding_mode" in results:
-            self.modes = self.modes or dict.fromkeys(SlidingMode, 0)
-            for mode in SlidingMode:
-                # int(): numpy would take a member of an enumeration for 64 bits, and all cells with it
-                self.modes[mode] += int(np.count_nonzero(results["sliding_mode"] == int(mode)))
-        if "validity" in results:
-            self.flags = self.flags or dict.fromkeys(Validity, 0)
-            seen = int(np.bitwise_or.reduce(results["validity"], axis=None))
-            for flag in Validity(seen & 255):
-                self.flags[flag] += int(np.count_nonzero(results["validity"] & int(flag)))
-
-    def merge(self, other: "Tally") -> None:
-        """Add the counts of other cells."""
-        self.cells += other.cells
-        if other.modes is not None:
-            self.modes = {mode: (self.modes or {}).get(mode, 0) + count for mode, count in other.modes.items()}
-        if other.flags is not None:
-            self.flags = {flag: (self.flags or {}).get(flag, 0) + count for flag, count in other.flags.items()}
 
 
 @dataclass
@@ -267,7 +137,7 @@ def run(
             if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
                 # killed between giving the output its name and clearing the folder away
                 work.done = True
-                return Report(path, spec.shape, 0.0, _nbytes(path), _stored_tally(path))
+                return Report(path, spec.shape, 0.0, _nbytes(path), stored_tally(path))
         else:
             work.clear()
             block_cells = min(filter(None, (block_cells, shared_cells)), default=default_cells(spec))
@@ -285,10 +155,10 @@ def run(
                 _ready(work, target, cut, manifest, tally, progress)
                 missing = {number: block for number, block in cut.items() if number not in work.finished}
                 _write_blocks(work, target, cut, solved(spec, missing, progress), tally)
-            with _writing(path):
+            with writing(path):
                 parts.sync(data)
                 work.close()
-                _appear(data, path, overwrite)
+                appear(data, path, overwrite)
         except MemoryError:
             error = RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}")
             raise _noted(error, work, len(cut)) from None
@@ -336,7 +206,7 @@ def _ready(
                 tally.add(arrays)
                 if progress is not None:
                     progress(math.prod(part.stop - part.start for part in cut[number].values()))
-    with _writing(work.output):
+    with writing(work.output):
         if kept:
             work.keep(kept)
         else:
@@ -366,9 +236,9 @@ def _write_blocks(
 
     def write(number: int, table: Table) -> None:
         nonlocal syncing, unsynced, synced
-        with _writing(work.output):
+        with writing(work.output):
             arrays = {
-                name: _rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
+                name: rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
             }
             digest = examiner.submit(examine, arrays)
             target.write(number, cut[number], table, arrays)
@@ -399,7 +269,7 @@ def _write_blocks(
             del table
         if pending is not None:
             pending.result()
-        with _writing(work.output):
+        with writing(work.output):
             if syncing is not None:
                 syncing.result()
             bring(drop=False, journal=True)
@@ -432,8 +302,8 @@ class _OneFile:
 
     def create(self) -> int:
         """Make the file, with all but the blocks in it; return its size."""
-        with _netcdf(self.data, self.data) as file:
-            _head(file, self.spec, self.table, self.spec.labels, self.command)
+        with new_file(self.data, self.data) as file:
+            write_head(file, self.spec, self.table, self.spec.labels, self.command)
             for name in self.table.data_vars:
                 # the first value that is written makes room for all
                 file[name][(-1,) * file[name].ndim or ...] = 0
@@ -484,21 +354,6 @@ class _OneFile:
         parts.sync(self.data, drop)
 
 
-def _rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """A result as the file holds it; what is too large for that is an error, and not infinite."""
-    if values.dtype == dtype:
-        return values
-    with np.errstate(over="ignore"):
-        rounded = values.astype(dtype)
-    beyond = np.isinf(rounded)
-    if beyond.any() and np.isfinite(worst := np.abs(values[beyond]).max()):
-        raise InputError(
-            f'output.dtype = "{dtype}": {name} reaches {worst:.4g}, more than the {np.finfo(dtype).max:.4g} that it '
-            'holds; must be "float64"'
-        )
-    return rounded
-
-
 class _Files:
     """A folder with a netCDF file for each block, complete by itself."""
 
@@ -546,8 +401,8 @@ class _Files:
         stored = replace(table, coords=coords, data_vars=results)
         path = self._name(number)
         temporary = path.with_suffix(".tmp")
-        with _netcdf(temporary, path) as file:
-            _head(file, self.spec, stored, labels, self.command)
+        with new_file(temporary, path) as file:
+            write_head(file, self.spec, stored, labels, self.command)
             for name, result in results.items():
                 file[name][...] = result.values
         temporary.replace(path)
@@ -567,84 +422,11 @@ def _where(block: Mapping[str, slice], dims: tuple[str, ...]) -> Any:
     return tuple(block[dim] for dim in dims) or ...
 
 
-def _head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[str, ...], command: str) -> None:
-    """Write all of a sweep's file but its results."""
-    _define(file, table, spec.dtype)
-    _label_cases(file, labels)
-    _describe(file, {**table.attrs, "title": spec.output.title, **_provenance(command), "sweep": spec.text})
-    file.set_auto_maskandscale(False)
-    for name, coordinate in table.coords.items():
-        file[name][...] = coordinate.values
-    if spec.record is not None:
-        _embed(file, spec.record)
-
-
-def _embed(file: netCDF4.Dataset, record: Record) -> None:
-    """Write the samples of a record, from which the run can be repeated when its file is gone."""
-    file.createDimension(RECORD_DIM, record.times.size)
-    for name, values in zip(RECORD_SAMPLES, (record.times, record.acceleration), strict=True):
-        variable = file.createVariable(name, "f8", (RECORD_DIM,))
-        _describe(variable, RECORD_SAMPLES[name])
-        variable[:] = values
-
-
 def _nbytes(path: Path) -> int:
     """Bytes that a file, or the files of a folder, take on the disk."""
     if path.is_dir():
         return sum(entry.stat().st_size for entry in path.iterdir())
     return path.stat().st_size if path.exists() else 0
-
-
-def write_table(
-    table: Table, path: Path, *, title: str, command: str, overwrite: bool = False, record: Record | None = None
-) -> None:
-    """Write a table that is in memory (a time history) by the rules that sweeps are written by.
-
-    The `record` that it is the response to is written with it.
-    """
-    check_output(path, overwrite)
-    with (
-        complete_or_absent(path, overwrite) as temporary,
-        _netcdf(temporary, path) as file,
-        _writing(path),
-    ):
-        _define(file, table, lambda name: table[name].values.dtype)
-        _describe(file, {**table.attrs, "title": title, **_provenance(command)})
-        file.set_auto_maskandscale(False)
-        for name, array in {**table.coords, **table.data_vars}.items():
-            file[name][...] = array.values
-        if record is not None:
-            _embed(file, record)
-
-
-def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str, overwrite: bool = False) -> None:
-    """Write the statistics of a sweep with uncertain inputs: with its text, so that it can be repeated from them."""
-    check_output(path, overwrite)
-    with (
-        complete_or_absent(path, overwrite) as temporary,
-        _netcdf(temporary, path) as file,
-        _writing(path),
-    ):
-        _head(file, spec, table, spec.labels, command)
-        for name, array in table.data_vars.items():
-            file[name][...] = _rounded(name, array.values, spec.dtype(name))
-
-
-def without_time_axis(table: Table) -> Table:
-    """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
-
-    A dimension `time` is a time axis of the CF conventions (4.4), whose values are dates.  Seconds
-    since the shaking began are none, and given a made-up date they would be read back as dates.
-    """
-    dims = {"time": "instant"}
-    coords, data_vars = (
-        {
-            name: Variable(tuple(dims.get(dim, dim) for dim in array.dims), array.values, array.attrs)
-            for name, array in arrays.items()
-        }
-        for arrays in (table.coords, table.data_vars)
-    )
-    return Table(coords, data_vars, table.attrs)
 
 
 def _check_size(spec: SweepSpec, path: Path, block_cells: int, written: int) -> None:
@@ -668,185 +450,3 @@ def _check_size(spec: SweepSpec, path: Path, block_cells: int, written: int) -> 
 def _block_text(spec: SweepSpec, block_cells: int) -> str:
     lengths = block_lengths(spec.shape, block_cells)
     return f"{math.prod(lengths.values())} cells ({' x '.join(f'{n} {dim}' for dim, n in lengths.items())})"
-
-
-# ------------------------------------------------------------------------------ netCDF files
-
-
-@contextmanager
-def _netcdf(temporary: Path, path: Path) -> Iterator[netCDF4.Dataset]:
-    """Open a new netCDF file, and close it whatever happens."""
-    with _writing(path):
-        file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
-    file.set_fill_off()  # every value is written: filling the file first would write it twice
-    try:
-        yield file
-    except BaseException:
-        with suppress(RuntimeError, OSError):  # the first error is the one to report
-            file.close()
-        raise
-    with _writing(path):
-        file.close()
-
-
-def _define(file: netCDF4.Dataset, table: Table, dtype: Callable[[str], np.dtype[Any]]) -> None:
-    """Define the dimensions and variables of `table`."""
-    sizes = table.sizes
-    # in the order of the results, which that of the coordinates need not be
-    widest = max((result.dims for result in table.data_vars.values()), key=len, default=())
-    shape = {dim: sizes[dim] for dim in (*widest, *sizes)}
-    for dim, length in shape.items():
-        file.createDimension(dim, length)
-    for name, coordinate in table.coords.items():
-        variable = file.createVariable(name, coordinate.values.dtype, coordinate.dims)
-        _describe(variable, coordinate.attrs)
-    for name, result in table.data_vars.items():
-        dims, kind = result.dims, dtype(name)
-        fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name in _WITH_MISSING else None
-        variable = file.createVariable(name, kind, dims, fill_value=fill, contiguous=True)
-        attributes = dict(result.attrs)
-        if attributes.get("ancillary_variables") not in table:
-            attributes.pop("ancillary_variables", None)
-        auxiliary = [c for c in table.coords if c not in shape and {*table[c].dims} <= {*dims}]
-        if auxiliary:
-            attributes["coordinates"] = " ".join(auxiliary)
-        _describe(variable, attributes)
-
-
-def _label_cases(file: netCDF4.Dataset, labels: tuple[str, ...]) -> None:
-    """Write the names of the rows of [[cases]]: as characters, since few programs read netCDF strings."""
-    if not labels:
-        return
-    text = np.array([label.encode() for label in labels])
-    file.createDimension("label_length", text.dtype.itemsize)
-    variable = file.createVariable("label", "S1", ("case", "label_length"))
-    variable.set_auto_chartostring(False)
-    _describe(variable, {"long_name": "name of the case", "_Encoding": "utf-8"})
-    variable[:] = text.view("S1").reshape(len(labels), -1)
-    for other in file.variables.values():
-        if "case" in other.dimensions and "coordinates" in other.ncattrs():
-            _describe(other, {"coordinates": f"{other.getncattr('coordinates')} label"})
-
-
-def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[str, Any]) -> None:
-    """Set attributes: text as characters in UTF-8, flag values in the type of their variable."""
-    for name, value in attributes.items():
-        if isinstance(value, str):
-            # as bytes: the library would write text beyond ASCII as a netCDF string
-            target.setncattr(name, value.encode())
-        elif name in ("flag_values", "flag_masks"):
-            target.setncattr(name, np.asarray(value, target.dtype))
-        elif isinstance(value, int):
-            target.setncattr(name, np.int32(value))  # not every program reads 64-bit attributes
-        else:
-            target.setncattr(name, value)
-
-
-def _provenance(command: str) -> dict[str, str]:
-    return {
-        "Conventions": "CF-1.11",
-        "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}",
-    }
-
-
-# --------------------------------------------------------------------------- reading a file
-
-
-@dataclass
-class Contents:
-    """What a file of slipsweep holds and how it was made; coordinates and variables in words."""
-
-    path: Path
-    nbytes: int
-    attributes: dict[str, str]
-    coordinates: dict[str, str]
-    variables: dict[str, str]
-    tally: Tally
-
-
-@contextmanager
-def open_result(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Open a file of slipsweep to read from.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, is not netCDF, or was not written by slipsweep.
-    """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    try:
-        file = netCDF4.Dataset(path)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
-    with file:
-        if not str(getattr(file, "source", "")).startswith("slipsweep "):
-            raise InputError(f"{path}: not written by slipsweep")
-        yield file
-
-
-def coordinate_names(file: netCDF4.Dataset) -> set[str]:
-    """Names of a file's coordinate variables, auxiliary and scalar ones among them."""
-    named = (
-        variable.coordinates.split() for variable in file.variables.values() if "coordinates" in variable.ncattrs()
-    )
-    return {*file.dimensions, *itertools.chain.from_iterable(named)}
-
-
-def read_contents(path: Path) -> Contents:
-    """Describe a file of slipsweep; memory stays small whatever its size.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, is not netCDF, or was not written by slipsweep.
-    """
-    with open_result(path) as file:
-        try:
-            coordinates = coordinate_names(file)
-            return Contents(
-                path,
-                path.stat().st_size,
-                {name: str(file.getncattr(name)) for name in file.ncattrs()},
-                {name: _values_text(file[name]) for name in file.variables if name in coordinates},
-                {name: _variable_text(file[name]) for name in file.variables if name not in coordinates},
-                _count(file),
-            )
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
-
-
-def _count(file: netCDF4.Dataset) -> Tally:
-    tally = Tally()
-    for name in ("sliding_mode", "validity"):
-        if name in file.variables:
-            variable = file[name]
-            variable.set_auto_mask(False)
-            tally.cells = variable.size
-            for block in grid_blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
-                tally.add({name: variable[tuple(block.values())]})
-    return tally
-
-
-def _stored_tally(path: Path) -> Tally:
-    """Count what is in a file, or in the files of a folder."""
-    tally = Tally()
-    for name in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with netCDF4.Dataset(name) as file:
-            tally.merge(_count(file))
-    return tally
-
-
-def _values_text(variable: netCDF4.Variable) -> str:
-    values = variable[...]
-    if variable.dtype == "S1":
-        return ", ".join(values)
-    units = "" if variable.units == "1" else f" {variable.units}"
-    if values.size == 1:
-        return f"{values.item():.6g}{units}"
-    return f"{values.size} values, {values.min():.6g} to {values.max():.6g}{units}"
-
-
-def _variable_text(variable: netCDF4.Variable) -> str:
-    units = f", {variable.units}" if "units" in variable.ncattrs() and variable.units != "1" else ""
-    return f"{variable.long_name}{units} ({variable.dtype})"

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from slipsweep import engine, threads
 from slipsweep.engine import Problem
 from slipsweep.errors import InputError
+from slipsweep.netcdf import Tally
 from slipsweep.parameters import BOUNDS, check_choice, check_values, check_whole, number_text
 from slipsweep.plans import aligned, grid_sizes, plan_sweep
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import quantity, unit_factor
-from slipsweep.store import Tally
 from slipsweep.suggest import did_you_mean
 from slipsweep.tables import Table, Variable
 from slipsweep.variables import (

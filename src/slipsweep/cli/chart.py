@@ -76,25 +76,25 @@ def chart(
             near = difflib.get_close_matches(name, _CHARTS, n=1)
             hint = f'did you mean "{near[0]}"? ' if near else ""
             raise InputError(f"--kind {name}: no such chart; {hint}there are {', '.join(_CHARTS)}")
-    outputs = output or []
-    for path in outputs:
+    given = output or []
+    for path in given:
         if path.suffix not in (".png", ".svg", ".pdf"):
             raise InputError(f"{path}: the name must end in one of .png, .svg, .pdf")
-    if outputs and len(kinds) != 1:
-        raise InputError(f"-o {outputs[0]}: is for one chart: give one --kind, one of {', '.join(_CHARTS)}")
+    if given and len(kinds) != 1:
+        raise InputError(f"-o {given[0]}: is for one chart: give one --kind, one of {', '.join(_CHARTS)}")
     wish = _Wish(x, y, _cuts(at or ()), variable)
 
-    from slipsweep import store
+    from slipsweep import outputs
     from slipsweep.slices import Result
 
     with Result(file) as result:
         figures: dict[str, Figure] = {}
         left_out: dict[str, str] = {}
         fitting = _STATISTIC_CHARTS if "exceedance_probability" in result.variables else _SWEEP_CHARTS
-        wanted = {name: outputs or [Path(f"{file.stem}-{name}.png")] for name in kinds or fitting}
+        wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in kinds or fitting}
         for paths in wanted.values():
             for path in paths:
-                store.check_output(path, overwrite)
+                outputs.check_output(path, overwrite)
         if not any(values.size > 1 for dim, values in result.axes.items() if dim != "case"):
             raise InputError(
                 f"{file}: no chart can be drawn: it has no axis of two values or more (its dimensions: "
@@ -113,7 +113,7 @@ def chart(
         raise InputError(f"{file}: no chart can be drawn from it: {reasons}")
     for name, figure in figures.items():
         for path in wanted[name]:
-            with store.complete_or_absent(path, overwrite) as temporary:
+            with outputs.complete_or_absent(path, overwrite) as temporary:
                 figure.savefig(temporary, format=path.suffix[1:], dpi=150)
             typer.echo(path)
     for name, reason in left_out.items():

@@ -11,7 +11,7 @@ import typer
 from slipsweep.variables import VALIDITY_TEXT
 
 if TYPE_CHECKING:
-    from slipsweep.store import Tally
+    from slipsweep.netcdf import Tally
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]

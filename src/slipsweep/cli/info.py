@@ -12,10 +12,10 @@ EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc"
 
 def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:
     """Tell what is in a result, how it was made, and the shares of its modes and flags."""
-    from slipsweep import store
+    from slipsweep import netcdf
     from slipsweep.resources import size_text
 
-    contents = store.read_contents(file)
+    contents = netcdf.read_contents(file)
     typer.echo(f"{contents.path}  {size_text(contents.nbytes)}")
     for title, entries in (("coordinates", contents.coordinates), ("variables", contents.variables)):
         typer.echo(f"{title}:")

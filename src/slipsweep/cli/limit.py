@@ -46,12 +46,12 @@ def limit(
         ".nc": _write_netcdf,
         **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
     }
-    outputs = output or []
-    for path in outputs:
+    paths = output or []
+    for path in paths:
         if path.suffix not in writers:
             raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
 
-    from slipsweep import spec, store
+    from slipsweep import outputs, spec
 
     checked = spec.load(sweep)
     if checked.record is not None:
@@ -59,10 +59,10 @@ def limit(
             f"{sweep}: excitation.record: limit looks for the amplitude of a harmonic motion; "
             "of a record sweep the scale"
         )
-    for path in outputs:
+    for path in paths:
         if path.exists() and path.samefile(sweep):
             raise InputError(f"{path}: is the sweep itself; give another name with -o")
-        store.check_output(path, overwrite)
+        outputs.check_output(path, overwrite)
     given = _arguments(checked, displacement, maximum_amplitude)
 
     from slipsweep.limits import limit_table
@@ -70,11 +70,11 @@ def limit(
     cells = checked.cells // checked.shape.get("amplitude", checked.shape.get("displacement_amplitude", 1))
     with progress_bar(cells * len(displacement), quiet) as progress:
         table = limit_table(**given, progress=progress)
-    for path in outputs:
+    for path in paths:
         writers[path.suffix](table, path, overwrite)
     if not quiet:
         _summarize(table)
-        for path in outputs:
+        for path in paths:
             typer.echo(path)
 
 
@@ -114,14 +114,14 @@ def _summarize(table: "Table") -> None:
 
 
 def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import store
+    from slipsweep import netcdf
 
-    store.write_table(table, path, title=_TITLE, command=typed_command(), overwrite=overwrite)
+    netcdf.write_table(table, path, title=_TITLE, command=typed_command(), overwrite=overwrite)
 
 
 def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import limit_figures, store
+    from slipsweep import limit_figures, outputs
 
     figure = limit_figures.limit_chart(table)
-    with store.complete_or_absent(path, overwrite) as temporary:
+    with outputs.complete_or_absent(path, overwrite) as temporary:
         figure.savefig(temporary, format=path.suffix[1:], dpi=150)

@@ -70,13 +70,13 @@ def record(
     }
     given: dict[str, Any] = {name: numbers(name, text) for name, text in texts.items() if text is not None}
 
-    from slipsweep import store
+    from slipsweep import netcdf, outputs
     from slipsweep.records import read_record
     from slipsweep.resources import size_text
 
     motion = read_record(file, units=units, baseline=baseline, file_format=file_format, channel=channel)
     if output is not None:
-        store.check_output(output, overwrite)
+        outputs.check_output(output, overwrite)
 
     import numpy as np
 
@@ -94,7 +94,7 @@ def record(
     with progress_bar(math.prod(plan.sizes.values()), quiet) as progress:
         table = plan.solve(progress)
     if output is not None:
-        store.write_table(
+        netcdf.write_table(
             table, output, title=table.attrs["title"], command=typed_command(), overwrite=overwrite, record=motion
         )
     if quiet:
@@ -121,7 +121,7 @@ def record(
         if (values >= 0).any():
             low, high = values[values >= 0].min(), values.max()
             typer.echo(f"{name.replace('_', ' '):<24}{low}" + (f" to {high}" if high > low else ""))
-    tally = store.Tally(count)
+    tally = netcdf.Tally(count)
     tally.add({"validity": validity})
     echo_tally(tally)
     if output is not None:

@@ -121,12 +121,12 @@ def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -
     """Sample the uncertain inputs of a sweep, and write the statistics."""
     import time
 
-    from slipsweep import store
+    from slipsweep import netcdf, outputs
     from slipsweep.resources import size_text
     from slipsweep.uncertainty import plan_samples, tally
 
     assert sweep.sampling is not None
-    store.check_output(path, overwrite)
+    outputs.check_output(path, overwrite)
     started = time.perf_counter()
     try:
         given = {name: value for name, value in sweep.arguments().items() if name != "variables"}
@@ -135,7 +135,7 @@ def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -
             table = plan.solve(progress)
     except InputError as error:
         raise InputError(f"{sweep.source}: {error}") from None
-    store.write_statistics(sweep, table, path, command=typed_command(), overwrite=overwrite)
+    netcdf.write_statistics(sweep, table, path, command=typed_command(), overwrite=overwrite)
     if quiet:
         return
     seconds = max(time.perf_counter() - started, 1e-9)

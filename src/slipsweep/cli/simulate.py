@@ -67,16 +67,16 @@ def simulate(
         ".csv": _write_csv,
         **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
     }
-    outputs = output or []
-    for path in outputs:
+    paths = output or []
+    for path in paths:
         if path.suffix not in writers:
             raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
 
-    from slipsweep import store
+    from slipsweep import outputs
     from slipsweep.history import history_table
 
-    for path in outputs:
-        store.check_output(path, overwrite)
+    for path in paths:
+        outputs.check_output(path, overwrite)
     table = history_table(
         theta=theta,
         mu_s=mu_s,
@@ -99,7 +99,7 @@ def simulate(
         g=g,
         points_per_cycle=points,
     )
-    for path in outputs:
+    for path in paths:
         writers[path.suffix](table, path, overwrite)
     if quiet:
         return
@@ -108,15 +108,15 @@ def simulate(
     typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
     for flag in Validity(table["validity"].item()):
         typer.echo(f"flag                    {(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
-    for path in outputs:
+    for path in paths:
         typer.echo(path)
 
 
 def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import store
+    from slipsweep import netcdf
 
-    store.write_table(
-        store.without_time_axis(table),
+    netcdf.write_table(
+        netcdf.without_time_axis(table),
         path,
         title="Time history of a sliding block",
         command=typed_command(),
@@ -125,18 +125,18 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
 
 
 def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import store
+    from slipsweep import outputs
 
     columns = {name: table[name] for name in ("time", *HISTORY)}
-    with store.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
+    with outputs.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(f"{name} ({array.attrs['units']})" for name, array in columns.items())
         writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
 
 
 def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import figures, store
+    from slipsweep import figures, outputs
 
     figure = figures.history(table)
-    with store.complete_or_absent(path, overwrite) as temporary:
+    with outputs.complete_or_absent(path, overwrite) as temporary:
         figure.savefig(temporary, format=path.suffix[1:], dpi=150)
