@@ -172,13 +172,13 @@ def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple
 
 
 @scalar
-def continuous_peak(block: Block, side: float, half_gain: float, after: float) -> float:
-    """Largest V in a half cycle entered with V = 0, where the plane has passed `after` on its rise.
+def continuous_peaks(block: Block, side: float, half_gain: float, after: float) -> tuple[float, float]:
+    """Largest V in a half cycle entered with V = 0, where the plane has passed `after` on its rise, and from Üg = 0.
 
     V peaks where its rate D changes sign; the falling quarter mirrors the rising one, over
     which and back V gains `half_gain`.
     """
-    peak = half_gain if after > 0.0 else max(0.0, half_gain)
+    late, whole = half_gain, max(0.0, half_gain)
     x, end = 0.0, side * block.amplitude
     for _ in range(MOST_LEGS):
         target = next_break(block, x, end)
@@ -186,13 +186,13 @@ def continuous_peak(block: Block, side: float, half_gain: float, after: float) -
         if opposite(slip(block, inner), slip(block, target)):
             zero = abs(slip_root(block, 0.0, inner, target))
             gained = slip_integrals(block, -_HALF_PI, phase(block, zero), side)[0]
-            peak = max(peak, half_gain - gained)
+            late, whole = max(late, half_gain - gained), max(whole, max(gained, half_gain - gained))
             if zero > after:
-                peak = max(peak, gained)
+                late = max(late, gained)
         x = target
         if x == end:
             break
-    return peak
+    return late, whole
 
 
 @in_lanes
@@ -228,11 +228,10 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     displacement = continuous_displacement(up, missed, missed_moment, drift, began, cycles)
     peak = math.nan
     if wants_peak:
-        positive = continuous_peak(block, 1.0, 2.0 * up, block.yield_acceleration)
-        negative = 2.0 * up + continuous_peak(block, -1.0, drift - 2.0 * up, 0.0)
-        peak = max(0.0, max(positive, negative) - missed)
+        first, positive = continuous_peaks(block, 1.0, 2.0 * up, block.yield_acceleration)
+        negative = 2.0 * up + continuous_peaks(block, -1.0, drift - 2.0 * up, 0.0)[1]
+        peak = max(0.0, max(first, negative) - missed)
         if cycles > 1:
-            positive = continuous_peak(block, 1.0, 2.0 * up, 0.0)
             peak = max(peak, drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift))
     return Motion(displacement, peak, 0)
 
