@@ -1,6 +1,7 @@
 """Machine code on disk: written once, shared by processes, and never in the way."""
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -11,6 +12,7 @@ from typing import Any
 
 import filelock
 import numba
+import numba.core.registry
 import numpy as np
 import pytest
 
@@ -247,3 +249,44 @@ def test_without_jit(tmp_path: Path) -> None:
     program = "from slipsweep.compiled import Kernel; print(Kernel(lambda x: x + 'b')('a'))"
     assert finish(start(program, tmp_path, NUMBA_DISABLE_JIT="1")) == "ab\n"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_llvm_calls_back_is_heard_after_it(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    """Raised in the callback itself, which LLVM makes for machine code made or loaded, it would be lost."""
+    calls: list[str] = []
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    compiled.Kernel(lambda x: x + 1.0)(2.0)  # what numba itself makes at its first use, in no time, is done
+    engine = numba.core.registry.cpu_target.target_context.codegen()._engine._ee
+
+    def signalled(name: str) -> Any:
+        called_back = getattr(engine, name)
+
+        def call(*data: Any) -> Any:
+            calls.append(name)
+            if len(calls) == 1:
+                signal.raise_signal(number)
+            return called_back(*data)
+
+        return call
+
+    for name in ("_object_cache_notify", "_object_cache_getbuffer"):
+        monkeypatch.setattr(engine, name, signalled(name))
+    before = signal.signal(number, stopped)
+    try:
+        for known in (False, True):
+            calls.clear()
+            kernel = compiled.Kernel(double)
+            with pytest.raises(KeyboardInterrupt):
+                kernel(2.0)
+            assert calls
+            assert signal.getsignal(number) is stopped
+            assert kernel(2.0) == 4.0, f"compiled before: {known}"
+    finally:
+        signal.signal(number, before)

@@ -28,6 +28,7 @@ import hashlib
 import os
 import pickle
 import shutil
+import signal
 import sys
 import tempfile
 import threading
@@ -118,6 +119,30 @@ def _alone(path: Path) -> Iterator[None]:
         yield
 
 
+@contextlib.contextmanager
+def _heard_later() -> Iterator[None]:
+    """Have Ctrl-C and SIGTERM wait for the end of the block, where this is the thread that hears them.
+
+    LLVM calls back into Python to hand over machine code, and what a signal raised there would be
+    printed and forgotten.  It takes a tenth of a second for a kernel from disk, two for one that is new.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    known = {number: handler for number, handler in handlers.items() if handler is not None}
+    for number in known:
+        signal.signal(number, lambda received, _: heard.append(received))
+    try:
+        yield
+    finally:
+        for number, handler in known.items():
+            signal.signal(number, handler)
+        for received in heard:
+            signal.raise_signal(received)
+
+
 class _Disk(NullCache):
     """Where a dispatcher looks for machine code before it compiles: one file."""
 
@@ -132,7 +157,8 @@ class _Disk(NullCache):
             checksum, data = content[:32], content[32:]
             if hashlib.sha256(data).digest() != checksum:
                 return None
-            return CompileResult._rebuild(target_context, *pickle.loads(data))
+            with _heard_later():
+                return CompileResult._rebuild(target_context, *pickle.loads(data))
         except Exception:  # not there, or of another make: whatever is wrong with it, it can be made anew
             return None
 
@@ -167,6 +193,10 @@ class _Sealed(JITCodeLibrary):
             if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
                 function.linkage = "internal"
         super()._finalize_final_module()
+
+    def _finalize_specific(self) -> None:
+        with _heard_later():
+            super()._finalize_specific()
 
 
 class _Compiler(numba.core.compiler.Compiler):
