@@ -286,7 +286,7 @@ def limited_file_size(folder: Path, rng: random.Random, expected: Values) -> int
     import resource
 
     def limit() -> None:
-        bytes_allowed = rng.randrange(100_000, 4_000_000)
+        bytes_allowed = rng.randrange(100_000, 2_000_000)  # the file has 2.4 million
         resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_allowed, bytes_allowed))
 
     status, errors = ended(start(folder, preexec_fn=limit))
