@@ -304,11 +304,10 @@ def whole_lanes(count: int) -> int:
 
 @in_lanes
 def lane_of(block: Block, lanes: np.ndarray, j: int) -> None:
-    """Lay a block out as lane j."""
+    """Lay a block out as lane j, but for the phase at which it comes to Üy."""
     lanes[AMPLITUDE + j], lanes[YIELD + j] = block.amplitude, block.yield_acceleration
     lanes[MU_S + j], lanes[TAN_THETA + j] = block.mu_s, block.tan_theta
     lanes[DELTA_MU + j], lanes[DECAY + j] = block.delta_mu, block.decay_rate / block.g
-    lanes[BEGAN + j] = rising_phase(block.yield_acceleration, block.amplitude)
 
 
 @in_lanes

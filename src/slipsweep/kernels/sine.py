@@ -788,7 +788,7 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
     """Blocks of a strip of a tile in lanes, with their codes and the way each goes.
 
     Neighbours are mostly alike, and what none of them needs is left out: λ and t1 of those that stay,
-    E of those that do not stick and slip (5 against 9 ns a cell of a design chart).
+    E of those that do not stick and slip (7 against 9 ns a cell of a design chart).
     """
     g, slides, sticks = options.g, 0, 0
     for j in range(STRIP):
