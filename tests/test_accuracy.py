@@ -296,6 +296,20 @@ def test_pulses_that_stop_anew_as_event_by_event() -> None:
         assert abs(u / float(history.relative_displacement[-1]) - 1) <= 1e-11
 
 
+@pytest.mark.parametrize("cycles", [1, 2, 10])
+@pytest.mark.parametrize("delta_mu", [0.0, 0.02, 0.3])
+def test_peaks_of_continuous_sliding(delta_mu: float, cycles: int) -> None:
+    """Whether the velocity turns on both half cycles, on one or on none; from friction that hardly falls to e^-7."""
+    theta, mu_s, amplitude = 3.0, 0.3, 1.9 * strategies.G
+    decay_rate = np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 5.5, 7.0]) * strategies.G / amplitude
+    given = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "delta_mu": delta_mu}
+    swept = slipsweep.sweep(**given, decay_rate=decay_rate, cycles=cycles)
+    assert (swept.sliding_mode == 2).all()
+    for rate, velocity in zip(decay_rate, swept.peak_relative_velocity.values.ravel(), strict=True):
+        right = float(reference.solve(**given, decay_rate=rate, cycles=cycles).peak_relative_velocity)
+        assert abs(velocity - right) <= 1e-13 * (abs(right) + cycles * amplitude / (2 * pi)), f"lambda {rate}"
+
+
 @strategies.reproducible
 @given(
     cell=strategies.given_friction(),

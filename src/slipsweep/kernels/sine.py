@@ -76,6 +76,9 @@ _CARRIED, _MOVED, _LAST, _ONSET, _HIGHEST, _THROUGH, _SLOWEST, _AT_PEAK, _TO_PEA
     (LANE_ROWS + 13) * TILE, (LANE_ROWS + 24) * TILE, TILE
 )
 LANES_SIZE = (LANE_ROWS + 24) * TILE
+#: The same rows in continuous sliding: what V misses before Üg = Üy, and what it gains from Üg = 0 up to where
+#: its rate changes sign on the rise of the positive half cycle.
+_MISSED, _DIP = _CARRIED, _MOVED
 
 #: Rows of a tile's blocks beside the lanes': the codes, the way a cell goes, μmin, and E at Üg = Üy and at the peak.
 _MODE, _VALIDITY, _WAY, _LEAST_FRICTION, _AT_START, _AT_END = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
@@ -214,6 +217,18 @@ def continuous_displacement(
     return displacement + later * math.pi * (2.0 * (drift - missed) + 3.0 * up + down + drift * (later - 1.0))
 
 
+@in_lanes
+def continuous_peak(missed: float, drift: float, first: float, positive: float, negative: float, cycles: int) -> float:
+    """Largest V of all cycles, from the largest of half cycles entered with V = 0.
+
+    `first` is that of the first half cycle from Üg = Üy on, before which V misses `missed`; `positive` and
+    `negative` are those of whole ones, the latter with the V that the positive one before it has left.
+    """
+    peak = max(0.0, max(first, negative) - missed)
+    again = drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift)
+    return max(peak, again) if cycles > 1 else peak
+
+
 @scalar
 def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.
@@ -230,9 +245,7 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     if wants_peak:
         first, positive = continuous_peaks(block, 1.0, 2.0 * up, block.yield_acceleration)
         negative = 2.0 * up + continuous_peaks(block, -1.0, drift - 2.0 * up, 0.0)[1]
-        peak = max(0.0, max(first, negative) - missed)
-        if cycles > 1:
-            peak = max(peak, drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift))
+        peak = continuous_peak(missed, drift, first, positive, negative, cycles)
     return Motion(displacement, peak, 0)
 
 
@@ -288,7 +301,8 @@ def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
     way = way if smooth else _OTHER
     way = _YIELD_GOVERNS if options.rise == NEWMARK else way
     way = way if mode == STICK_SLIP else _OTHER
-    early = gentle & (start <= _SHORT_SINE * end) & (not options.wants_peak)
+    # where the peak velocity is wanted, D has to be concave (`lane_turn`)
+    early = gentle & (start <= _SHORT_SINE * end) & (convex | (not options.wants_peak))
     way = _CONTINUOUS if (mode == CONTINUOUS) & early else way
     return way if mode > STUCK else _STAYS
 
@@ -733,9 +747,63 @@ def quarter_integrals(k: float) -> tuple[float, float]:
     return first, second
 
 
+@in_lanes
+def lane_rate_and_slope(lanes: np.ndarray, j: int, side: float, x: float, g: float) -> tuple[float, float]:
+    """D and dD/d|Üg| of a lane in continuous sliding, |Üg| = x, on the positive (`side` 1) or negative (−1) half."""
+    tan_theta, mu_s, decay = lanes[TAN_THETA + j], lanes[MU_S + j], lanes[DECAY + j]
+    mu = lane_friction(lanes, j, x)
+    kept = mu_s - tan_theta - mu
+    rate = side * (g * (mu_s - mu)) + x * tan_theta * kept
+    slope = side * (g * (mu * decay)) + tan_theta * (kept + x * (mu * decay))
+    return rate, slope
+
+
+@scalar
+def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
+    """∫ D dψ on the rise of a half cycle, from Üg = 0 up to where D changes sign, in _RATE; 0 where it does not.
+
+    D is -side g Δμ at Üg = 0.  On the positive half it is concave (by `way_of`), on the negative one convex
+    (as long as the block does not lift off): it changes sign once at most, and Newton comes there from Üg = 0
+    without passing it.
+    """
+    for j in range(STRIP):
+        at_peak, slope = lane_rate_and_slope(lanes, j, side, lanes[AMPLITUDE + j], g)
+        turns = side * at_peak > 0.0
+        # one that has its first sign at the peak may have changed twice, unless it still goes away from it
+        monotone = side * slope >= 0.0
+        lanes[_CONVERGED + j] = lanes[_CONVERGED + j] if turns | monotone else 0.0
+        lanes[_PSI + j] = 0.0 if turns else 1.0
+        lanes[_X + j] = 0.0
+    for _ in range(_MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            x = lanes[_X + j]
+            rate, slope = lane_rate_and_slope(lanes, j, side, x, g)
+            step = rate / slope
+            settled = lanes[_PSI + j] > 0.0
+            lanes[_X + j] = x if settled else x - step
+            settled |= abs(step) <= _LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[_PSI + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[_CONVERGED + j] = min(lanes[_CONVERGED + j], lanes[_PSI + j])
+        lanes[_PSI + j] = _HALF_PI + rising_phase(lanes[_X + j], lanes[AMPLITUDE + j])
+        lanes[_RATE + j] = 0.0
+    for node in range(_LANE_NODES.size):
+        at, weight = _LANE_NODES[node], _LANE_WEIGHTS[node]
+        for j in range(STRIP):
+            phi = lanes[_PSI + j] * at
+            x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
+            lanes[_RATE + j] += weight * lane_rate_and_slope(lanes, j, side, x, g)[0]
+    for j in range(STRIP):
+        lanes[_RATE + j] *= lanes[_PSI + j]
+
+
 @scalar
 def lane_continuous(options: Options, lanes: np.ndarray) -> None:
-    """Continuous sliding, all cycles: W in row _W."""
+    """Continuous sliding, all cycles: W in row _W, the largest V in _PEAK."""
     g = options.g
     for j in range(STRIP):
         # the whole quarter: ∫ D in _V, a quarter of the drift in _X; up to Üg = Üy: _RATE, _MOMENT
@@ -757,15 +825,24 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
     for j in range(STRIP):
         began = lanes[BEGAN + j]
         width = _HALF_PI + began
-        lanes[_W + j] = continuous_displacement(
-            lanes[_V + j],
-            lanes[_RATE + j] * width,
-            lanes[_MOMENT + j] * width * width,
-            4.0 * lanes[_X + j],
-            began,
-            options.cycles,
-        )
+        missed, missed_moment = lanes[_RATE + j] * width, lanes[_MOMENT + j] * width * width
+        drift = 4.0 * lanes[_X + j]
+        lanes[_W + j] = continuous_displacement(lanes[_V + j], missed, missed_moment, drift, began, options.cycles)
+        lanes[_MISSED + j], lanes[_GAIN + j] = missed, drift
         lanes[_PEAK + j], lanes[_CODE + j], lanes[_CONVERGED + j] = math.nan, 0.0, 1.0
+    if options.wants_peak:
+        lane_turn(1.0, g, lanes)
+        for j in range(STRIP):
+            lanes[_DIP + j] = lanes[_RATE + j]
+        lane_turn(-1.0, g, lanes)
+        for j in range(STRIP):
+            # as in `continuous_peaks`: the fall mirrors the rise
+            drift, half, dip, bump = lanes[_GAIN + j], 2.0 * lanes[_V + j], lanes[_DIP + j], lanes[_RATE + j]
+            first = max(half, half - dip)
+            other = drift - half
+            negative = half + max(max(0.0, other), max(bump, other - bump))
+            positive = max(max(0.0, dip), first)
+            lanes[_PEAK + j] = continuous_peak(lanes[_MISSED + j], drift, first, positive, negative, options.cycles)
 
 
 @scalar
