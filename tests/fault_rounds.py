@@ -51,7 +51,7 @@ SMALL, CELLS = 400, 4000
 #: Longest that a run may take to begin, to answer or to end.
 PATIENCE = 300.0
 
-#: All variables of a file, or of all files of a folder, bit for bit.
+#: All variables of a file, or of all files of a folder, bit for bit, and all attributes but its history.
 Values: TypeAlias = dict[str, bytes]
 
 #: A kind of fault.
@@ -77,10 +77,15 @@ def run(path: Path, text: str = SWEEP, **options: Any) -> store.Report:
 
 
 def values(path: Path) -> Values:
-    """All variables of a file, bit for bit."""
+    """All variables of a file, bit for bit, and all attributes but its history."""
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
-        return {name: np.asarray(variable[...]).tobytes() for name, variable in file.variables.items()}
+        found = {name: np.asarray(variable[...]).tobytes() for name, variable in file.variables.items()}
+        owners: list[tuple[str, Any]] = [("", file), *file.variables.items()]
+        for owner, described in owners:
+            found |= {f"{owner}@{name}": repr(described.getncattr(name)).encode() for name in described.ncattrs()}
+        assert found.pop("@history").endswith(b"'"), "a history that cannot be read"
+        return found
 
 
 def stopped(path: Path, after: int = 30, **options: Any) -> Path:
@@ -393,6 +398,9 @@ def damaged(folder: Path, rng: random.Random, expected: Values) -> int:
     assert not parts.exists()
     if split:
         assert joined(path) == {name: expected[name] for name in joined(path)}
+        run(folder / "b.nc", split=True)
+        for file in path.iterdir():
+            assert values(file) == values(folder / "b.nc" / file.name), file.name
     else:
         assert values(path) == expected
     return 1

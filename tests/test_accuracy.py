@@ -302,11 +302,12 @@ def test_peaks_of_continuous_sliding(delta_mu: float, cycles: int) -> None:
     """Whether the velocity turns on both half cycles, on one or on none; from friction that hardly falls to e^-7."""
     theta, mu_s, amplitude = 3.0, 0.3, 1.9 * strategies.G
     decay_rate = np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 5.5, 7.0]) * strategies.G / amplitude
-    given = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "delta_mu": delta_mu}
-    swept = slipsweep.sweep(**given, decay_rate=decay_rate, cycles=cycles)
+    cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "delta_mu": delta_mu}
+    cell |= {"frequency": 1.0, "cycles": cycles}
+    swept = slipsweep.sweep(**cell, decay_rate=decay_rate)
     assert (swept.sliding_mode == 2).all()
     for rate, velocity in zip(decay_rate, swept.peak_relative_velocity.values.ravel(), strict=True):
-        right = float(reference.solve(**given, decay_rate=rate, cycles=cycles).peak_relative_velocity)
+        right = float(reference.solve(**cell, decay_rate=rate).peak_relative_velocity)
         assert abs(velocity - right) <= 1e-13 * (abs(right) + cycles * amplitude / (2 * pi)), f"lambda {rate}"
 
 

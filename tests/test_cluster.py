@@ -272,7 +272,7 @@ def test_other_versions_are_refused(address: str, tmp_path: Path, monkeypatch: p
         late = client.submit(cluster._solve, installation() | {"slipsweep version": "9.9"}, {}, pure=False)
         message = rf"worker at tcp://.* has slipsweep version {slipsweep.__version__}, this process has 9\.9"
         with pytest.raises(RunError, match=message):
-            late.result()
+            late.result(timeout=60)
     # the same number, but other sources
     monkeypatch.setattr(cluster, "installation", lambda: installation() | {"slipsweep sources": "abc"})
     message = r"worker at tcp://.* has slipsweep sources [0-9a-f]{16}, this process has abc: install the same versions"

@@ -2,6 +2,7 @@
 
 import errno
 import itertools
+import math
 import os
 import shutil
 import subprocess
@@ -17,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slipsweep
-from slipsweep import blocks, netcdf, plans, spec, store, variables
+from slipsweep import blocks, netcdf, placed, plans, spec, store, variables
 from slipsweep.errors import InputError, RunError
 from slipsweep.tables import Table, Variable
 
@@ -89,7 +90,24 @@ def test_blocks_cover_the_grid_once_and_keep_within_the_limit(shape: dict[str, i
     assert np.all(seen == 1)
 
 
-def test_blocks_cut_the_frequency_axis_last() -> None:
+@given(shape=SHAPES, most=st.integers(1, 400), data=st.data())
+@settings(max_examples=200, deadline=None)
+def test_a_block_is_one_run_of_any_result(shape: dict[str, int], most: int, data: st.DataObject) -> None:
+    """Also of those that have not all the dimensions."""
+    sizes = {dim: length for dim, length in shape.items() if data.draw(st.booleans())}
+    numbers = np.arange(math.prod(sizes.values())).reshape(tuple(sizes.values()))
+    for part in blocks.grid_blocks(shape, most):
+        first, count = placed.run_of(part, sizes)
+        wanted = numbers[tuple(part[dim] for dim in sizes)]
+        assert wanted.ravel().tolist() == list(range(first, first + count))
+
+
+def test_what_is_no_run_of_a_result_is_refused() -> None:
+    with pytest.raises(ValueError, match="is more than one run of"):
+        placed.run_of({"theta": slice(0, 2), "mu_s": slice(0, 2)}, {"theta": 3, "mu_s": 3})
+
+
+def test_blocks_are_whole_along_the_last_dimensions() -> None:
     shape = {"theta": 50, "mu_s": 20, "amplitude": 300, "frequency": 1000, "case": 7}
     assert blocks.block_lengths(shape, 4_000_000) == {
         "theta": 1,
@@ -134,6 +152,79 @@ def test_workers_share_a_sweep_evenly_within_the_memory() -> None:
     assert blocks.cells_shared(stepping, 1000) == 10_000
     assert blocks.cells_shared(night, None) == 500_000  # each but a few times what sending it takes
     assert blocks.cells_shared(night, 1) == 60_000_000 // 16
+
+
+# ------------------------------------------------------------------------- bytes of results
+
+LARGE = """
+[axes.theta]
+values = [0, 10]
+[axes.mu_s]
+values = [0.3, 0.5, 0.7]
+[axes.amplitude]
+start = 0.5
+stop = 12
+num = 401
+[axes.frequency]
+start = 1
+stop = 3
+num = 407
+"""
+
+
+def refusing(*arguments: Any) -> int:
+    raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+
+
+@pytest.mark.parametrize("way", ["as it is", "no such flag", "not this file system", "not this file", "piecemeal"])
+def test_results_are_written_to_their_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+    """Past the system's memory of files or through it: the same bytes."""
+    open_file, write = os.open, os.pwrite
+    written: list[int] = []
+
+    def not_directly(path: Path, flags: int, *more: int) -> int:
+        return refusing() if flags & os.O_DIRECT else open_file(path, flags, *more)
+
+    def counted(descriptor: int, content: memoryview, at: int) -> int:
+        assert at % 4096 == len(content) % 4096 == 0
+        if way == "piecemeal":
+            content = content[: min(len(content), 12288)]
+        written.append(write(descriptor, content, at))
+        return written[-1]
+
+    if not hasattr(os, "O_DIRECT"):
+        pytest.skip("the system has no direct writing")
+    monkeypatch.setattr(os, "pwrite", refusing if way == "not this file" else counted)
+    monkeypatch.setattr(placed, "_PIECE", 2**20)
+    if way == "no such flag":
+        monkeypatch.delattr(os, "O_DIRECT")
+    elif way == "not this file system":
+        monkeypatch.setattr(os, "open", not_directly)
+    run(LARGE, tmp_path / "a.nc", block_cells=400_000)
+    expected = slipsweep.sweep(**spec.parse(LARGE, "a.toml").arguments())
+    with netCDF4.Dataset(tmp_path / "a.nc") as file:
+        file.set_auto_mask(False)
+        for name, result in expected.data_vars.items():
+            np.testing.assert_array_equal(file[str(name)][...], result.values, err_msg=str(name))
+    if way == "as it is" and written:  # not on every file system
+        # both floating-point results, but for the sectors that two blocks share; codes are too short
+        assert sum(written) > 0.98 * 16 * expected.permanent_displacement.size
+
+
+def test_a_disk_that_fills_while_it_is_written_directly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*arguments: Any) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "pwrite", full)
+    with (tmp_path / "direct").open("wb") as probe:
+        pass
+    try:
+        os.close(os.open(probe.name, os.O_WRONLY | os.O_DIRECT))
+    except (OSError, AttributeError):
+        pytest.skip("the file system has no direct writing")
+    with pytest.raises(RunError, match=r"writing failed: No space left on device; is the disk full\?"):
+        run(LARGE, tmp_path / "a.nc")
+    assert not (tmp_path / "a.nc.parts").exists()
 
 
 # ----------------------------------------------------------------------------- what is in it

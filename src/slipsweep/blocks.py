@@ -51,20 +51,16 @@ _LEAST_CELLS = {"record": 1_000, "step": 10_000, "cycle": 500_000}
 #: Processes reckoned with where a scheduler has them.
 _UNKNOWN_WORKERS = 64
 
-#: Dimensions that blocks cut last.  Charts are drawn over these two, and a whole
-#: frequency axis costs `sweep` hardly more than one frequency.
-_CUT_LAST = ("amplitude", "displacement_amplitude", "frequency")
-
-
-def _cut_order(shape: Mapping[str, int]) -> list[str]:
-    return [dim for dim in shape if dim not in _CUT_LAST] + [dim for dim in _CUT_LAST if dim in shape]
-
 
 def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the block of a grid: at most `most` cells, whole along frequency and amplitude as far as they allow."""
+    """Return the block of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
+
+    Its cells then follow one another in the file.  Among the last dimensions is the frequency, of which a
+    whole axis costs `sweep` hardly more than one value.
+    """
     lengths: dict[str, int] = {}
     cells = 1
-    for dim in reversed(_cut_order(shape)):
+    for dim in reversed(list(shape)):
         # equal shares rather than full blocks and a remnant
         pieces = math.ceil(shape[dim] / max(1, most // cells))
         lengths[dim] = math.ceil(shape[dim] / pieces)

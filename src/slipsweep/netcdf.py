@@ -99,18 +99,20 @@ def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[st
             target.setncattr(name, value)
 
 
-def _provenance(command: str) -> dict[str, str]:
-    return {
-        "Conventions": "CF-1.11",
-        "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}",
-    }
+def history_of(command: str) -> str:
+    """The `history` of a file that `command` makes now."""
+    return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
 
 
-def write_head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[str, ...], command: str) -> None:
+def _provenance(history: str) -> dict[str, str]:
+    return {"Conventions": "CF-1.11", "history": history}
+
+
+def write_head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[str, ...], history: str) -> None:
     """Write all of a sweep's file but its results."""
     _define(file, table, spec.dtype)
     _label_cases(file, labels)
-    _describe(file, {**table.attrs, "title": spec.output.title, **_provenance(command), "sweep": spec.text})
+    _describe(file, {**table.attrs, "title": spec.output.title, **_provenance(history), "sweep": spec.text})
     file.set_auto_maskandscale(False)
     for name, coordinate in table.coords.items():
         file[name][...] = coordinate.values
@@ -156,7 +158,7 @@ def write_table(
         writing(path),
     ):
         _define(file, table, lambda name: table[name].values.dtype)
-        _describe(file, {**table.attrs, "title": title, **_provenance(command)})
+        _describe(file, {**table.attrs, "title": title, **_provenance(history_of(command))})
         file.set_auto_maskandscale(False)
         for name, array in {**table.coords, **table.data_vars}.items():
             file[name][...] = array.values
@@ -172,7 +174,7 @@ def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str,
         new_file(temporary, path) as file,
         writing(path),
     ):
-        write_head(file, spec, table, spec.labels, command)
+        write_head(file, spec, table, spec.labels, history_of(command))
         for name, array in table.data_vars.items():
             file[name][...] = rounded(name, array.values, spec.dtype(name))
 

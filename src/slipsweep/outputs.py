@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.parts import sync
 from slipsweep.resources import size_text
 
 #: Name of a block's file in a folder that `slipsweep.store.run` made.
@@ -35,6 +34,17 @@ def check_output(path: Path, overwrite: bool, folder: bool = False) -> None:
         raise InputError(f"{path}: exists already; give --overwrite to replace it, or another name with -o")
     if not os.access(path.parent, os.W_OK):
         raise InputError(f"{path}: the folder {path.parent} is not writable")
+
+
+def sync(path: Path) -> None:
+    """Have a file, or on POSIX a folder, on the disk itself, so that a power cut does not take it back."""
+    if path.is_dir() and os.name != "posix":  # elsewhere a folder cannot be opened
+        return
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 @contextmanager

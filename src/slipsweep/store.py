@@ -1,31 +1,28 @@
 """A sweep computed and written block by block.
 
-Results are stored contiguous and uncompressed: then each value has its place in the file before any
-is known, and once the empty file is on the disk a block is written without a change to anything but
-its own bytes.  A run that is killed leaves a file that can be read and gone on with
-(`slipsweep.parts`), and no value is written twice.
+Each value has its place in the file before any is known: once the empty file is on the disk a block is written
+without a change to anything but its own bytes (`slipsweep.placed`).  A run that is killed leaves a file that can
+be read and gone on with (`slipsweep.parts`), and no value is written twice.
 
-Fresh memory is what writing costs: the netCDF4 library alone takes from 1 to 5 s of processor for
-1.9 GB, nearly all of it for the pages of the file.  So a run has few of them at a time, and solves
-into the arrays of blocks that are written.  (On a grid of 20 million cells nothing compressed
-wrote 2.1 GB/s; zlib on the two flag variables 1.7 GB/s for 16 % of the bytes; zlib on everything
-0.1 GB/s for 58 %.)
+Nothing is compressed.  (On a grid of 20 million cells that wrote 2.1 GB/s; zlib on the two flag variables
+1.7 GB/s for 16 % of the bytes; zlib on everything 0.1 GB/s for 58 %.)
 """
 
+import hashlib
 import math
-import os
 import shutil
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import netCDF4
 import numpy as np
+import xxhash
 from numpy.typing import NDArray
 
 from slipsweep import parts
@@ -41,15 +38,14 @@ from slipsweep.blocks import (
     solve_here,
 )
 from slipsweep.errors import InputError, RunError
-from slipsweep.netcdf import Tally, new_file, rounded, stored_tally, write_head
-from slipsweep.outputs import appear, check_output, writing
+from slipsweep.netcdf import Tally, history_of, rounded, stored_tally
+from slipsweep.outputs import appear, check_output, sync, writing
+from slipsweep.placed import PlacedFile, file_checksum, make_file, run_of
 from slipsweep.resources import available_memory, size_text
 from slipsweep.spec import SweepSpec
 from slipsweep.tables import Table, Variable
 
-#: Bytes that are written, or seconds that pass, before they are brought to the disk itself; the
-#: journal follows after as many seconds.
-_SYNC_BYTES = 64_000_000
+#: Seconds after which what is written is brought to the disk itself.
 _SYNC_SECONDS = 1.0
 
 
@@ -150,13 +146,13 @@ def run(
         tally = Tally(spec.cells)
         cut = dict(enumerate(grid_blocks(spec.shape, block_cells)))
         try:
-            with (_Files if split else _OneFile)(spec, data, command) as target:
-                manifest = work.manifest or parts.Manifest(identity, block_cells, overwrite)
-                _ready(work, target, cut, manifest, tally, progress)
+            manifest = work.manifest or parts.Manifest(identity, block_cells, overwrite, history_of(command))
+            with closing((_Files if split else _OneFile)(spec, data, manifest)) as target:
+                _ready(work, target, cut, tally, progress)
                 missing = {number: block for number, block in cut.items() if number not in work.finished}
                 _write_blocks(work, target, cut, solved(spec, missing, progress), tally)
             with writing(path):
-                parts.sync(data)
+                sync(data)
                 work.close()
                 appear(data, path, overwrite)
         except MemoryError:
@@ -192,16 +188,15 @@ def _ready(
     work: parts.Folder,
     target: "_OneFile | _Files",
     cut: Mapping[int, Block],
-    manifest: parts.Manifest,
     tally: Tally,
     progress: Progress | None,
 ) -> None:
     """Take over the finished blocks that are as they were written, or begin with none."""
     kept = {}
-    if work.finished and target.open(manifest.nbytes):
+    if work.finished and target.open():
         for number in sorted(work.finished.keys() & cut.keys()):
-            arrays = target.read(number, cut[number])
-            if arrays is not None and parts.checksum(arrays) == work.finished[number]:
+            arrays = target.find(number, cut[number], work.finished[number])
+            if arrays is not None:
                 kept[number] = work.finished[number]
                 tally.add(arrays)
                 if progress is not None:
@@ -212,8 +207,8 @@ def _ready(
         else:
             target.close()
             work.clear()
-            manifest.nbytes = target.create()
-            work.begin(manifest)
+            target.create()
+            work.begin(target.manifest)
 
 
 def _write_blocks(
@@ -225,43 +220,32 @@ def _write_blocks(
 ) -> None:
     """Write blocks and put them on record, each while the next is being solved.
 
-    Checksums and counts are made beside the writing.  So is what is written brought to the disk
-    itself, but the writer waits for that before it has more brought there: no more of the file than
-    some blocks is in memory at a time.  The system finds their pages again and again: it took 0.7 s
-    of processor to write 1.9 GB so, and from 1 to 5 s where all of the file stayed in memory.
+    Beside the writing cells are counted, and what is written is brought to the disk itself.
     """
     pending: Future[None] | None = None
     syncing: Future[None] | None = None
-    unsynced, synced = 0, time.monotonic()
+    synced = time.monotonic()
 
     def write(number: int, table: Table) -> None:
-        nonlocal syncing, unsynced, synced
+        nonlocal syncing, synced
         with writing(work.output):
             arrays = {
                 name: rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
             }
-            digest = examiner.submit(examine, arrays)
-            target.write(number, cut[number], table, arrays)
-            work.add(number, digest.result())
-            unsynced += sum(values.nbytes for values in arrays.values())
-            due = time.monotonic() - synced >= _SYNC_SECONDS
-            if due or unsynced >= _SYNC_BYTES:
+            counted = counter.submit(tally.add, arrays)
+            work.add(number, target.write(number, cut[number], table, arrays))
+            if time.monotonic() - synced >= _SYNC_SECONDS:
                 if syncing is not None:
                     syncing.result()
-                syncing = syncer.submit(bring, unsynced >= _SYNC_BYTES, due)
-                unsynced, synced = 0, time.monotonic() if due else synced
+                syncing, synced = syncer.submit(bring), time.monotonic()
+            counted.result()
 
-    def examine(arrays: dict[str, NDArray[Any]]) -> str:
-        tally.add(arrays)
-        return parts.checksum(arrays)
-
-    def bring(drop: bool, journal: bool) -> None:
-        target.sync(drop)
-        if journal:
-            work.sync()
+    def bring() -> None:
+        target.sync()
+        work.sync()
 
     # leaving them waits, for the writer first: a block that is being written is finished
-    with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as examiner, ThreadPoolExecutor(1) as writer:
+    with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as counter, ThreadPoolExecutor(1) as writer:
         for number, table in found:
             if pending is not None:
                 pending.result()
@@ -272,125 +256,103 @@ def _write_blocks(
         with writing(work.output):
             if syncing is not None:
                 syncing.result()
-            bring(drop=False, journal=True)
+            bring()
 
 
 class _OneFile:
     """All blocks in one netCDF file, each in its place."""
 
-    def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
-        self.spec, self.data, self.command = spec, data, command
+    def __init__(self, spec: SweepSpec, data: Path, manifest: parts.Manifest) -> None:
+        self.spec, self.data, self.manifest = spec, data, manifest
         self.table = plan_of(spec.arguments()).empty()
-        self.file: netCDF4.Dataset | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
+        self.file: PlacedFile | None = None
 
     def close(self) -> None:
-        """Close the file, if it is open.
-
-        Left to itself it would be closed when garbage is looked for, by any thread: the netCDF
-        library crashes where another is writing meanwhile.
-        """
+        """Close the file, if it is open."""
         if self.file is not None:
-            with suppress(RuntimeError, OSError):  # every block has been flushed
-                self.file.close()
+            self.file.close()
             self.file = None
 
-    def create(self) -> int:
-        """Make the file, with all but the blocks in it; return its size."""
-        with new_file(self.data, self.data) as file:
-            write_head(file, self.spec, self.table, self.spec.labels, self.command)
-            for name in self.table.data_vars:
-                # the first value that is written makes room for all
-                file[name][(-1,) * file[name].ndim or ...] = 0
-        parts.sync(self.data)
-        self.file = netCDF4.Dataset(self.data, "r+")
-        self.file.set_auto_maskandscale(False)
-        return self.data.stat().st_size
+    def create(self) -> None:
+        """Make the file, with all but the blocks in it."""
+        layout = make_file(self.data, self.spec, self.table, self.spec.labels, self.manifest.history)
+        self.manifest.layout, self.manifest.head = layout, file_checksum(self.data, layout)
+        sync(self.data)
+        self.file = PlacedFile(self.data, layout)
 
-    def open(self, nbytes: int) -> bool:
-        """Open the file of an earlier run; whether all but its blocks is as it should be."""
+    def open(self) -> bool:
+        """Open the file of an earlier run; whether all but its blocks is as it was made."""
+        layout = self.manifest.layout
+        if layout is None:
+            return False
         try:
             # what the system refuses (rights, a disk that does not answer) is no damage: blocks are not thrown away
-            with self.data.open("r+b") as file:
-                if file.seek(0, os.SEEK_END) < nbytes:
-                    file.truncate(nbytes)  # what was cut off is zeros: the blocks that are whole can be read
+            self.file = PlacedFile(self.data, layout)
         except FileNotFoundError:
             return False
-        try:
-            self.file = netCDF4.Dataset(self.data, "r+")
-            self.file.set_auto_maskandscale(False)
-            return all(
-                np.array_equal(self.file[name][...], coordinate.values)
-                for name, coordinate in self.table.coords.items()
-            ) and all(self.file[name].shape == result.values.shape for name, result in self.table.data_vars.items())
-        except (OSError, RuntimeError, IndexError):
-            return False
+        # what was cut off is zeros: the blocks that are whole can be read
+        self.file.restore_size()
+        return file_checksum(self.data, layout) == self.manifest.head
 
-    def read(self, number: int, block: Block) -> dict[str, NDArray[Any]] | None:
-        """Return a block's values as they are stored, or None."""
+    def find(self, number: int, block: Block, digest: str) -> dict[str, NDArray[Any]] | None:
+        """Return the values of a block, as they are stored, or None if they are not those on record."""
         assert self.file is not None
-        try:
-            return {
-                name: np.asarray(self.file[name][_where(block, result.dims)])
-                for name, result in self.table.data_vars.items()
-            }
-        except (OSError, RuntimeError):
-            return None
+        arrays = {}
+        for name, result in self.table.data_vars.items():
+            shape = [block[dim].stop - block[dim].start for dim in result.dims]
+            try:
+                values = self.file.read(name, *run_of(block, result.sizes), self.spec.dtype(name))
+            except OSError:  # a sector that cannot be read; that the file can was seen when it was opened
+                return None
+            arrays[name] = values.reshape(shape)
+        return arrays if parts.checksum(arrays) == digest else None
 
-    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write a block, with its values as they are to be stored."""
+    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
+        """Write a block, with its values as they are to be stored; return what is to go on record."""
         assert self.file is not None
-        for name, result in table.data_vars.items():
-            self.file[name][_where(block, result.dims)] = arrays[name]
-        self.file.sync()
+        for name, result in self.table.data_vars.items():
+            self.file.write(name, run_of(block, result.sizes)[0], arrays[name])
+        return parts.checksum(arrays)
 
-    def sync(self, drop: bool = False) -> None:
-        """Have all that is written on the disk itself, and with `drop` no longer in memory."""
-        parts.sync(self.data, drop)
+    def sync(self) -> None:
+        """Have all that is written on the disk itself."""
+        sync(self.data)
 
 
 class _Files:
     """A folder with a netCDF file for each block, complete by itself."""
 
-    def __init__(self, spec: SweepSpec, data: Path, command: str) -> None:
-        self.spec, self.data, self.command = spec, data, command
+    def __init__(self, spec: SweepSpec, data: Path, manifest: parts.Manifest) -> None:
+        self.spec, self.data, self.manifest = spec, data, manifest
         self.unsynced: deque[Path] = deque()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        pass
 
     def close(self) -> None:
         """Every file is closed when it is written."""
 
-    def create(self) -> int:
+    def create(self) -> None:
         """Make the folder."""
         self.data.mkdir()
-        return 0
 
-    def open(self, nbytes: int) -> bool:
+    def open(self) -> bool:
         """Whether there is a folder of an earlier run."""
         return self.data.is_dir()
 
-    def read(self, number: int, block: Block) -> dict[str, NDArray[Any]] | None:
-        """Return a block's values as they are stored, or None."""
+    def find(self, number: int, block: Block, digest: str) -> dict[str, NDArray[Any]] | None:
+        """Return the values of a block, as they are stored, or None if its file is not that on record."""
         try:
-            with netCDF4.Dataset(self._name(number)) as file:
-                file.set_auto_maskandscale(False)
-                return {name: np.asarray(file[name][...]) for name in self.spec.output.variables}
-        except (OSError, RuntimeError, IndexError):
+            with self._name(number).open("rb") as content:
+                if hashlib.file_digest(content, xxhash.xxh3_128).hexdigest() != digest:
+                    return None
+        except PermissionError:
+            raise  # no damage
+        except OSError:
             return None
+        with netCDF4.Dataset(self._name(number)) as file:
+            file.set_auto_maskandscale(False)
+            return {name: np.asarray(file[name][...]) for name in self.spec.output.variables}
 
-    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write a block, with its values as they are to be stored."""
-        results = {name: replace(result, values=arrays[name]) for name, result in table.data_vars.items()}
+    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
+        """Write a block, with its values as they are to be stored; return what is to go on record."""
         coords = dict(table.coords)
         labels = self.spec.labels
         if "case" in block:
@@ -398,28 +360,27 @@ class _Files:
             rows = np.arange(block["case"].start, block["case"].stop, dtype=np.int32) + 1
             coords["case"] = Variable(("case",), rows, {"long_name": "row of [[cases]]", "units": "1"})
             labels = labels[block["case"]]
-        stored = replace(table, coords=coords, data_vars=results)
         path = self._name(number)
         temporary = path.with_suffix(".tmp")
-        with new_file(temporary, path) as file:
-            write_head(file, self.spec, stored, labels, self.command)
-            for name, result in results.items():
-                file[name][...] = result.values
+        layout = make_file(temporary, self.spec, replace(table, coords=coords), labels, self.manifest.history)
+        file = PlacedFile(temporary, layout)
+        try:
+            for name, values in arrays.items():
+                file.write(name, 0, values)
+        finally:
+            file.close()
         temporary.replace(path)
         self.unsynced.append(path)
+        return file_checksum(path, layout, arrays)
 
-    def sync(self, drop: bool = False) -> None:
-        """Have all that is written on the disk itself, and with `drop` no longer in memory."""
+    def sync(self) -> None:
+        """Have all that is written on the disk itself."""
         while self.unsynced:
-            parts.sync(self.unsynced.popleft(), drop)
-        parts.sync(self.data)
+            sync(self.unsynced.popleft())
+        sync(self.data)
 
     def _name(self, number: int) -> Path:
         return self.data / f"block-{number:06}.nc"
-
-
-def _where(block: Mapping[str, slice], dims: tuple[str, ...]) -> Any:
-    return tuple(block[dim] for dim in dims) or ...
 
 
 def _nbytes(path: Path) -> int:
