@@ -182,19 +182,22 @@ def test_a_killed_worker_loses_nothing(address: str, tmp_path: Path) -> None:
     run(SLOW, tmp_path / "here.nc")
     killed: list[str] = []
 
-    with distributed.Client(address, set_as_default=False) as client, workers(address, 2):
-        pids = client.run(os.getpid)
-        assert len(pids) == 4
+    with distributed.Client(address, set_as_default=False) as client:
+        staying = client.run(os.getpid)  # those of the other tests
+        with workers(address, 2):
+            pids = client.run(os.getpid)
+            assert len(pids) == 4
 
-        def kill(cells: int) -> None:
-            """Kill a worker that has blocks to solve, when the first block and again when another is back."""
-            busy = [worker for worker, tasks in client.processing().items() if tasks and worker not in killed]
-            if len(killed) < 2 and busy:
-                os.kill(pids[busy[0]], 9)
-                killed.append(busy[0])
+            def kill(cells: int) -> None:
+                """Kill a worker that has blocks to solve, when the first block and again when another is back."""
+                working = [worker for worker, tasks in client.processing().items() if tasks]
+                busy = [worker for worker in working if worker not in (*staying, *killed)]
+                if len(killed) < 2 and busy:
+                    os.kill(pids[busy[0]], 9)
+                    killed.append(busy[0])
 
-        with cluster.cluster(scheduler=address) as solved:
-            report = run(SLOW, tmp_path / "there.nc", solved=solved, progress=kill)
+            with cluster.cluster(scheduler=address) as solved:
+                report = run(SLOW, tmp_path / "there.nc", solved=solved, progress=kill)
     assert len(killed) == 2
     assert report.tally.cells == 9600
     assert_same_bits(tmp_path / "here.nc", tmp_path / "there.nc")
