@@ -15,6 +15,7 @@ from slipsweep.kernels import cycle, sine, step
 from slipsweep.kernels.block import TILE, Options, block_of, cell_of
 from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.jit import scalar
+from slipsweep.kernels.lanes import LANES_SIZE
 
 
 class Grid(NamedTuple):
@@ -160,7 +161,7 @@ def _sine_grid(
     cells, runs = np.empty(7 * TILE), empty_runs(grid)
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
     room = sine.Room(
-        np.empty(sine.BLOCKS_SIZE), np.empty(sine.LANES_SIZE), np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64),
+        np.empty(sine.BLOCKS_SIZE), np.empty(LANES_SIZE), np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64),
         np.empty(TILE, np.bool_),
     )  # fmt: skip
     stretches = 0

@@ -1,0 +1,314 @@
+"""Continuous sliding under a sine: Eq. 4 throughout, from integrals over one quarter of the cycle.
+
+|Üg| and the friction repeat every quarter, mirrored, so that a quarter gives a cycle, and the cycles an
+arithmetic series.  Most cells are solved in SIMD lanes (`lane_continuous`), those whose friction decays
+sharply, or whose velocity turns more than once on a rise, one by one (`continuous`).
+"""
+
+import math
+
+import numpy as np
+
+from slipsweep.elementary import angle_minus_sine, rising_phase, sine_after, versine
+from slipsweep.kernels.block import (
+    AMPLITUDE,
+    BEGAN,
+    DECAY,
+    DELTA_MU,
+    MU_S,
+    STRIP,
+    TAN_THETA,
+    Block,
+    Motion,
+    Options,
+    friction,
+    lane_friction,
+    lane_slip,
+    opposite,
+    phase,
+    slip,
+    slip_root,
+)
+from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break
+from slipsweep.kernels.jit import in_lanes, scalar, summed
+from slipsweep.kernels.lanes import (
+    CARRIED,
+    CODE,
+    CONVERGED,
+    GAIN,
+    HALF_PI,
+    LANE_NODES,
+    LANE_TOLERANCE,
+    LANE_WEIGHTS,
+    MOMENT,
+    MOST_ITERATIONS,
+    MOVED,
+    PEAK,
+    PSI,
+    RATE,
+    V,
+    W,
+    X,
+)
+
+#: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes reach 1e-14.
+SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
+SHORT_SINE = math.sin(0.6)
+
+#: Coefficients, highest first, of ∫ e^(−k sin φ) dφ over [0, π/2] in powers of 4 − k: integrals of
+#: sinⁿ e^(−4 sin) / n!, all positive, on 8 panels of 8 nodes (more on fewer panels have weights that
+#: are wrong by 3e-15).  31 terms give 4e-16 for k from 0 to 6; about 4, no digits cancel where k is large.
+_CENTRE = 4.0
+_PANEL_WIDTH = HALF_PI / 8
+_SINES = np.sin(_PANEL_WIDTH * (np.arange(8)[:, np.newaxis] + SHORT_NODES))
+_WEIGHTED = _PANEL_WIDTH * SHORT_WEIGHTS * np.exp(-_CENTRE * _SINES)
+_QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) for n in range(30, -1, -1)])
+
+#: Rows of lanes that pulses have for something else: what V misses before Üg = Üy, and what it gains from
+#: Üg = 0 up to where its rate changes sign on the rise of the positive half cycle.
+_MISSED, _DIP = CARRIED, MOVED
+
+
+@summed
+def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple[float, float]:
+    """∫ D dψ and ∫ (end − ψ) D dψ over a part of a rising quarter: gains of V and W from rest.
+
+    `side` is 1 for the positive half cycle and −1 for the negative one.
+    """
+    amplitude = side * block.amplitude
+    x_start = amplitude * (1.0 - versine(start))
+    decay = block.decay_rate / block.g
+    e_foldings = decay * abs(amplitude * (1.0 - versine(end)) - x_start)
+    first, second = 0.0, 0.0
+    left = start
+    for bound in PANEL_BOUNDS:
+        right = end if e_foldings <= bound else phase(block, abs(x_start) + bound / decay)
+        width = right - left
+        rate, moment = 0.0, 0.0
+        for node in range(NODES.size):
+            weighted = WEIGHTS[node] * slip(block, amplitude * sine_after(left, width * NODES[node]))
+            rate += weighted
+            moment += (1.0 - NODES[node]) * weighted
+        second += (first + moment * width) * width
+        first += rate * width
+        left = right
+        if e_foldings <= bound:
+            break
+    return first, second
+
+
+@scalar
+def continuous_peaks(block: Block, side: float, half_gain: float, after: float) -> tuple[float, float]:
+    """Largest V in a half cycle entered with V = 0, where the plane has passed `after` on its rise, and from Üg = 0.
+
+    V peaks where its rate D changes sign; the falling quarter mirrors the rising one, over
+    which and back V gains `half_gain`.
+    """
+    late, whole = half_gain, max(0.0, half_gain)
+    x, end = 0.0, side * block.amplitude
+    for _ in range(MOST_LEGS):
+        target = next_break(block, x, end)
+        inner = x + SLIVER * (target - x)
+        if opposite(slip(block, inner), slip(block, target)):
+            zero = abs(slip_root(block, 0.0, inner, target))
+            gained = slip_integrals(block, -HALF_PI, phase(block, zero), side)[0]
+            late, whole = max(late, half_gain - gained), max(whole, max(gained, half_gain - gained))
+            if zero > after:
+                late = max(late, gained)
+        x = target
+        if x == end:
+            break
+    return late, whole
+
+
+@in_lanes
+def continuous_displacement(
+    up: float, missed: float, missed_moment: float, drift: float, began: float, cycles: int
+) -> float:
+    """W of all cycles, from integrals over the rising quarter of the positive half cycle.
+
+    `up` is ∫ D over the quarter, `missed` and `missed_moment` the integrals of D (as
+    `slip_integrals`) up to ψ = `began`, where sliding starts, and `drift` the gain of V
+    over a cycle.
+    """
+    down = 0.5 * drift - up  # ∫ D over a quarter of the negative half cycle
+    # to the peak W misses what D would have given before Üg = Üy; the other quarters are whole
+    displacement = began * missed - missed_moment + HALF_PI * (2.0 * up - missed) + math.pi * (2.0 * up - missed + down)
+    later = cycles - 1.0
+    return displacement + later * math.pi * (2.0 * (drift - missed) + 3.0 * up + down + drift * (later - 1.0))
+
+
+@in_lanes
+def continuous_peak(missed: float, drift: float, first: float, positive: float, negative: float, cycles: int) -> float:
+    """Largest V of all cycles, from the largest of half cycles entered with V = 0.
+
+    `first` is that of the first half cycle from Üg = Üy on, before which V misses `missed`; `positive` and
+    `negative` are those of whole ones, the latter with the V that the positive one before it has left.
+    """
+    peak = max(0.0, max(first, negative) - missed)
+    again = drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift)
+    return max(peak, again) if cycles > 1 else peak
+
+
+@scalar
+def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
+    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.
+
+    |Üg| and the friction repeat every quarter cycle, mirrored, so that integrals over a
+    quarter give a cycle, and the cycles an arithmetic series.
+    """
+    began = phase(block, block.yield_acceleration)
+    missed, missed_moment = slip_integrals(block, -HALF_PI, began, 1.0)
+    up = missed + slip_integrals(block, began, 0.0, 1.0)[0]
+    drift = drift_integral(block)
+    displacement = continuous_displacement(up, missed, missed_moment, drift, began, cycles)
+    peak = math.nan
+    if wants_peak:
+        first, positive = continuous_peaks(block, 1.0, 2.0 * up, block.yield_acceleration)
+        negative = 2.0 * up + continuous_peaks(block, -1.0, drift - 2.0 * up, 0.0)[1]
+        peak = continuous_peak(missed, drift, first, positive, negative, cycles)
+    return Motion(displacement, peak, 0)
+
+
+@scalar
+def drift_rate(block: Block, x: float) -> float:
+    """tan θ x (μs − tan θ − μ), half of what V gains at x and at −x together; where μ is huge, tan θ x is not."""
+    return block.tan_theta * x * (block.mu_s - block.tan_theta - friction(block, x))
+
+
+@summed
+def drift_integral(block: Block) -> float:
+    """Gain of V over a whole cycle, 4 ∫ tan θ x (μs − tan θ − μ) dψ over a quarter.
+
+    The sum of the two half cycles with g cancelled by hand: over 10⁶ cycles the rounding
+    of that cancellation would show.
+    """
+    decay = block.decay_rate / block.g
+    e_foldings = decay * block.amplitude
+    total = 0.0
+    left = -HALF_PI
+    for bound in PANEL_BOUNDS:
+        right = 0.0 if e_foldings <= bound else phase(block, bound / decay)
+        width = right - left
+        part = 0.0
+        for node in range(NODES.size):
+            x = block.amplitude * sine_after(left, width * NODES[node])
+            part += WEIGHTS[node] * drift_rate(block, x)
+        total += part * width
+        left = right
+        if e_foldings <= bound:
+            break
+    return 4.0 * total
+
+
+@in_lanes
+def quarter_integrals(k: float) -> tuple[float, float]:
+    """∫ e^(−k sin φ) dφ and ∫ sin φ e^(−k sin φ) dφ over [0, π/2], for k from 0 to the e-foldings of the lanes.
+
+    The second is the derivative of the first by −k.  In closed form they are π/2 (I₀ − L₀) and
+    1 + π/2 (L₁ − I₁), modified Bessel and Struve functions of k.
+    """
+    below = _CENTRE - k
+    first, second = 0.0, 0.0
+    for n in range(_QUARTER_SERIES.size):
+        second = second * below + first
+        first = first * below + _QUARTER_SERIES[n]
+    return first, second
+
+
+@in_lanes
+def lane_rate_and_slope(lanes: np.ndarray, j: int, side: float, x: float, g: float) -> tuple[float, float]:
+    """D and dD/d|Üg| of a lane in continuous sliding, |Üg| = x, on the positive (`side` 1) or negative (−1) half."""
+    tan_theta, mu_s, decay = lanes[TAN_THETA + j], lanes[MU_S + j], lanes[DECAY + j]
+    mu = lane_friction(lanes, j, x)
+    kept = mu_s - tan_theta - mu
+    rate = side * (g * (mu_s - mu)) + x * tan_theta * kept
+    slope = side * (g * (mu * decay)) + tan_theta * (kept + x * (mu * decay))
+    return rate, slope
+
+
+@scalar
+def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
+    """∫ D dψ on the rise of a half cycle, from Üg = 0 up to where D changes sign, in RATE; 0 where it does not.
+
+    D is -side g Δμ at Üg = 0.  On the positive half it is concave (by `way_of`), on the negative one convex
+    (as long as the block does not lift off): it changes sign once at most, and Newton comes there from Üg = 0
+    without passing it.
+    """
+    for j in range(STRIP):
+        at_peak, slope = lane_rate_and_slope(lanes, j, side, lanes[AMPLITUDE + j], g)
+        turns = side * at_peak > 0.0
+        # one that has its first sign at the peak may have changed twice, unless it still goes away from it
+        monotone = side * slope >= 0.0
+        lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
+        lanes[PSI + j] = 0.0 if turns else 1.0
+        lanes[X + j] = 0.0
+    for _ in range(MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            x = lanes[X + j]
+            rate, slope = lane_rate_and_slope(lanes, j, side, x, g)
+            step = rate / slope
+            settled = lanes[PSI + j] > 0.0
+            lanes[X + j] = x if settled else x - step
+            settled |= abs(step) <= LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[PSI + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
+        lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], lanes[AMPLITUDE + j])
+        lanes[RATE + j] = 0.0
+    for node in range(LANE_NODES.size):
+        at, weight = LANE_NODES[node], LANE_WEIGHTS[node]
+        for j in range(STRIP):
+            phi = lanes[PSI + j] * at
+            x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
+            lanes[RATE + j] += weight * lane_rate_and_slope(lanes, j, side, x, g)[0]
+    for j in range(STRIP):
+        lanes[RATE + j] *= lanes[PSI + j]
+
+
+@scalar
+def lane_continuous(options: Options, lanes: np.ndarray) -> None:
+    """Continuous sliding, all cycles: W in row W, the largest V in PEAK."""
+    g = options.g
+    for j in range(STRIP):
+        # the whole quarter: ∫ D in V, a quarter of the drift in X; up to Üg = Üy: RATE, MOMENT
+        amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
+        most = mu_s + lanes[DELTA_MU + j]
+        plain, with_sine = quarter_integrals(lanes[DECAY + j] * amplitude)
+        lanes[X + j] = amplitude * tan_theta * (mu_s - tan_theta - most * with_sine)
+        lanes[V + j] = g * (HALF_PI * mu_s - most * plain) + lanes[X + j]
+        lanes[RATE + j] = lanes[MOMENT + j] = 0.0
+    for node in range(SHORT_NODES.size):
+        at, left, weight = SHORT_NODES[node], 1.0 - SHORT_NODES[node], SHORT_WEIGHTS[node]
+        for j in range(STRIP):
+            # sin φ on the way from Üg = 0 to Üg = Üy
+            phi = (HALF_PI + lanes[BEGAN + j]) * at
+            x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
+            weighted = weight * lane_slip(lanes, j, x, g)
+            lanes[RATE + j] += weighted
+            lanes[MOMENT + j] += left * weighted
+    for j in range(STRIP):
+        began = lanes[BEGAN + j]
+        width = HALF_PI + began
+        missed, missed_moment = lanes[RATE + j] * width, lanes[MOMENT + j] * width * width
+        drift = 4.0 * lanes[X + j]
+        lanes[W + j] = continuous_displacement(lanes[V + j], missed, missed_moment, drift, began, options.cycles)
+        lanes[_MISSED + j], lanes[GAIN + j] = missed, drift
+        lanes[PEAK + j], lanes[CODE + j], lanes[CONVERGED + j] = math.nan, 0.0, 1.0
+    if options.wants_peak:
+        lane_turn(1.0, g, lanes)
+        for j in range(STRIP):
+            lanes[_DIP + j] = lanes[RATE + j]
+        lane_turn(-1.0, g, lanes)
+        for j in range(STRIP):
+            # as in `continuous_peaks`: the fall mirrors the rise
+            drift, half, dip, bump = lanes[GAIN + j], 2.0 * lanes[V + j], lanes[_DIP + j], lanes[RATE + j]
+            first = max(half, half - dip)
+            other = drift - half
+            negative = half + max(max(0.0, other), max(bump, other - bump))
+            positive = max(max(0.0, dip), first)
+            lanes[PEAK + j] = continuous_peak(lanes[_MISSED + j], drift, first, positive, negative, options.cycles)

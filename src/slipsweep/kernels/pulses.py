@@ -1,0 +1,490 @@
+"""Stick-slip under a sine in SIMD lanes: the pulse from its onset to the stop, phase by phase, and all cycles.
+
+Nearly all cells go the same way: they slide from Üg = Üy, hold the yield value, perhaps follow Eq. 4 to the
+peak, hold again and stop before the next pulse.  Where a block comes to the next pulse in motion it goes on by one
+of a few rules (`lane_attenuation`, `lane_carried`), pulse by pulse where none is like another (`follow_pulses`).
+"""
+
+import math
+
+import numpy as np
+
+from slipsweep import equations as eq
+from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, rising_phase, versine
+from slipsweep.kernels.block import (
+    AMPLITUDE,
+    BEGAN,
+    DECAY,
+    EVENT_TOLERANCE,
+    MU_S,
+    NOT_RECOUPLED,
+    STRIP,
+    TAN_THETA,
+    YIELD,
+    Options,
+    lane_friction,
+    lane_response,
+    lane_slip,
+)
+from slipsweep.kernels.jit import in_lanes, scalar, summed
+from slipsweep.kernels.lanes import (
+    AT_PEAK,
+    CARRIED,
+    CODE,
+    CONVERGED,
+    FOLLOWS_EQ4,
+    GAIN,
+    HALF_PI,
+    HELD,
+    HIGHEST,
+    LANE_NODES,
+    LANE_TOLERANCE,
+    LANE_WEIGHTS,
+    LAST,
+    LEFT,
+    LEVEL,
+    MOMENT,
+    MOST,
+    MOST_ITERATIONS,
+    MOVED,
+    ONSET,
+    PEAK,
+    PSI,
+    RATE,
+    SLOWEST,
+    START,
+    STICKS,
+    THROUGH,
+    TO_PEAK,
+    YIELD_GOVERNS,
+    V,
+    W,
+    X,
+)
+
+#: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
+_MOST_PULSES = 64
+
+
+@in_lanes
+def held_motion(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+    """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest."""
+    width = end - start
+    excess = amplitude - held
+    sine_part = angle_minus_sine(start)
+    first = excess * width - amplitude * (angle_minus_sine(end) - sine_part)
+    second = 0.5 * excess * width * width - amplitude * (
+        half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * width
+    )
+    return first, second
+
+
+@in_lanes
+def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
+    """E and dE/dx of a lane (x > 0)."""
+    tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]
+    mu = lane_friction(lanes, j, x)
+    n = eq.normal_acceleration(x, tan_theta, g)
+    slope = 1.0 - tan_theta * (mu_s - tan_theta - mu) - n * mu * lanes[DECAY + j]
+    return x - eq.lag(x, mu, mu_s, tan_theta, g), slope
+
+
+@scalar
+def lane_onset(way: int, g: float, lanes: np.ndarray) -> None:
+    """t1: where each lane begins to slide (ψ in START) and the value it then holds (LEVEL)."""
+    for j in range(STRIP):
+        lanes[CONVERGED + j] = 1.0
+        lanes[LEVEL + j], lanes[START + j] = lanes[YIELD + j], lanes[BEGAN + j]
+    if way != STICKS:
+        return
+    for j in range(STRIP):
+        lanes[CONVERGED + j] = 0.0
+    # D = 0, from the left, where a concave D converges, slowly where it starts flat
+    for _ in range(MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            x = lanes[LEVEL + j]
+            asked, slope = lane_response_and_slope(lanes, j, x, g)
+            step = (asked - x) / (1.0 - slope)
+            settled = lanes[CONVERGED + j] > 0.0
+            lanes[LEVEL + j] = x if settled else x + step
+            settled |= abs(step) <= LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[CONVERGED + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[START + j] = rising_phase(lanes[LEVEL + j], lanes[AMPLITUDE + j])
+
+
+@scalar
+def lane_switch(g: float, lanes: np.ndarray) -> None:
+    """x at which each lane ceases to hold its level and follows Eq. 4 (X), and b at the peak (HELD)."""
+    for j in range(STRIP):
+        amplitude, level = lanes[AMPLITUDE + j], lanes[LEVEL + j]
+        asked, slope = lane_response_and_slope(lanes, j, amplitude, g)
+        follows = asked > level
+        lanes[HELD + j] = asked if follows else level
+        lanes[X + j] = amplitude - (asked - level) / slope if follows else amplitude
+        lanes[PSI + j] = 0.0 if follows else 1.0
+    # E = b, from the right, where a convex E converges
+    for _ in range(MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            x = lanes[X + j]
+            asked, slope = lane_response_and_slope(lanes, j, x, g)
+            step = (asked - lanes[LEVEL + j]) / slope
+            settled = lanes[PSI + j] > 0.0
+            lanes[X + j] = x if settled else x - step
+            settled |= abs(step) <= LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
+            lanes[PSI + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
+
+
+@scalar
+def lane_rise(way: int, g: float, lanes: np.ndarray) -> None:
+    """From t1 to the peak: b in HELD, V and W gained from rest in V and W."""
+    if way == YIELD_GOVERNS:
+        for j in range(STRIP):
+            lanes[X + j], lanes[HELD + j] = lanes[AMPLITUDE + j], lanes[LEVEL + j]
+            lanes[V + j], lanes[W + j] = held_motion(lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[START + j], 0.0)
+        return
+    lane_switch(g, lanes)
+    # the hold
+    for j in range(STRIP):
+        amplitude = lanes[AMPLITUDE + j]
+        # no earlier than the start, from which it may differ by the roundings of two roots
+        psi = max(rising_phase(lanes[X + j], amplitude), lanes[START + j])
+        lanes[PSI + j] = psi
+        lanes[V + j], lanes[W + j] = held_motion(amplitude, lanes[LEVEL + j], lanes[START + j], psi)
+        lanes[RATE + j] = lanes[MOMENT + j] = 0.0
+    # Eq. 4
+    for node in range(LANE_NODES.size):
+        left, weight = 1.0 - LANE_NODES[node], LANE_WEIGHTS[node]
+        for j in range(STRIP):
+            x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[PSI + j] * left))
+            weighted = weight * lane_slip(lanes, j, x, g)
+            lanes[RATE + j] += weighted
+            lanes[MOMENT + j] += left * weighted
+    for j in range(STRIP):
+        width = -lanes[PSI + j]
+        lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width
+        lanes[V + j] += lanes[RATE + j] * width
+
+
+@scalar
+def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
+    """The hold from the peak to the stop or to Üg = 0 (t5): V left in LEFT, if wanted the largest V in PEAK."""
+    unsettled = 0
+    for j in range(STRIP):
+        left = lanes[V + j] + held_motion(lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, HALF_PI)[0]
+        lanes[LEFT + j] = max(left, 0.0)
+        lanes[PSI + j] = HALF_PI
+        lanes[PEAK + j] = math.nan
+        unsettled += 0 if left > 0.0 else 1
+    if wants_peak or unsettled > 0:
+        for j in range(STRIP):
+            # V is largest where x = b; a parabola from there overestimates the stop
+            amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j]
+            top = -rising_phase(held, amplitude)
+            peak = velocity + held_motion(amplitude, held, 0.0, top)[0]
+            onward = math.sqrt(2.0 * peak / (amplitude * (top - angle_minus_sine(top))))
+            lanes[PSI + j] = HALF_PI if lanes[LEFT + j] > 0.0 else min(top + onward, HALF_PI)
+            lanes[PEAK + j] = peak if wants_peak else math.nan
+            lanes[X + j] = 1.0 if lanes[LEFT + j] > 0.0 else 0.0
+        for _ in range(MOST_ITERATIONS):
+            if unsettled == 0:
+                break
+            unsettled = 0
+            for j in range(STRIP):
+                amplitude, held, psi = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[PSI + j]
+                over = lanes[V + j] + held_motion(amplitude, held, 0.0, psi)[0]
+                step = over / (amplitude - held - amplitude * versine(psi))
+                settled = lanes[X + j] > 0.0
+                lanes[PSI + j] = psi if settled else min(max(psi - step, 0.0), HALF_PI)
+                settled |= abs(step) <= LANE_TOLERANCE * psi
+                lanes[X + j] = 1.0 if settled else 0.0
+                unsettled += 0 if settled else 1
+        for j in range(STRIP):
+            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
+    for j in range(STRIP):
+        end = lanes[PSI + j]
+        lanes[W + j] += lanes[V + j] * end + held_motion(lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, end)[1]
+
+
+@in_lanes
+def pause_of(began: float) -> float:
+    """Phase from Üg = 0 (t5) to the next Üg = Üy."""
+    return 1.5 * math.pi + began
+
+
+@in_lanes
+def slid(velocity: float, after: float, held: float) -> float:
+    """W while Eq. 12 brings V down: (V² − V'²) / 2b, the squares of which need be no doubles."""
+    return 0.5 * (velocity - after) * ((velocity + after) / held)
+
+
+@in_lanes
+def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: float) -> float:
+    """W of the pulse that a lane has followed and of `later` more, each entered with V greater by `gain`.
+
+    All but the last slide `braked` and π · gain · (2n − 1) more between two pulses, the last to its stop.
+    """
+    moved, left = lanes[W + j], lanes[LEFT + j] + later * gain
+    last = moved + later * gain * (HALF_PI - lanes[BEGAN + j]) + slid(left, 0.0, lanes[HELD + j])
+    return later * (moved + braked + math.pi * gain * (later - 1.0)) + last
+
+
+@scalar
+def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
+    """Eq. 12, and all cycles: W in W, the largest V in PEAK.
+
+    Where a block still slides at the next Üg = Üy, Eq. 4 and the hold act on it as in the
+    pulse before, so that each cycle adds the same velocity v: an arithmetic series.  But what
+    sticks at Üg = Üy when at rest does not when it slides: `lane_carried` goes on with it.
+    """
+    for j in range(STRIP):
+        held, left, moved = lanes[HELD + j], lanes[LEFT + j], lanes[W + j]
+        carried = max(left - held * pause_of(lanes[BEGAN + j]), 0.0)
+        braked = slid(left, carried, held)
+        later = cycles - 1.0
+        lanes[CARRIED + j], lanes[MOVED + j] = carried, moved + braked
+        lanes[LAST + j] = moved + slid(left, 0.0, held)
+        lanes[HIGHEST + j], lanes[ONSET + j] = lanes[PEAK + j], lanes[START + j]
+        lanes[W + j] = lane_series(lanes, j, braked, carried, later)
+        lanes[PEAK + j] += later * carried
+        still = (carried > 0.0) & (cycles > 1)
+        lanes[CODE + j] = NOT_RECOUPLED if still else 0
+        # -1: right so far, but not over
+        lanes[CONVERGED + j] *= -1.0 if still & (way == STICKS) else 1.0
+
+
+@scalar
+def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
+    """From Üg = 0 on by integration, χ = φ − π to the stop, which comes before 2π for b ≥ Üy; and all cycles."""
+    for j in range(STRIP):
+        # vers χ ≥ 2 χ²/π²: this start lies beyond the stop
+        b, left = lanes[HELD + j], lanes[LEFT + j]
+        curvature = 4.0 * lanes[AMPLITUDE + j] / (math.pi * math.pi)
+        longest = left / b
+        lanes[PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
+        lanes[X + j] = 0.0
+    for _ in range(MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            amplitude, b, chi = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[PSI + j]
+            half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
+            over = lanes[LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
+            step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
+            settled = lanes[X + j] > 0.0
+            lanes[PSI + j] = chi if settled else min(max(chi + step, 0.0), math.pi)
+            settled |= abs(step) <= LANE_TOLERANCE * chi
+            lanes[X + j] = 1.0 if settled else 0.0
+            unsettled += 0 if settled else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
+    for j in range(STRIP):
+        amplitude, b, chi = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[PSI + j]
+        sine = 2.0 * (0.5 * chi - angle_minus_sine(0.5 * chi)) * (1.0 - versine(0.5 * chi))
+        lanes[W + j] += (lanes[LEFT + j] - 0.5 * b * chi) * chi - amplitude * (chi - sine)
+        lanes[W + j] *= cycles
+        lanes[CODE + j] = 0.0
+
+
+@scalar
+def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
+    """All cycles of `count` lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
+
+    Then they hold E(Üy) ≥ Üg from Üy on and slide through, and each pulse is entered with V greater by
+    the same gain.  Where that is a loss, one of two things ends it, and the motion repeats: a pulse that
+    recouples, or one that stops before t1 of the first pulse and goes on like it.
+    """
+    later = options.cycles - 1.0
+    for j in range(STRIP):
+        lanes[LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
+        lanes[START + j], lanes[CONVERGED + j] = lanes[BEGAN + j], 1.0
+    # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
+    lane_rise(FOLLOWS_EQ4, options.g, lanes)
+    for j in range(STRIP):
+        amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j], lanes[CARRIED + j]
+        slowest = rising_phase(min(held, lanes[X + j]), amplitude)
+        lanes[SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
+        # held until past its slowest, or else Eq. 4 itself slows it
+        through = (held >= amplitude) | (lanes[X + j] >= held)
+        lanes[THROUGH + j] = lanes[CONVERGED + j] if through else 0.0
+        lanes[W + j] += -carried * began
+        lanes[V + j] += carried
+        lanes[AT_PEAK + j], lanes[TO_PEAK + j] = lanes[V + j], lanes[W + j]
+    lane_fall(options.wants_peak, lanes)
+    for j in range(STRIP):
+        # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
+        carried, slowest = lanes[CARRIED + j], lanes[SLOWEST + j]
+        gain = lanes[LEFT + j] - lanes[HELD + j] * pause_of(lanes[BEGAN + j]) - carried
+        after = carried + gain
+        through = (np.ceil(slowest / -gain) if gain < 0.0 else later) if slowest > 0.0 else 0.0
+        sliding = (np.ceil(after / -gain) if gain < 0.0 else later) if after > 0.0 else 0.0
+        most = min(min(through, sliding + 1.0), later)
+        stops = (through <= sliding) & (most < later)
+        lanes[GAIN + j], lanes[MOST + j] = gain, most
+        # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
+        lanes[V + j] = carried + (most * gain if most > 0.0 else 0.0)
+        lanes[PSI + j] = lanes[BEGAN + j]
+        lanes[X + j] = 0.0 if stops else 1.0
+    for _ in range(MOST_ITERATIONS):
+        unsettled = 0
+        for j in range(STRIP):
+            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[PSI + j]
+            velocity = lanes[V + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
+            step = velocity / (amplitude - held - amplitude * versine(psi))
+            settled = lanes[X + j] > 0.0
+            lanes[PSI + j] = psi if settled else min(max(psi - step, lanes[BEGAN + j]), lanes[ONSET + j])
+            settled |= abs(step) <= LANE_TOLERANCE * abs(lanes[PSI + j] - lanes[BEGAN + j])
+            lanes[X + j] = 1.0 if settled else 0.0
+            # one that reaches t1 does not stop before
+            unsettled += 0 if settled | (lanes[PSI + j] >= lanes[ONSET + j]) else 1
+        if unsettled == 0:
+            break
+    for j in range(STRIP):
+        began, psi, left, gain, most = (
+            lanes[BEGAN + j],
+            lanes[PSI + j],
+            lanes[LEFT + j],
+            lanes[GAIN + j],
+            lanes[MOST + j],
+        )
+        held_on = held_motion(lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
+        again = lanes[V + j] * (psi - began) + held_on if psi > began else 0.0
+        stops = psi > began
+        braked = slid(left, lanes[CARRIED + j] + gain, lanes[HELD + j])
+        periods = np.floor(later / (most + 1.0))
+        rest = later - periods * (most + 1.0)
+        sliding_on = most * (lanes[W + j] + braked + math.pi * gain * (most - 1.0))
+        slides = sliding_on if stops else lane_series(lanes, j, braked, gain, most - 1.0)
+        period = lanes[MOVED + j] + again + (slides if most > 0.0 else 0.0)
+        tail = lanes[MOVED + j] + lane_series(lanes, j, braked, gain, rest - 1.0)
+        # the slides through all reach t5, as the first does
+        gets_over = (lanes[LEVEL + j] < lanes[AMPLITUDE + j]) & (lanes[CONVERGED + j] * lanes[THROUGH + j] > 0.0)
+        alike = gets_over & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
+        repeats = ((most == 0.0) | alike) & (lanes[X + j] > 0.0) & ((not stops) | (psi < lanes[ONSET + j]))
+        lanes[W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if rest > 0.0 else lanes[LAST + j])
+        highest = lanes[PEAK + j] + max(gain, 0.0) * max(rest - 1.0, 0.0)
+        lanes[PEAK + j] = max(lanes[HIGHEST + j], highest if most > 0.0 else 0.0)
+        # -1: each pulse has to be followed
+        lanes[CONVERGED + j] = 1.0 if repeats else -1.0
+        lanes[CODE + j] = NOT_RECOUPLED
+    if later <= _MOST_PULSES:
+        for j in range(count):
+            if lanes[CONVERGED + j] < 0.0:
+                follow_pulses(options, lanes, j)
+
+
+@scalar
+def held_stop(lanes: np.ndarray, j: int, velocity: float) -> float:
+    """ψ at which the hold from Üy on, entered with `velocity`, stops before its slowest; NaN if not found."""
+    amplitude, held, began = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j]
+    psi = began
+    for _ in range(MOST_ITERATIONS):
+        over = velocity + held_motion(amplitude, held, began, psi)[0]
+        step = over / (amplitude - held - amplitude * versine(psi))
+        psi -= step
+        if abs(step) <= EVENT_TOLERANCE * (psi - began):
+            return psi
+    return math.nan
+
+
+@summed
+def followed_to_peak(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float]:
+    """V and W gained from rest at ψ = `start` to the peak by Eq. 4."""
+    rate, moment = 0.0, 0.0
+    for node in range(LANE_NODES.size):
+        left = 1.0 - LANE_NODES[node]
+        x = lanes[AMPLITUDE + j] * (1.0 - versine(start * left))
+        weighted = LANE_WEIGHTS[node] * lane_slip(lanes, j, x, g)
+        rate += weighted
+        moment += left * weighted
+    return -start * rate, start * start * moment
+
+
+@scalar
+def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float, float]:
+    """b at the peak, and V and W gained there, of a lane that starts to slide at ψ = `start`, beyond t1; or NaN."""
+    amplitude = lanes[AMPLITUDE + j]
+    asked, slope = lane_response_and_slope(lanes, j, amplitude * (1.0 - versine(start)), g)
+    level = max(lanes[YIELD + j], asked)
+    at_peak, slope_at_peak = lane_response_and_slope(lanes, j, amplitude, g)
+    if at_peak <= level:
+        return level, *held_motion(amplitude, level, start, 0.0)
+    psi = start
+    if slope <= 0.0 or asked < level:  # as in `lane_switch`
+        x, step = amplitude - (at_peak - level) / slope_at_peak, math.inf
+        for _ in range(MOST_ITERATIONS):
+            if abs(step) <= EVENT_TOLERANCE * min(x, amplitude - x):
+                break
+            asked, slope = lane_response_and_slope(lanes, j, x, g)
+            step = (asked - level) / slope
+            x -= step
+        else:
+            return math.nan, math.nan, math.nan
+        psi = max(rising_phase(x, amplitude), start)
+    held_on = held_motion(amplitude, level, start, psi)
+    followed = followed_to_peak(lanes, j, psi, g)
+    return at_peak, held_on[0] + followed[0], held_on[1] - held_on[0] * psi + followed[1]
+
+
+@scalar
+def fall_stop(amplitude: float, held: float, at_peak: float, highest: float, top: float) -> float:
+    """ψ after the peak at which V = `at_peak` there, largest at ψ = `top`, is used up by the hold; NaN if not found."""
+    psi = top + math.sqrt(2.0 * highest / (amplitude * (top - angle_minus_sine(top))))  # beyond it
+    for _ in range(MOST_ITERATIONS):
+        psi = min(psi, HALF_PI)
+        over = at_peak + held_motion(amplitude, held, 0.0, psi)[0]
+        step = over / (amplitude - held - amplitude * versine(psi))
+        psi -= step
+        if abs(step) <= EVENT_TOLERANCE * psi:
+            return psi
+    return math.nan
+
+
+@scalar
+def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
+    """All cycles of a lane of `lane_carried` that stops between t1 and Üg = b, so that no pulse is like another.
+
+    It restarts at once; the other pulses are those that `lane_carried` knows.
+    """
+    amplitude, began, carried = lanes[AMPLITUDE + j], lanes[BEGAN + j], lanes[CARRIED + j]
+    moved, highest, velocity = lanes[MOVED + j], lanes[HIGHEST + j], carried
+    for later in range(options.cycles - 2, -1, -1):
+        if velocity > 0.0 and lanes[SLOWEST + j] + velocity - carried > 0.0:
+            if lanes[THROUGH + j] == 0.0:
+                return
+            held, at_peak = lanes[HELD + j], lanes[AT_PEAK + j] + (velocity - carried)
+            moved += lanes[TO_PEAK + j] - (velocity - carried) * began
+        else:
+            stop = began
+            if velocity > 0.0:
+                stop = held_stop(lanes, j, velocity)
+                moved += velocity * (stop - began) + held_motion(amplitude, lanes[LEVEL + j], began, stop)[1]
+            if stop <= lanes[ONSET + j]:
+                moved += lanes[MOVED + j] if later > 0 else lanes[LAST + j]
+                velocity = carried
+                continue
+            held, at_peak, gained = restart(lanes, j, stop, options.g)
+            moved += gained
+        top = -rising_phase(held, amplitude)
+        peak = at_peak + held_motion(amplitude, held, 0.0, top)[0]
+        left = at_peak + held_motion(amplitude, held, 0.0, HALF_PI)[0]
+        end = HALF_PI if left > 0.0 else fall_stop(amplitude, held, at_peak, peak, top)
+        moved += at_peak * end + held_motion(amplitude, held, 0.0, end)[1]
+        left = max(left, 0.0)
+        velocity = max(left - held * pause_of(began), 0.0) if later > 0 else 0.0
+        moved += slid(left, velocity, held)
+        highest = max(highest, peak)
+    # NaN where an iteration has not converged
+    if moved >= 0.0:
+        lanes[W + j], lanes[PEAK + j], lanes[CONVERGED + j] = moved, highest, 1.0
