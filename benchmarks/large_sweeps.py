@@ -51,6 +51,20 @@ if synced:
 print(time.perf_counter() - start)
 """
 
+#: Writes as many bytes, 8 MiB at a time, past the system's cache where that can be: what the disk takes by itself.
+DISK = """
+import mmap, os, sys, time
+path, nbytes = sys.argv[1], int(sys.argv[2])
+piece = mmap.mmap(-1, 2**23)
+piece.write(os.urandom(2**23))
+start = time.perf_counter()
+file = os.open(path, os.O_WRONLY | os.O_CREAT | getattr(os, "O_DIRECT", 0))
+for _ in range(-(-nbytes // 2**23)):
+    os.write(file, piece)
+os.fsync(file)
+print(time.perf_counter() - start)
+"""
+
 
 @dataclass
 class Process:
@@ -101,29 +115,34 @@ def throughput(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
     length = 10 if tiny else 100
     rows = max(1, blocks.BLOCK_CELLS // length**3)
     sweep = sweep_file(folder / "big.toml", [length] * 4)
-    taken: dict[str, list[tuple[float, float]]] = {"run": [], "alone": [], "synced": [], "again": []}
+    taken: dict[str, list[tuple[float, float]]] = {"run": [], "alone": [], "again": [], "synced": [], "disk": []}
     memory = 0.0
+    nbytes = length**4 * sum(np.dtype(kind).itemsize for kind in RESULTS.values())
     run(sweep)  # the kernels are on disk from here on
     for _ in range(1 if tiny else 4):
         # each after what is not of its kind, but for "again": a virtual machine takes up to seconds of processor to
         # have 1.9 GB of memory from its host, and none for what a process has just given back
-        for name, synced in (("alone", "0"), ("again", "0"), ("run", ""), ("synced", "1"), ("run", "")):
+        for name in ("alone", "again", "run", "synced", "run", "disk"):
             if name == "run":
                 found = run(sweep)
                 memory = max(memory, found.memory)
                 taken["run"].append((found.seconds, found.processor))
                 continue
-            found = process("-c", ALONE % RESULTS, str(folder / "alone.nc"), str(length), str(rows), synced)
+            if name == "disk":
+                found = process("-c", DISK, str(folder / "alone.nc"), str(nbytes))
+            else:
+                synced = str(int(name == "synced"))
+                found = process("-c", ALONE % RESULTS, str(folder / "alone.nc"), str(length), str(rows), synced)
             (folder / "alone.nc").unlink()
             taken[name].append((float(found.printed), found.processor))
     seconds = {name: min(first for first, _ in times) for name, times in taken.items()}
     processor = {name: min(second for _, second in times) for name, times in taken.items()}
-    nbytes = length**4 * sum(np.dtype(kind).itemsize for kind in RESULTS.values())
     names = {
         "run": "`slipsweep run`, whole process, on the disk at the end",
         "alone": "netCDF4 alone, in the page cache at the end",
         "again": "the same once more, right after itself",
         "synced": "netCDF4 alone, on the disk at the end",
+        "disk": "as many bytes written directly, on the disk at the end",
     }
     rows_of_table = [
         [
