@@ -75,7 +75,7 @@ def make_file(path: Path, spec: SweepSpec, table: Table, labels: tuple[str, ...]
             # the first value that is written makes room for all
             file[name][(-1,) * file[name].ndim or ...] = 0
     offsets, lengths = {}, {}
-    with h5py.File(path) as file:
+    with h5py.File(path, locking=False) as file:  # the run holds a lock of its own; some network folders have none
         for name in table.data_vars:
             stored = file[name]
             offset, length = stored.id.get_offset(), stored.id.get_storage_size()
