@@ -38,10 +38,8 @@ from slipsweep.kernels.lanes import (
     GAIN,
     HALF_PI,
     LANE_NODES,
-    LANE_TOLERANCE,
     LANE_WEIGHTS,
     MOMENT,
-    MOST_ITERATIONS,
     MOVED,
     PEAK,
     PSI,
@@ -49,6 +47,7 @@ from slipsweep.kernels.lanes import (
     V,
     W,
     X,
+    settling,
 )
 
 #: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes reach 1e-14.
@@ -227,6 +226,17 @@ def lane_rate_and_slope(lanes: np.ndarray, j: int, side: float, x: float, g: flo
     return rate, slope
 
 
+@in_lanes
+def _turn_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
+    """To D = 0, from Üg = 0 on."""
+    rate, slope = lane_rate_and_slope(lanes, j, side, x, g)
+    step = rate / slope
+    return x - step, step, min(x, lanes[AMPLITUDE + j] - x)
+
+
+_settle_turn = settling(X, PSI, _turn_step)
+
+
 @scalar
 def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
     """∫ D dψ on the rise of a half cycle, from Üg = 0 up to where D changes sign, in RATE; 0 where it does not.
@@ -243,19 +253,7 @@ def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
         lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
         lanes[PSI + j] = 0.0 if turns else 1.0
         lanes[X + j] = 0.0
-    for _ in range(MOST_ITERATIONS):
-        unsettled = 0
-        for j in range(STRIP):
-            x = lanes[X + j]
-            rate, slope = lane_rate_and_slope(lanes, j, side, x, g)
-            step = rate / slope
-            settled = lanes[PSI + j] > 0.0
-            lanes[X + j] = x if settled else x - step
-            settled |= abs(step) <= LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
-            lanes[PSI + j] = 1.0 if settled else 0.0
-            unsettled += 0 if settled else 1
-        if unsettled == 0:
-            break
+    _settle_turn(lanes, side, g)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
         lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], lanes[AMPLITUDE + j])

@@ -38,7 +38,6 @@ from slipsweep.kernels.lanes import (
     HELD,
     HIGHEST,
     LANE_NODES,
-    LANE_TOLERANCE,
     LANE_WEIGHTS,
     LAST,
     LEFT,
@@ -60,6 +59,7 @@ from slipsweep.kernels.lanes import (
     V,
     W,
     X,
+    settling,
 )
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
@@ -89,6 +89,58 @@ def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tu
     return x - eq.lag(x, mu, mu_s, tan_theta, g), slope
 
 
+@in_lanes
+def _onset_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
+    """To D = 0, from the left, where a concave D converges, slowly where it starts flat."""
+    asked, slope = lane_response_and_slope(lanes, j, x, g)
+    step = (asked - x) / (1.0 - slope)
+    return x + step, step, min(x, lanes[AMPLITUDE + j] - x)
+
+
+@in_lanes
+def _switch_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
+    """To E = b, from the right, where a convex E converges."""
+    asked, slope = lane_response_and_slope(lanes, j, x, g)
+    step = (asked - lanes[LEVEL + j]) / slope
+    return x - step, step, min(x, lanes[AMPLITUDE + j] - x)
+
+
+@in_lanes
+def _fall_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
+    """To the stop after the peak."""
+    amplitude, held = lanes[AMPLITUDE + j], lanes[HELD + j]
+    over = lanes[V + j] + held_motion(amplitude, held, 0.0, psi)[0]
+    step = over / (amplitude - held - amplitude * versine(psi))
+    return min(max(psi - step, 0.0), HALF_PI), step, psi
+
+
+@in_lanes
+def _held_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
+    """To the stop of a pulse entered in motion, from Üy on, where V falls ever more slowly; no further than t1."""
+    amplitude, held, began, onset = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j], lanes[ONSET + j]
+    velocity = lanes[V + j] + held_motion(amplitude, held, began, psi)[0]
+    step = velocity / (amplitude - held - amplitude * versine(psi))
+    onward = min(max(psi - step, began), onset)
+    return onward, step, math.inf if onward >= onset else onward - began
+
+
+@in_lanes
+def _recoupling_step(lanes: np.ndarray, j: int, chi: float, side: float, g: float) -> tuple[float, float, float]:
+    """To the stop after Üg = 0."""
+    amplitude, b = lanes[AMPLITUDE + j], lanes[HELD + j]
+    half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
+    over = lanes[LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
+    step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
+    return min(max(chi + step, 0.0), math.pi), step, chi
+
+
+_settle_onset = settling(LEVEL, CONVERGED, _onset_step)
+_settle_switch = settling(X, PSI, _switch_step)
+_settle_fall = settling(PSI, X, _fall_step)
+_settle_held = settling(PSI, X, _held_step)
+_settle_recoupling = settling(PSI, X, _recoupling_step)
+
+
 @scalar
 def lane_onset(way: int, g: float, lanes: np.ndarray) -> None:
     """t1: where each lane begins to slide (ψ in START) and the value it then holds (LEVEL)."""
@@ -99,20 +151,7 @@ def lane_onset(way: int, g: float, lanes: np.ndarray) -> None:
         return
     for j in range(STRIP):
         lanes[CONVERGED + j] = 0.0
-    # D = 0, from the left, where a concave D converges, slowly where it starts flat
-    for _ in range(MOST_ITERATIONS):
-        unsettled = 0
-        for j in range(STRIP):
-            x = lanes[LEVEL + j]
-            asked, slope = lane_response_and_slope(lanes, j, x, g)
-            step = (asked - x) / (1.0 - slope)
-            settled = lanes[CONVERGED + j] > 0.0
-            lanes[LEVEL + j] = x if settled else x + step
-            settled |= abs(step) <= LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
-            lanes[CONVERGED + j] = 1.0 if settled else 0.0
-            unsettled += 0 if settled else 1
-        if unsettled == 0:
-            break
+    _settle_onset(lanes, 1.0, g)
     for j in range(STRIP):
         lanes[START + j] = rising_phase(lanes[LEVEL + j], lanes[AMPLITUDE + j])
 
@@ -127,20 +166,7 @@ def lane_switch(g: float, lanes: np.ndarray) -> None:
         lanes[HELD + j] = asked if follows else level
         lanes[X + j] = amplitude - (asked - level) / slope if follows else amplitude
         lanes[PSI + j] = 0.0 if follows else 1.0
-    # E = b, from the right, where a convex E converges
-    for _ in range(MOST_ITERATIONS):
-        unsettled = 0
-        for j in range(STRIP):
-            x = lanes[X + j]
-            asked, slope = lane_response_and_slope(lanes, j, x, g)
-            step = (asked - lanes[LEVEL + j]) / slope
-            settled = lanes[PSI + j] > 0.0
-            lanes[X + j] = x if settled else x - step
-            settled |= abs(step) <= LANE_TOLERANCE * min(x, lanes[AMPLITUDE + j] - x)
-            lanes[PSI + j] = 1.0 if settled else 0.0
-            unsettled += 0 if settled else 1
-        if unsettled == 0:
-            break
+    _settle_switch(lanes, 1.0, g)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
 
@@ -196,19 +222,8 @@ def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
             lanes[PSI + j] = HALF_PI if lanes[LEFT + j] > 0.0 else min(top + onward, HALF_PI)
             lanes[PEAK + j] = peak if wants_peak else math.nan
             lanes[X + j] = 1.0 if lanes[LEFT + j] > 0.0 else 0.0
-        for _ in range(MOST_ITERATIONS):
-            if unsettled == 0:
-                break
-            unsettled = 0
-            for j in range(STRIP):
-                amplitude, held, psi = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[PSI + j]
-                over = lanes[V + j] + held_motion(amplitude, held, 0.0, psi)[0]
-                step = over / (amplitude - held - amplitude * versine(psi))
-                settled = lanes[X + j] > 0.0
-                lanes[PSI + j] = psi if settled else min(max(psi - step, 0.0), HALF_PI)
-                settled |= abs(step) <= LANE_TOLERANCE * psi
-                lanes[X + j] = 1.0 if settled else 0.0
-                unsettled += 0 if settled else 1
+        if unsettled > 0:
+            _settle_fall(lanes, 1.0, 0.0)
         for j in range(STRIP):
             lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
     for j in range(STRIP):
@@ -273,20 +288,7 @@ def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
         longest = left / b
         lanes[PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
         lanes[X + j] = 0.0
-    for _ in range(MOST_ITERATIONS):
-        unsettled = 0
-        for j in range(STRIP):
-            amplitude, b, chi = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[PSI + j]
-            half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
-            over = lanes[LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
-            step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
-            settled = lanes[X + j] > 0.0
-            lanes[PSI + j] = chi if settled else min(max(chi + step, 0.0), math.pi)
-            settled |= abs(step) <= LANE_TOLERANCE * chi
-            lanes[X + j] = 1.0 if settled else 0.0
-            unsettled += 0 if settled else 1
-        if unsettled == 0:
-            break
+    _settle_recoupling(lanes, 1.0, 0.0)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
     for j in range(STRIP):
@@ -332,24 +334,11 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         most = min(min(through, sliding + 1.0), later)
         stops = (through <= sliding) & (most < later)
         lanes[GAIN + j], lanes[MOST + j] = gain, most
-        # the stop on the way from Üy, where Newton comes from the left: V falls ever more slowly
+        # the stop on the way from Üy
         lanes[V + j] = carried + (most * gain if most > 0.0 else 0.0)
         lanes[PSI + j] = lanes[BEGAN + j]
         lanes[X + j] = 0.0 if stops else 1.0
-    for _ in range(MOST_ITERATIONS):
-        unsettled = 0
-        for j in range(STRIP):
-            amplitude, held, psi = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[PSI + j]
-            velocity = lanes[V + j] + held_motion(amplitude, held, lanes[BEGAN + j], psi)[0]
-            step = velocity / (amplitude - held - amplitude * versine(psi))
-            settled = lanes[X + j] > 0.0
-            lanes[PSI + j] = psi if settled else min(max(psi - step, lanes[BEGAN + j]), lanes[ONSET + j])
-            settled |= abs(step) <= LANE_TOLERANCE * abs(lanes[PSI + j] - lanes[BEGAN + j])
-            lanes[X + j] = 1.0 if settled else 0.0
-            # one that reaches t1 does not stop before
-            unsettled += 0 if settled | (lanes[PSI + j] >= lanes[ONSET + j]) else 1
-        if unsettled == 0:
-            break
+    _settle_held(lanes, 1.0, options.g)
     for j in range(STRIP):
         began, psi, left, gain, most = (
             lanes[BEGAN + j],
