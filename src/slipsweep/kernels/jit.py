@@ -107,7 +107,7 @@ class _Part(CPUDispatcher):
             "no_cpython_wrapper": True,
             "no_cfunc_wrapper": True,
         }
-        super().__init__(py_func, locals, (targetoptions or {}) | inner, pipeline_class=_Compiler)
+        super().__init__(py_func, locals or {}, (targetoptions or {}) | inner, pipeline_class=_Compiler)
 
     @functools.cached_property
     def _for_python(self) -> Callable[..., Any]:
