@@ -54,11 +54,13 @@ print(time.perf_counter() - start)
 #: Writes as many bytes, 8 MiB at a time, past the system's cache where that can be: what the disk takes by itself.
 DISK = """
 import mmap, os, sys, time
+from slipsweep.placed import open_directly
 path, nbytes = sys.argv[1], int(sys.argv[2])
 piece = mmap.mmap(-1, 2**23)
 piece.write(os.urandom(2**23))
 start = time.perf_counter()
-file = os.open(path, os.O_WRONLY | os.O_CREAT | getattr(os, "O_DIRECT", 0))
+buffered = os.open(path, os.O_WRONLY | os.O_CREAT)
+file = open_directly(path) or buffered
 for _ in range(-(-nbytes // 2**23)):
     os.write(file, piece)
 os.fsync(file)
@@ -118,6 +120,13 @@ def throughput(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
     taken: dict[str, list[tuple[float, float]]] = {"run": [], "alone": [], "again": [], "synced": [], "disk": []}
     memory = 0.0
     nbytes = length**4 * sum(np.dtype(kind).itemsize for kind in RESULTS.values())
+    alone = (ALONE % RESULTS, str(folder / "alone.nc"), str(length), str(rows))
+    commands = {
+        "alone": (*alone, "0"),
+        "again": (*alone, "0"),
+        "synced": (*alone, "1"),
+        "disk": (DISK, str(folder / "alone.nc"), str(nbytes)),
+    }
     run(sweep)  # the kernels are on disk from here on
     for _ in range(1 if tiny else 4):
         # each after what is not of its kind, but for "again": a virtual machine takes up to seconds of processor to
@@ -128,11 +137,7 @@ def throughput(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
                 memory = max(memory, found.memory)
                 taken["run"].append((found.seconds, found.processor))
                 continue
-            if name == "disk":
-                found = process("-c", DISK, str(folder / "alone.nc"), str(nbytes))
-            else:
-                synced = str(int(name == "synced"))
-                found = process("-c", ALONE % RESULTS, str(folder / "alone.nc"), str(length), str(rows), synced)
+            found = process("-c", *commands[name])
             (folder / "alone.nc").unlink()
             taken[name].append((float(found.printed), found.processor))
     seconds = {name: min(first for first, _ in times) for name, times in taken.items()}

@@ -79,7 +79,9 @@ def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
     record = spec.record
     return {
         "sweep file": spec.text,
-        **({} if record is None else {"record": _digest(record.times, record.acceleration)}),
+        **(
+            {} if record is None else {"record": checksum({"times": record.times, "acceleration": record.acceleration})}
+        ),
         "solver": spec.solver.method,
         "--split": split,
         "checksums": "XXH3-128",
@@ -95,14 +97,6 @@ def installation() -> dict[str, str]:
         "numpy version": version("numpy"),
         "numba version": version("numba"),
     }
-
-
-def _digest(*arrays: NDArray[Any]) -> str:
-    digest = hashlib.sha256()
-    for values in arrays:
-        digest.update(f"{values.dtype.str} {values.shape};".encode())
-        digest.update(np.ascontiguousarray(values).data)
-    return digest.hexdigest()
 
 
 def checksum(arrays: Mapping[str, NDArray[Any]]) -> str:

@@ -152,7 +152,6 @@ def run(
                 missing = {number: block for number, block in cut.items() if number not in work.finished}
                 _write_blocks(work, target, cut, solved(spec, missing, progress), tally)
             with writing(path):
-                sync(data)
                 work.close()
                 appear(data, path, overwrite)
         except MemoryError:

@@ -80,6 +80,13 @@ def held_motion(amplitude: float, held: float, start: float, end: float) -> tupl
 
 
 @in_lanes
+def stopping_step(amplitude: float, held: float, velocity: float, start: float, psi: float) -> float:
+    """What Newton takes off ψ on the way to the stop of a hold that was entered with V = `velocity` at `start`."""
+    left = velocity + held_motion(amplitude, held, start, psi)[0]
+    return left / (amplitude - held - amplitude * versine(psi))
+
+
+@in_lanes
 def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
     """E and dE/dx of a lane (x > 0)."""
     tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]
@@ -108,18 +115,15 @@ def _switch_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> 
 @in_lanes
 def _fall_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
     """To the stop after the peak."""
-    amplitude, held = lanes[AMPLITUDE + j], lanes[HELD + j]
-    over = lanes[V + j] + held_motion(amplitude, held, 0.0, psi)[0]
-    step = over / (amplitude - held - amplitude * versine(psi))
+    step = stopping_step(lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j], 0.0, psi)
     return min(max(psi - step, 0.0), HALF_PI), step, psi
 
 
 @in_lanes
 def _held_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
     """To the stop of a pulse entered in motion, from Üy on, where V falls ever more slowly; no further than t1."""
-    amplitude, held, began, onset = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j], lanes[ONSET + j]
-    velocity = lanes[V + j] + held_motion(amplitude, held, began, psi)[0]
-    step = velocity / (amplitude - held - amplitude * versine(psi))
+    began, onset = lanes[BEGAN + j], lanes[ONSET + j]
+    step = stopping_step(lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[V + j], began, psi)
     onward = min(max(psi - step, began), onset)
     return onward, step, math.inf if onward >= onset else onward - began
 
@@ -379,8 +383,7 @@ def held_stop(lanes: np.ndarray, j: int, velocity: float) -> float:
     amplitude, held, began = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j]
     psi = began
     for _ in range(MOST_ITERATIONS):
-        over = velocity + held_motion(amplitude, held, began, psi)[0]
-        step = over / (amplitude - held - amplitude * versine(psi))
+        step = stopping_step(amplitude, held, velocity, began, psi)
         psi -= step
         if abs(step) <= EVENT_TOLERANCE * (psi - began):
             return psi
@@ -432,8 +435,7 @@ def fall_stop(amplitude: float, held: float, at_peak: float, highest: float, top
     psi = top + math.sqrt(2.0 * highest / (amplitude * (top - angle_minus_sine(top))))  # beyond it
     for _ in range(MOST_ITERATIONS):
         psi = min(psi, HALF_PI)
-        over = at_peak + held_motion(amplitude, held, 0.0, psi)[0]
-        step = over / (amplitude - held - amplitude * versine(psi))
+        step = stopping_step(amplitude, held, at_peak, 0.0, psi)
         psi -= step
         if abs(step) <= EVENT_TOLERANCE * psi:
             return psi
