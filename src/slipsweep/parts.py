@@ -77,11 +77,10 @@ def numerics() -> str:
 def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
     """What two runs must have in common for one to go on with the blocks of the other."""
     record = spec.record
+    samples = {} if record is None else {"times": record.times, "acceleration": record.acceleration}
     return {
         "sweep file": spec.text,
-        **(
-            {} if record is None else {"record": checksum({"times": record.times, "acceleration": record.acceleration})}
-        ),
+        **({"record": checksum(samples)} if samples else {}),
         "solver": spec.solver.method,
         "--split": split,
         "checksums": "XXH3-128",
