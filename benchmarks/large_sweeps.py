@@ -24,7 +24,9 @@ import numpy as np
 import slipsweep
 from benchmarks.grids import design_grid, regime_cells
 from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
-from slipsweep import blocks, spec, store
+from slipsweep.files import spec
+from slipsweep.grid import blocks
+from slipsweep.runs import store
 
 #: Results that are written by default, with their types.
 RESULTS = {"permanent_displacement": "f8", "peak_relative_velocity": "f8", "sliding_mode": "i1", "validity": "i2"}
@@ -54,7 +56,7 @@ print(time.perf_counter() - start)
 #: Writes as many bytes, 8 MiB at a time, past the system's cache where that can be: what the disk takes by itself.
 DISK = """
 import mmap, os, sys, time
-from slipsweep.placed import open_directly
+from slipsweep.runs.placed import open_directly
 path, nbytes = sys.argv[1], int(sys.argv[2])
 piece = mmap.mmap(-1, 2**23)
 piece.write(os.urandom(2**23))

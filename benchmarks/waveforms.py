@@ -11,7 +11,7 @@ import numpy as np
 
 import slipsweep
 from benchmarks.machine import arguments, measured_on, number, table
-from slipsweep.variables import DEFAULT_RESULTS
+from slipsweep.model.variables import DEFAULT_RESULTS
 
 
 def _harmonics(amplitudes: list[float], multiples: list[int], phases: list[float] | None = None) -> dict[str, Any]:

@@ -21,8 +21,10 @@ from typing import Any, TypeAlias
 import netCDF4
 import numpy as np
 
-from slipsweep import blocks, spec, store
 from slipsweep.errors import InputError
+from slipsweep.files import spec
+from slipsweep.grid import blocks
+from slipsweep.runs import store
 
 SWEEP = """
 [axes.theta]
@@ -59,7 +61,7 @@ Fault: TypeAlias = Callable[[Path, random.Random, Values], int]
 
 _COMMAND = """
 import sys
-from slipsweep import blocks
+from slipsweep.grid import blocks
 blocks.BLOCK_CELLS = int(sys.argv[1])
 blocks.cells_shared = lambda *arguments: int(sys.argv[1])
 from slipsweep.cli import main
@@ -315,7 +317,7 @@ def limited_file_size(folder: Path, rng: random.Random, expected: Values) -> int
 _REVOKING = """
 import contextlib, io, json, os, sys, tempfile
 from pathlib import Path
-from slipsweep import blocks
+from slipsweep.grid import blocks
 from slipsweep.cli import main
 text = Path("a.toml").read_text()
 with tempfile.TemporaryDirectory() as folder:
@@ -472,7 +474,7 @@ def can_be_done(name: str) -> str:
     if fault is revoked_rights and os.getuid() == 0:
         if sys.platform != "linux":
             return "root gives its rights away as on Linux"
-        installed = (Path(sys.prefix), Path(store.__file__).parent)
+        installed = (Path(sys.prefix), Path(store.__file__).parents[1])
         if any(folder.stat().st_mode & 0o5 != 0o5 for path in installed for folder in (path, *path.parents)):
             return "root gives its rights away, and others may not read this installation"
     return ""

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 import slipsweep
-from slipsweep.variables import VALUELESS, Validity
+from slipsweep.model.variables import VALUELESS, Validity
 
 CASES = [case for case in read_cases() if not case.uplift]
 

@@ -14,11 +14,13 @@ from matplotlib.patches import PathPatch
 from processes import slipsweep as command
 
 import slipsweep
-from slipsweep import charts, spec, store
+from slipsweep.charts import charts
+from slipsweep.charts.slices import Result, boundaries, newmark
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.slices import Result, boundaries, newmark
-from slipsweep.variables import Validity
+from slipsweep.files import spec
+from slipsweep.model.variables import Validity
+from slipsweep.runs import store
 
 SWEEP = """
 [axes.theta]
@@ -294,7 +296,7 @@ def test_nearest_values_are_taken(result: Result, asked: tuple[float, float], th
 
 
 def test_long_axes_are_thinned(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("slipsweep.slices.MOST_POINTS", 10)
+    monkeypatch.setattr("slipsweep.charts.slices.MOST_POINTS", 10)
     assert result.thinned("frequency") == slice(0, 25, 3)
     assert result.spread("frequency", 4) == [0, 8, 16, 24]
 

@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 
 import slipsweep
-from slipsweep import cluster, spec, store
 from slipsweep.cli import main
 from slipsweep.errors import InputError, RunError
-from slipsweep.parts import installation
+from slipsweep.files import spec
+from slipsweep.runs import cluster, store
+from slipsweep.runs.parts import installation
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")

@@ -16,14 +16,14 @@ import numba.core.registry
 import numpy as np
 import pytest
 
-from slipsweep import compiled
+from slipsweep.jit import cache as compiled
 
 #: A small kernel, so that compiling it takes a second; says what it gives and whether it was compiled here.
 PROGRAM = """
 import sys, warnings
 warnings.simplefilter("error")
 import numba.core.event as events
-from slipsweep.compiled import Kernel
+from slipsweep.jit.cache import Kernel
 import numpy as np
 
 def twice(values):
@@ -199,7 +199,7 @@ def test_kernels_of_the_latest_versions_are_kept(cache: Path) -> None:
 def test_the_folder_is_named_for_the_sources(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = compiled.cache_folder()
     compiled.cache_folder.cache_clear()
-    monkeypatch.setattr(compiled, "_SOURCES", ("equations.py",))
+    monkeypatch.setattr(compiled, "_SOURCES", ("model/equations.py",))
     assert compiled.cache_folder() != first
 
 
@@ -246,7 +246,7 @@ def test_first_use_by_several_threads(cache: Path) -> None:
 
 
 def test_without_jit(tmp_path: Path) -> None:
-    program = "from slipsweep.compiled import Kernel; print(Kernel(lambda x: x + 'b')('a'))"
+    program = "from slipsweep.jit.cache import Kernel; print(Kernel(lambda x: x + 'b')('a'))"
     assert finish(start(program, tmp_path, NUMBA_DISABLE_JIT="1")) == "ab\n"
     assert not list(tmp_path.iterdir())
 

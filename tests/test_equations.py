@@ -9,8 +9,8 @@ from typing import Any
 import numba
 import pytest
 
-from slipsweep import equations as eq
 from slipsweep.kernels.block import opposite
+from slipsweep.model import equations as eq
 
 MU_S, TAN_THETA, G = 0.38, math.tan(math.radians(5.0)), 9.81
 

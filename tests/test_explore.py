@@ -20,7 +20,7 @@ from processes import slipsweep
 
 from slipsweep import InputError, SlidingMode, Validity, simulate, sweep
 from slipsweep.cli.explore import parse_size
-from slipsweep.explore import evenly, thinned_lengths, write_page
+from slipsweep.explore.page import evenly, thinned_lengths, write_page
 
 pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
 

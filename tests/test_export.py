@@ -10,9 +10,10 @@ import xarray as xr
 from processes import slipsweep as command
 
 import slipsweep
-from slipsweep import export, spec, store
 from slipsweep.errors import InputError
-from slipsweep.variables import VALIDITY_TEXT, Validity
+from slipsweep.files import export, spec
+from slipsweep.model.variables import VALIDITY_TEXT, Validity
+from slipsweep.runs import store
 
 GRID = """
 [axes.theta]

@@ -17,8 +17,10 @@ import pytest
 import xarray as xr
 from fault_rounds import SWEEP, run, stopped, values
 
-from slipsweep import blocks, outputs, parts, spec, store
 from slipsweep.errors import InputError, RunError
+from slipsweep.files import outputs, spec
+from slipsweep.grid import blocks
+from slipsweep.runs import parts, store
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from slipsweep.netcdf import coordinate_names
+from slipsweep.files.netcdf import coordinate_names
 
 #: Missing values, every sliding mode and four flags.
 GRID = """

@@ -11,10 +11,10 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from test_spec import CASES, GOOD
 
-from slipsweep import spec
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.variables import PARAMETERS, RESULTS
+from slipsweep.files import spec
+from slipsweep.model.variables import PARAMETERS, RESULTS
 
 SWEEPS = Path(__file__).parents[1] / "sweeps"
 OPTIONS = """

@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 import slipsweep
 from slipsweep.errors import InputError
-from slipsweep.spec import quantity
-from slipsweep.variables import LimitStatus, SlidingMode, Validity
+from slipsweep.files.spec import quantity
+from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -154,7 +154,7 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
         "mu_s": [0.3, 0.5, 0.4],
         "frequency": [1.0, 2.0, 0.7],
     }
-    monkeypatch.setattr("slipsweep.limits._SCANNED", 1024)
+    monkeypatch.setattr("slipsweep.studies.limits._SCANNED", 1024)
     zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
     together = slipsweep.limit_amplitude(**zipped)
     assert together.limit_amplitude.dims == ("case",)

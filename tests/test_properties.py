@@ -16,7 +16,7 @@ from mpmath import mp, mpf, workdps
 
 import slipsweep
 from slipsweep.errors import InputError
-from slipsweep.variables import DEFAULT_RESULTS, VALUELESS, Validity
+from slipsweep.model.variables import DEFAULT_RESULTS, VALUELESS, Validity
 
 SOLVERS = pytest.mark.parametrize("solver", ["cycle", "step"])
 

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import pytest
 
 import slipsweep
-from slipsweep import spec
-from slipsweep.variables import VALIDITY_TEXT, VALUELESS, Validity
+from slipsweep.files import spec
+from slipsweep.model.variables import VALIDITY_TEXT, VALUELESS, Validity
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (
@@ -254,7 +254,7 @@ def test_keys_are_those_of_the_schema(heading: str, table: Any) -> None:
 
 
 def test_the_table_of_contents_of_a_file_names_every_dimension() -> None:
-    from slipsweep.variables import DIMENSION_ORDER
+    from slipsweep.model.variables import DIMENSION_ORDER
 
     text = section("docs/files.md", "## What is in a file")
     places = [text.index(f"`{name}`") for name in (*DIMENSION_ORDER, "case")]

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from slipsweep import InputError, Record, read_record, records
+from slipsweep import InputError, Record, read_record
+from slipsweep.motion import records
 
 
 def write(folder: Path, name: str, text: str) -> Path:

@@ -14,9 +14,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Record, RunError, blocks, export, parts, read_record, spec, store, sweep_record
-from slipsweep.tables import Table
-from slipsweep.variables import RECORD_RESULTS
+from slipsweep import InputError, Record, RunError, read_record, sweep_record
+from slipsweep.files import export, spec
+from slipsweep.grid import blocks
+from slipsweep.grid.tables import Table
+from slipsweep.model.variables import RECORD_RESULTS
+from slipsweep.runs import parts, store
 
 SWEEPS = Path(__file__).parents[1] / "sweeps"
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from slipsweep import parameters, spec, variables
 from slipsweep.errors import InputError
+from slipsweep.files import spec
+from slipsweep.model import parameters, variables
 
 GOOD = """
 [axes.theta]

@@ -18,9 +18,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slipsweep
-from slipsweep import blocks, netcdf, placed, plans, spec, store, variables
 from slipsweep.errors import InputError, RunError
-from slipsweep.tables import Table, Variable
+from slipsweep.files import netcdf, spec
+from slipsweep.grid import blocks, plans
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model import variables
+from slipsweep.runs import placed, store
 
 GRID = """
 # θ in degrees

@@ -11,10 +11,10 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep import engine, plans
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.variables import (
+from slipsweep.grid import engine, plans
+from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
     PARAMETERS,

@@ -1,4 +1,4 @@
-"""Threads and processes: the policy of `slipsweep.threads`, under everything that may call a sweep."""
+"""Threads and processes: the policy of `slipsweep.grid.threads`, under everything that may call a sweep."""
 
 import multiprocessing
 import os
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import slipsweep
-from slipsweep import threads
+from slipsweep.grid import threads
 
 GRID: dict[str, Any] = {
     "theta": np.linspace(0.0, 15.0, 60),
@@ -38,7 +38,7 @@ def count_in_process(**environment: str) -> int:
     clean = {name: value for name, value in os.environ.items() if name not in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
     code = environment.pop("code", "")
     done = subprocess.run(
-        [sys.executable, "-c", f"{code}\nfrom slipsweep.threads import thread_count; print(thread_count())"],
+        [sys.executable, "-c", f"{code}\nfrom slipsweep.grid.threads import thread_count; print(thread_count())"],
         env={**clean, **environment},
         capture_output=True,
         text=True,
@@ -74,7 +74,7 @@ def test_lists_as_openmp_takes_them(value: str, count: int) -> None:
 def test_affinity_limits_threads() -> None:
     assert count_in_process(code="import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})") == 1
     # even where it changes later
-    late = "import os, slipsweep.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
+    late = "import os, slipsweep.grid.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
     assert count_in_process(code=late) == 1
 
 

@@ -13,11 +13,12 @@ from processes import slipsweep as command
 from scipy import stats
 
 import slipsweep
-from slipsweep import netcdf, spec, uncertainty_figures
+from slipsweep.charts import uncertainty_figures
+from slipsweep.charts.slices import Result
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.slices import Result
-from slipsweep.uncertainty import DRAWN, check_sampling, plan_samples
+from slipsweep.files import netcdf, spec
+from slipsweep.studies.uncertainty import DRAWN, check_sampling, plan_samples
 
 G = 9.81
 LOGNORMAL: dict[str, Any] = {"distribution": "lognorm", "s": 0.3}
@@ -281,7 +282,7 @@ def test_samples_without_a_value_are_counted_and_left_out() -> None:
 def test_blocks_of_grid_points_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     uncertain = {"amplitude": FACTOR, "decay_rate": {**FACTOR, "s": 0.1}}
     whole = slipsweep.sample(**GRID, uncertain=uncertain, samples=128)
-    monkeypatch.setattr("slipsweep.uncertainty._CELLS", 300)
+    monkeypatch.setattr("slipsweep.studies.uncertainty._CELLS", 300)
     parts = slipsweep.sample(**GRID, uncertain=uncertain, samples=128)
     xr.testing.assert_identical(whole, parts)
 
@@ -404,7 +405,7 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
 
 
 def test_what_memory_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("slipsweep.uncertainty.available_memory", lambda: 10**6)
+    monkeypatch.setattr("slipsweep.studies.uncertainty.available_memory", lambda: 10**6)
     with pytest.raises(
         InputError, match=r"3 amplitude x 2 frequency, 65536 samples: takes .* but 1 MB of memory is free"
     ):

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, RunError
-from slipsweep.variables import SlidingMode, Validity
+from slipsweep.model.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep, sweep_record
-    from slipsweep.decoding import flags
-    from slipsweep.records import Record, read_record
+    from slipsweep.motion.records import Record, read_record
+    from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep, sweep_record
+    from slipsweep.studies.decoding import flags
 
 __all__ = [
     "InputError",
@@ -39,15 +39,15 @@ __all__ = [
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
 #: No submodule may have one of these names: importing it would put the module in the function's place.
 _LAZY = {
-    "Record": "slipsweep.records",
-    "flags": "slipsweep.decoding",
-    "friction_parameters": "slipsweep.datasets",
-    "limit_amplitude": "slipsweep.datasets",
-    "read_record": "slipsweep.records",
-    "sample": "slipsweep.datasets",
-    "simulate": "slipsweep.datasets",
-    "sweep": "slipsweep.datasets",
-    "sweep_record": "slipsweep.datasets",
+    "Record": "slipsweep.motion.records",
+    "flags": "slipsweep.studies.decoding",
+    "friction_parameters": "slipsweep.studies.datasets",
+    "limit_amplitude": "slipsweep.studies.datasets",
+    "read_record": "slipsweep.motion.records",
+    "sample": "slipsweep.studies.datasets",
+    "simulate": "slipsweep.studies.datasets",
+    "sweep": "slipsweep.studies.datasets",
+    "sweep_record": "slipsweep.studies.datasets",
 }
 
 

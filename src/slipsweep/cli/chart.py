@@ -14,7 +14,7 @@ from slipsweep.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from slipsweep.slices import Result
+    from slipsweep.charts.slices import Result
 
 EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
 
@@ -84,8 +84,8 @@ def chart(
         raise InputError(f"-o {given[0]}: is for one chart: give one --kind, one of {', '.join(_CHARTS)}")
     wish = _Wish(x, y, _cuts(at or ()), variable)
 
-    from slipsweep import outputs
-    from slipsweep.slices import Result
+    from slipsweep.charts.slices import Result
+    from slipsweep.files import outputs
 
     with Result(file) as result:
         figures: dict[str, Figure] = {}
@@ -179,7 +179,7 @@ def _continuous(result: "Result", name: str) -> str:
 
 
 def _contours(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import charts, slices
+    from slipsweep.charts import charts, slices
 
     name = _continuous(result, wish.variable)
     x, y = _axes(result, wish, name, ("frequency", "theta", "mu_s"), _DRIVES)
@@ -188,7 +188,7 @@ def _contours(result: "Result", wish: _Wish) -> "Figure":
 
 
 def _modes(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import charts, slices
+    from slipsweep.charts import charts, slices
 
     x, y = _axes(result, wish, "sliding_mode", ("theta", "mu_s", "frequency"), _DRIVES)
     table = result.select(_shown(result, "sliding_mode"), {x: result.thinned(x), y: result.thinned(y)}, wish.at)
@@ -196,7 +196,7 @@ def _modes(result: "Result", wish: _Wish) -> "Figure":
 
 
 def _families(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import charts, slices
+    from slipsweep.charts import charts, slices
 
     name = _continuous(result, wish.variable)
     x, family = _axes(result, wish, name, _DRIVES, ("frequency", "mu_s", "theta"))
@@ -205,7 +205,7 @@ def _families(result: "Result", wish: _Wish) -> "Figure":
 
 
 def _dimensionless(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import charts, slices
+    from slipsweep.charts import charts, slices
 
     name = result.result("permanent_displacement")
     if wish.x not in (None, *_DRIVES):
@@ -225,7 +225,7 @@ def _dimensionless(result: "Result", wish: _Wish) -> "Figure":
 
 
 def _newmark(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import charts, slices
+    from slipsweep.charts import charts, slices
 
     name = result.result("permanent_displacement")
     if result.attrs["model"] == "newmark":
@@ -253,7 +253,7 @@ def _curves(result: "Result", wish: _Wish, variable: str, family: str | None) ->
 
 
 def _fragility(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import uncertainty_figures
+    from slipsweep.charts import uncertainty_figures
 
     x, family = _curves(result, wish, "exceedance_probability", "threshold")
     keep: dict[str, slice | list[int]] = {x: result.thinned(x)}
@@ -264,7 +264,7 @@ def _fragility(result: "Result", wish: _Wish) -> "Figure":
 
 
 def _quantiles(result: "Result", wish: _Wish) -> "Figure":
-    from slipsweep import uncertainty_figures
+    from slipsweep.charts import uncertainty_figures
 
     if wish.y is not None:
         raise InputError(f"{result.path}: --y {wish.y}: not with quantiles, whose bands lie over one axis, --x")

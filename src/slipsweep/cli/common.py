@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.variables import VALIDITY_TEXT
+from slipsweep.model.variables import VALIDITY_TEXT
 
 if TYPE_CHECKING:
-    from slipsweep.netcdf import Tally
+    from slipsweep.files.netcdf import Tally
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]

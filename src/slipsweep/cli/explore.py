@@ -27,8 +27,8 @@ def explore(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary.")] = False,
 ) -> None:
     """Write one page, for any browser, to explore a result in: no server, no network."""
-    from slipsweep import explore as pages
-    from slipsweep.resources import size_text
+    from slipsweep.explore import page as pages
+    from slipsweep.grid.resources import size_text
 
     path = output or file.with_suffix(".html")
     nbytes = parse_size(size)

@@ -28,8 +28,8 @@ def export(
     quiet: Quiet = False,
 ) -> None:
     """Write a result as a long table: a row a cell, coordinates as columns, units in the header."""
-    from slipsweep import export as tables
-    from slipsweep.resources import size_text
+    from slipsweep.files import export as tables
+    from slipsweep.grid.resources import size_text
 
     with progress_bar(tables.count_rows(file, variables or None), quiet, "rows") as progress:
         rows = tables.export(

@@ -12,8 +12,8 @@ EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc"
 
 def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:
     """Tell what is in a result, how it was made, and the shares of its modes and flags."""
-    from slipsweep import netcdf
-    from slipsweep.resources import size_text
+    from slipsweep.files import netcdf
+    from slipsweep.grid.resources import size_text
 
     contents = netcdf.read_contents(file)
     typer.echo(f"{contents.path}  {size_text(contents.nbytes)}")

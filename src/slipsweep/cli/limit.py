@@ -8,11 +8,11 @@ import typer
 
 from slipsweep.cli.common import Overwrite, progress_bar, typed_command
 from slipsweep.errors import InputError
-from slipsweep.variables import LIMIT_STATUS_TEXT, LimitStatus
+from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
 if TYPE_CHECKING:
-    from slipsweep.spec import SweepSpec
-    from slipsweep.tables import Table
+    from slipsweep.files.spec import SweepSpec
+    from slipsweep.grid.tables import Table
 
 EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
 
@@ -51,7 +51,7 @@ def limit(
         if path.suffix not in writers:
             raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
 
-    from slipsweep import outputs, spec
+    from slipsweep.files import outputs, spec
 
     checked = spec.load(sweep)
     if checked.record is not None:
@@ -65,7 +65,7 @@ def limit(
         outputs.check_output(path, overwrite)
     given = _arguments(checked, displacement, maximum_amplitude)
 
-    from slipsweep.limits import limit_table
+    from slipsweep.studies.limits import limit_table
 
     cells = checked.cells // checked.shape.get("amplitude", checked.shape.get("displacement_amplitude", 1))
     with progress_bar(cells * len(displacement), quiet) as progress:
@@ -80,7 +80,7 @@ def limit(
 
 def _arguments(sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None) -> dict[str, Any]:
     """Arguments of `limit_table`: those of the sweep but for the amplitude and the time stepping."""
-    from slipsweep.spec import quantity
+    from slipsweep.files.spec import quantity
 
     if sweep.sampling is not None:
         raise InputError(f"{sweep.source}: has uncertain inputs; limits are those of a sweep without [uncertainty]")
@@ -114,13 +114,14 @@ def _summarize(table: "Table") -> None:
 
 
 def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import netcdf
+    from slipsweep.files import netcdf
 
     netcdf.write_table(table, path, title=_TITLE, command=typed_command(), overwrite=overwrite)
 
 
 def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import limit_figures, outputs
+    from slipsweep.charts import limit_figures
+    from slipsweep.files import outputs
 
     figure = limit_figures.limit_chart(table)
     with outputs.complete_or_absent(path, overwrite) as temporary:

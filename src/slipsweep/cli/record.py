@@ -70,9 +70,9 @@ def record(
     }
     given: dict[str, Any] = {name: numbers(name, text) for name, text in texts.items() if text is not None}
 
-    from slipsweep import netcdf, outputs
-    from slipsweep.records import read_record
-    from slipsweep.resources import size_text
+    from slipsweep.files import netcdf, outputs
+    from slipsweep.grid.resources import size_text
+    from slipsweep.motion.records import read_record
 
     motion = read_record(file, units=units, baseline=baseline, file_format=file_format, channel=channel)
     if output is not None:
@@ -80,7 +80,7 @@ def record(
 
     import numpy as np
 
-    from slipsweep.record_sweeps import plan_record
+    from slipsweep.studies.record_sweeps import plan_record
 
     plan = plan_record(
         motion,

@@ -10,7 +10,7 @@ from slipsweep.cli.common import Overwrite, Quiet, echo_tally, examples, progres
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
-    from slipsweep.spec import SweepSpec
+    from slipsweep.files.spec import SweepSpec
 
 EXAMPLE = examples(
     "slipsweep run sweeps/design_chart.toml",
@@ -58,8 +58,10 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
-    from slipsweep import blocks, spec, store
-    from slipsweep.resources import parse_size, size_text
+    from slipsweep.files import spec
+    from slipsweep.grid import blocks
+    from slipsweep.grid.resources import parse_size, size_text
+    from slipsweep.runs import store
 
     if resume and overwrite:
         raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
@@ -91,7 +93,7 @@ def run(
         solved: blocks.Solved = blocks.solve_here
         shared = None
         if workers is not None or scheduler is not None:
-            from slipsweep.cluster import cluster
+            from slipsweep.runs.cluster import cluster
 
             solved = stack.enter_context(cluster(workers=workers, scheduler=scheduler))
             shared = blocks.cells_shared(checked, workers)
@@ -121,9 +123,9 @@ def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -
     """Sample the uncertain inputs of a sweep, and write the statistics."""
     import time
 
-    from slipsweep import netcdf, outputs
-    from slipsweep.resources import size_text
-    from slipsweep.uncertainty import plan_samples, tally
+    from slipsweep.files import netcdf, outputs
+    from slipsweep.grid.resources import size_text
+    from slipsweep.studies.uncertainty import plan_samples, tally
 
     assert sweep.sampling is not None
     outputs.check_output(path, overwrite)

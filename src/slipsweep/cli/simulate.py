@@ -9,10 +9,10 @@ import typer
 
 from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
 from slipsweep.errors import InputError
-from slipsweep.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
+from slipsweep.model.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
 
 if TYPE_CHECKING:
-    from slipsweep.tables import Table
+    from slipsweep.grid.tables import Table
 
 EXAMPLE = examples(
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8",
@@ -72,8 +72,8 @@ def simulate(
         if path.suffix not in writers:
             raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
 
-    from slipsweep import outputs
-    from slipsweep.history import history_table
+    from slipsweep.files import outputs
+    from slipsweep.studies.history import history_table
 
     for path in paths:
         outputs.check_output(path, overwrite)
@@ -113,7 +113,7 @@ def simulate(
 
 
 def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import netcdf
+    from slipsweep.files import netcdf
 
     netcdf.write_table(
         netcdf.without_time_axis(table),
@@ -125,7 +125,7 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
 
 
 def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import outputs
+    from slipsweep.files import outputs
 
     columns = {name: table[name] for name in ("time", *HISTORY)}
     with outputs.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
@@ -135,7 +135,8 @@ def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
 
 
 def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
-    from slipsweep import figures, outputs
+    from slipsweep.charts import figures
+    from slipsweep.files import outputs
 
     figure = figures.history(table)
     with outputs.complete_or_absent(path, overwrite) as temporary:

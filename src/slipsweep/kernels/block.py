@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep import equations as eq
-from slipsweep.elementary import rising_phase
-from slipsweep.kernels.jit import in_lanes, scalar
-from slipsweep.variables import VALUELESS, Validity
+from slipsweep.jit.decorators import in_lanes, scalar
+from slipsweep.jit.elementary import rising_phase
+from slipsweep.model import equations as eq
+from slipsweep.model.variables import VALUELESS, Validity
 
 #: Relative accuracy of an event's phase ; an error there enters the result squared.
 EVENT_TOLERANCE = 1e-9

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from slipsweep.elementary import angle_minus_sine, rising_phase, sine_after, versine
+from slipsweep.jit.decorators import in_lanes, scalar, summed
+from slipsweep.jit.elementary import angle_minus_sine, rising_phase, sine_after, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -30,7 +31,6 @@ from slipsweep.kernels.block import (
     slip_root,
 )
 from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break
-from slipsweep.kernels.jit import in_lanes, scalar, summed
 from slipsweep.kernels.lanes import (
     CARRIED,
     CODE,

@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from slipsweep.elementary import versine
-from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
+from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.elementary import versine
 from slipsweep.kernels.block import (
     EVENT_TOLERANCE,
     INTEGRATE,
@@ -62,9 +62,9 @@ from slipsweep.kernels.excitation import (
     phase_at,
     plane,
 )
-from slipsweep.kernels.jit import scalar, summed
 from slipsweep.kernels.linear import exponential_moments
 from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of
+from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
 #: 16 Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
 NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))

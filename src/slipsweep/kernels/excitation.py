@@ -4,7 +4,7 @@ On piece p the wave is w = top + c₁τ + c₂τ² + …, where τ is the phase 
 anchor: that end of it at which |w| is larger.  Differences from a peak thus come out of the sum,
 not out of a subtraction of two numbers near 1, and keep their digits however small they are
 (near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
-smooth waves are cut so short that the series are exact to rounding (`slipsweep.waveforms`, which
+smooth waves are cut so short that the series are exact to rounding (`slipsweep.motion.waveforms`, which
 fills the table): one form for all waveforms.  Only the series of a plain sine has a name, and is
 evaluated by its shorter closed forms.  Times the amplitude A it is the plane's acceleration x.
 """
@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
-from slipsweep.kernels.jit import scalar
-from slipsweep.waveforms import TERMS
+from slipsweep.jit.decorators import scalar
+from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
+from slipsweep.motion.waveforms import TERMS
 
 #: Relative size of the last Newton step of `offset_at`: its square is below rounding.
 _TOLERANCE = 1e-8

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.compiled import Kernel
+from slipsweep.jit.cache import Kernel
+from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle, sine, step
 from slipsweep.kernels.block import TILE, Options, block_of, cell_of
 from slipsweep.kernels.excitation import Wave
-from slipsweep.kernels.jit import scalar
 from slipsweep.kernels.lanes import LANES_SIZE
 
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import LANE_ROWS, STRIP, TILE
-from slipsweep.kernels.jit import scalar
 
 HALF_PI = 0.5 * math.pi
 

@@ -8,7 +8,7 @@ together).  No step is taken, no error but rounding.
 
 import math
 
-from slipsweep.kernels.jit import scalar
+from slipsweep.jit.decorators import scalar
 
 #: From here on the moments' closed forms lose less than a digit; below, their power series is summed.
 _SERIES_END = 2.0

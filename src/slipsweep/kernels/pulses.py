@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from slipsweep import equations as eq
-from slipsweep.elementary import angle_minus_sine, half_square_minus_versine, rising_phase, versine
+from slipsweep.jit.decorators import in_lanes, scalar, summed
+from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -26,7 +26,6 @@ from slipsweep.kernels.block import (
     lane_response,
     lane_slip,
 )
-from slipsweep.kernels.jit import in_lanes, scalar, summed
 from slipsweep.kernels.lanes import (
     AT_PEAK,
     CARRIED,
@@ -61,6 +60,7 @@ from slipsweep.kernels.lanes import (
     X,
     settling,
 )
+from slipsweep.model import equations as eq
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
 _MOST_PULSES = 64

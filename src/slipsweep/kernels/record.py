@@ -15,9 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep import equations as eq
-from slipsweep.compiled import Kernel
-from slipsweep.equations import CONTINUOUS
+from slipsweep.jit.cache import Kernel
+from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
     EVENT_TOLERANCE,
@@ -46,8 +45,9 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.cycle import next_break, onset, rising_leg, straight_lag
 from slipsweep.kernels.grid import Grid, empty_runs, gather, place_of
-from slipsweep.kernels.jit import scalar
 from slipsweep.kernels.linear import held_integrals, held_stop
+from slipsweep.model import equations as eq
+from slipsweep.model.equations import CONTINUOUS
 
 #: More legs than a piece has: breaks of Eq. 4, and a stop and an onset between each.
 _MOST_LEGS = 64

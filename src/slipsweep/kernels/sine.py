@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep import equations as eq
-from slipsweep.elementary import rising_phase
-from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
+from slipsweep.jit.decorators import in_lanes, scalar
+from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -40,7 +39,6 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.continuous import SHORT_SINE, continuous, lane_continuous
 from slipsweep.kernels.cycle import answer
-from slipsweep.kernels.jit import in_lanes, scalar
 from slipsweep.kernels.lanes import (
     CODE,
     CONVERGED,
@@ -56,6 +54,8 @@ from slipsweep.kernels.lanes import (
     W,
 )
 from slipsweep.kernels.pulses import lane_attenuation, lane_carried, lane_fall, lane_onset, lane_recoupling, lane_rise
+from slipsweep.model import equations as eq
+from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
 #: Rows of a tile's blocks beside the lanes': the codes, the way a cell goes, μmin, and E at Üg = Üy and at the peak.
 _MODE, _VALIDITY, _WAY, _LEAST_FRICTION, _AT_START, _AT_END = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)

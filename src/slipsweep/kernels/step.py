@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import literally
 
-from slipsweep.equations import CONTINUOUS, STICK_SLIP, STUCK
+from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
     AMPLITUDE,
     EQ4_BELOW_YIELD,
@@ -76,8 +76,8 @@ from slipsweep.kernels.excitation import (
     plane,
 )
 from slipsweep.kernels.excitation import slope as w_slope
-from slipsweep.kernels.jit import in_lanes, scalar
 from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
+from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 

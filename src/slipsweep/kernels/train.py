@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
     NO_VALUE,
@@ -20,7 +21,6 @@ from slipsweep.kernels.block import (
     stays_below_yield,
 )
 from slipsweep.kernels.excitation import BEGIN, END, FIRST, LAST, Wave, offset_at
-from slipsweep.kernels.jit import scalar
 
 
 class Pulse(NamedTuple):

@@ -1,0 +1,306 @@
+"""Slices of a result file: the cells that a chart shows, and no others, read as a table.
+
+`Result` opens a file, finds the nearest values on its axes and reads hyperslabs;
+`boundaries` and `newmark` compute for a slice the accelerations of yield and of the mode limit,
+and what Newmark's block does on the same cells.
+"""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
+
+Floats = NDArray[np.float64]
+
+#: What a file may hold along its axes, and on them.
+_COORDINATES = PARAMETERS | STATISTIC_COORDINATES
+_RESULTS = RESULTS | STATISTICS
+
+#: Points of an axis that a figure shows: more than one for every two dots on paper is lost.
+MOST_POINTS = 600
+
+
+class Result:
+    """A file that `slipsweep run` wrote, open for reading slices; a context manager.
+
+    Parameters
+    ----------
+    path : Path
+
+    Attributes
+    ----------
+    attrs : dict
+        Global attributes.
+    axes : dict of str to ndarray
+        Dimensions and their values; those of ``case`` are 1, 2, ...
+    labels : list of str
+        Names of the cases; empty without them.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is not netCDF, or was not written by `slipsweep run`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+        try:
+            self._file = netCDF4.Dataset(path)
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
+        try:
+            self.attrs: dict[str, Any] = {name: self._file.getncattr(name) for name in self._file.ncattrs()}
+            if not str(self.attrs.get("source", "")).startswith("slipsweep ") or "sweep" not in self.attrs:
+                raise InputError(f'{path}: not a result of "slipsweep run"')
+            if "record" in self.attrs:
+                raise InputError(
+                    f"{path}: is the response to a recorded motion; charts are drawn of harmonic sweeps only "
+                    "(slipsweep export makes a table of it)"
+                )
+            self._file.set_auto_mask(False)
+            dims = [dim for dim in self._file.dimensions if dim != "label_length"]
+            self.axes: dict[str, Floats] = {
+                dim: self.read(dim, ()) if dim in self._file.variables else np.arange(1.0, 1 + self._length(dim))
+                for dim in dims
+            }
+            self.labels: list[str] = list(self._file["label"][:]) if "label" in self._file.variables else []
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> "Result":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def _length(self, dim: str) -> int:
+        return len(self._file.dimensions[dim])
+
+    @property
+    def variables(self) -> list[str]:
+        """Names of the results in the file."""
+        return [name for name in self._file.variables if name in _RESULTS and name not in self.coordinates]
+
+    @property
+    def coordinates(self) -> list[str]:
+        """Names of the parameters in the file: axes, scalars, and those that lie along other dimensions."""
+        named = " ".join(v.coordinates for v in self._file.variables.values() if "coordinates" in v.ncattrs()).split()
+        return [name for name in _COORDINATES if name in self._file.variables and (name in named or name in self.axes)]
+
+    def dims(self, name: str) -> tuple[str, ...]:
+        """Dimensions of a variable."""
+        return tuple(self._file[name].dimensions)
+
+    def read(self, name: str, where: tuple[Any, ...]) -> NDArray[Any]:
+        """Read one hyperslab: the only way that values come out of the file."""
+        return np.asarray(self._file[name][where or ...])
+
+    # ------------------------------------------------------------------------ what is meant
+
+    def axis(self, name: str) -> str:
+        """`name` if it is an axis with more than one value.
+
+        Raises
+        ------
+        InputError
+            Naming the axes there are.
+        """
+        wide = [dim for dim, values in self.axes.items() if values.size > 1 and dim != "case"]
+        if name in wide:
+            return name
+        if name in self.axes or name in self.coordinates:
+            raise InputError(f"{self.path}: {name}: has no more than one value along an axis of its own; {_list(wide)}")
+        raise InputError(f"{self.path}: {name}: no such axis; {_suggest(name, wide)}")
+
+    def result(self, name: str) -> str:
+        """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
+        if name not in self.variables:
+            raise InputError(f"{self.path}: {name}: no such variable; {_suggest(name, self.variables)}")
+        return name
+
+    def nearest(self, at: Mapping[str, float | str]) -> dict[str, int]:
+        """Where on the axes the values nearest to those asked for are.
+
+        Parameters
+        ----------
+        at : mapping of axis name to value
+            In the axis's own unit, or a text with another ("0.3g"); for ``case`` its number or label.
+            A parameter that is one number for the whole file may be named too, with that number.
+
+        Returns
+        -------
+        dict of str to int
+            Indices into `axes`.
+
+        Raises
+        ------
+        InputError
+            An axis that is not there, or a value beyond its range by more than half a step.
+        """
+        found = {}
+        for name, value in at.items():
+            known = [*self.axes, *(c for c in self.coordinates if not self.dims(c))]
+            if name not in known:
+                raise InputError(f"{self.path}: {name} = {value}: no such axis; {_suggest(name, known)}")
+            if name == "case" and isinstance(value, str) and value in self.labels:
+                found[name] = self.labels.index(value)
+                continue
+            number = self._number(name, value)
+            values = self.axes[name] if name in self.axes else np.atleast_1d(self.read(name, ()))
+            steps = np.diff(values)
+            # an axis of one value takes that value, give or take its rounding
+            low, high = (steps[0] / 2, steps[-1] / 2) if steps.size else (1e-6 * abs(values[0]),) * 2
+            slack = 1e-12 * abs(values).max()
+            if not values[0] - low - slack <= number <= values[-1] + high + slack:
+                unit = _COORDINATES[name]["units"] if name in _COORDINATES else "1"
+                there = f"{values[0]:.6g} to {values[-1]:.6g}" if values.size > 1 else f"{values[0]:.6g}"
+                raise InputError(
+                    f"{self.path}: {name} = {number:.6g}: outside the file's range, {there}"
+                    + ("" if unit == "1" else f" {unit}")
+                )
+            if name in self.axes:
+                found[name] = int(np.argmin(np.abs(values - number)))
+        return found
+
+    def _number(self, name: str, value: float | str) -> float:
+        """A value on an axis in the axis's own unit."""
+        try:
+            return float(value)
+        except ValueError:
+            if name == "case":
+                allowed = f"a number or one of {', '.join(self.labels)}"
+                raise InputError(f"{self.path}: {name} = {value}: must be {allowed}") from None
+        from slipsweep.files.spec import quantity  # imports pydantic: only for values with units
+
+        # of the same unit
+        parameter = name if name in PARAMETERS else "displacement_amplitude" if name == "threshold" else "mu_s"
+        return quantity(f"{self.path}: {name}", str(value), parameter, float(self.attrs["g"]))
+
+    # --------------------------------------------------------------------------- reading
+
+    def select(
+        self, names: Iterable[str], keep: Mapping[str, slice | Sequence[int]], at: Mapping[str, float | str]
+    ) -> Table:
+        """Read a slice.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Results.
+        keep : mapping of axis to slice or indices
+            The axes that stay, and what of them to read; they may be missing from a result.
+        at : mapping of axis to value
+            Where to cut the other axes: at the nearest value.  Those not named are cut in the middle.
+
+        Returns
+        -------
+        Table
+            With every parameter as a coordinate: along the axes kept, or of one value.
+
+        Raises
+        ------
+        InputError
+            As `nearest`, or an axis that is both kept and cut.
+        """
+        for name in at:
+            if name in keep:
+                raise InputError(
+                    f"{self.path}: {name} = {at[name]}: is an axis of this chart; it cannot be cut there too"
+                )
+        indices = self.nearest(at)
+        where: dict[str, Any] = {}
+        for dim, values in self.axes.items():
+            where[dim] = keep[dim] if dim in keep else indices.get(dim, 0 if dim == "case" else (values.size - 1) // 2)
+
+        def variable(name: str) -> Variable:
+            dims = self.dims(name)
+            attrs = _COORDINATES[name] if name in self.coordinates else _RESULTS[name]
+            parts = tuple(where[dim] for dim in dims)
+            return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, parts), attrs)
+
+        coords = {name: variable(name) for name in self.coordinates}
+        chosen = {"case": self.labels[where["case"]]} if self.labels and "case" not in keep else {}
+        attrs = {**self.attrs, **chosen}
+        return Table(coords, {name: variable(name) for name in names}, attrs)
+
+    def thinned(self, dim: str) -> slice:
+        """A slice of an axis of `MOST_POINTS` values at most."""
+        size = self.axes[dim].size
+        return slice(0, size, math.ceil(size / MOST_POINTS))
+
+    def spread(self, dim: str, number: int) -> list[int]:
+        """Indices of `number` values at most, from end to end of an axis."""
+        size = self.axes[dim].size
+        return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
+
+
+def _list(names: Sequence[str]) -> str:
+    return f"there {'is' if len(names) == 1 else 'are'} {', '.join(names)}" if names else "there is none"
+
+
+def _suggest(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return (f'did you mean "{near[0]}"? ' if near else "") + _list(known)
+
+
+# ------------------------------------------------------------- what is computed on a slice
+
+
+def boundaries(table: Table) -> dict[str, Variable]:
+    """Yield acceleration and, but for Newmark's block, limiting acceleration (Eq. 7) of a slice, m/s².
+
+    Returns
+    -------
+    dict of str to Variable
+        ``yield_acceleration`` and ``limiting_acceleration`` along those dimensions of the slice that
+        they depend on; NaN where the block slides under its own weight.
+    """
+    from slipsweep.grid.plans import plan_friction_parameters
+
+    given = {name: table[name] for name in ("theta", "mu_s", "yield_acceleration") if name in table.coords}
+    # neither depends on the amplitude
+    found = plan_friction_parameters(amplitude=0.0, g=float(table.attrs["g"]), **given).solve()
+    slides_at_rest = found["yield_acceleration"].values <= 0
+    limit = found["limiting_acceleration"]
+    unstable = found["validity"].values != 0
+    lines = {
+        "yield_acceleration": replace(
+            found["yield_acceleration"], values=np.where(slides_at_rest, np.nan, found["yield_acceleration"].values)
+        ),
+        "limiting_acceleration": replace(limit, values=np.where(unstable, np.nan, limit.values)),
+    }
+    return lines if table.attrs["model"] != "newmark" else {"yield_acceleration": lines["yield_acceleration"]}
+
+
+def newmark(table: Table) -> Variable:
+    """Permanent displacement of Newmark's block on the cells of a slice, swept anew."""
+    from slipsweep.grid.plans import plan_sweep
+    from slipsweep.motion.waveforms import ATTRIBUTES
+
+    drive = "displacement_amplitude" if "displacement_amplitude" in table.coords else "amplitude"
+    given = ("theta", "mu_s", drive, "frequency", "yield_acceleration")
+    plan = plan_sweep(
+        **{name: table[name] for name in given if name in table.coords},
+        model="newmark",
+        cycles=int(table.attrs["cycles"]),
+        **{name: table.attrs[name] for name in ATTRIBUTES if name in table.attrs},
+        g=float(table.attrs["g"]),
+        variables=["permanent_displacement"],
+    )
+    return plan.solve()["permanent_displacement"]

@@ -1,0 +1,68 @@
+"""How figures look: colours, symbols, units and captions, the same in all of them."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from slipsweep.grid.tables import Table
+from slipsweep.model.variables import PARAMETERS, RESULTS
+from slipsweep.motion.waveforms import text_of
+
+#: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
+BLUE, VERMILION = "#0072B2", "#D55E00"
+SKY_BLUE, ORANGE, PURPLE = "#56B4E9", "#E69F00", "#CC79A7"
+
+#: Symbols of the paper.
+SYMBOLS = {
+    "theta": "θ",
+    "mu_s": "μs",
+    "amplitude": "A",
+    "displacement_amplitude": "d",
+    "frequency": "f",
+    "yield_acceleration": "Üy",
+    "decay_rate": "λ",
+    "delta_mu": "Δμ",
+    "minimum_friction": "μmin",
+    "structure_frequency": "fs",
+}
+
+_UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
+
+
+def unit(name: str) -> str:
+    """The unit of a parameter or result as people write it; nothing for a pure number."""
+    units = (PARAMETERS.get(name) or RESULTS[name]).get("units", "1")
+    return _UNITS.get(units, units)
+
+
+def axis_label(name: str) -> str:
+    """The label of a parameter's axis: name, symbol and unit."""
+    text = f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}"
+    return f"{text} ({unit(name)})" if unit(name) else text
+
+
+def value_text(name: str, value: float) -> str:
+    """A parameter's value with symbol and unit: ``θ = 5°``."""
+    space = "" if unit(name) in ("", "°") else " "
+    return f"{SYMBOLS[name]} = {value:.4g}{space}{unit(name)}"
+
+
+def caption(table: Table) -> str:
+    """The parameters that have one value, the model and the shaking, on two lines."""
+    single = [name for name in SYMBOLS if name in table.coords and table[name].values.size == 1]
+    parts = [value_text(name, table[name].item()) for name in single]
+    attributes = table.attrs
+    uncertain = [f"uncertain: {_drawn_text(attributes)}"] if "uncertain" in attributes else []
+    options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
+    shaking = f"{attributes['cycles']} cycles of a {text_of(attributes)}"
+    return "\n".join([", ".join(parts), *uncertain, f"model: {', '.join(options)}; {shaking}"]).strip()
+
+
+def _drawn_text(attributes: Mapping[str, Any]) -> str:
+    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``."""
+    signs = {"absolute": "~", "factor": "×", "offset": "+"}
+    texts = []
+    for name, about in json.loads(attributes["uncertain"]).items():
+        numbers = ", ".join(f"{key}={value}" for key, value in about.items() if key not in ("distribution", "kind"))
+        texts.append(f"{SYMBOLS[name]} {signs[about['kind']]} {about['distribution']}({numbers})")
+    return f"{', '.join(texts)}; {attributes['samples']} samples"

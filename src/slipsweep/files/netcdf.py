@@ -1,0 +1,329 @@
+"""netCDF files of results: made by the CF conventions, and read."""
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.files.outputs import check_output, complete_or_absent, writing
+from slipsweep.files.spec import SweepSpec
+from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode, Validity
+from slipsweep.motion.records import Record
+
+#: Results that are whole numbers, -1 where there is no value.
+_WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
+
+#: Dimension of the samples of a record.
+RECORD_DIM = "record_sample"
+
+
+# --------------------------------------------------------------------------- making a file
+
+
+@contextmanager
+def new_file(temporary: Path, path: Path) -> Iterator[netCDF4.Dataset]:
+    """Open a new netCDF file, and close it whatever happens."""
+    with writing(path):
+        file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
+    file.set_fill_off()  # every value is written: filling the file first would write it twice
+    try:
+        yield file
+    except BaseException:
+        with suppress(RuntimeError, OSError):  # the first error is the one to report
+            file.close()
+        raise
+    with writing(path):
+        file.close()
+
+
+def _define(file: netCDF4.Dataset, table: Table, dtype: Callable[[str], np.dtype[Any]]) -> None:
+    """Define the dimensions and variables of `table`."""
+    sizes = table.sizes
+    # in the order of the results, which that of the coordinates need not be
+    widest = max((result.dims for result in table.data_vars.values()), key=len, default=())
+    shape = {dim: sizes[dim] for dim in (*widest, *sizes)}
+    for dim, length in shape.items():
+        file.createDimension(dim, length)
+    for name, coordinate in table.coords.items():
+        variable = file.createVariable(name, coordinate.values.dtype, coordinate.dims)
+        _describe(variable, coordinate.attrs)
+    for name, result in table.data_vars.items():
+        dims, kind = result.dims, dtype(name)
+        fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name in _WITH_MISSING else None
+        variable = file.createVariable(name, kind, dims, fill_value=fill, contiguous=True)
+        attributes = dict(result.attrs)
+        if attributes.get("ancillary_variables") not in table:
+            attributes.pop("ancillary_variables", None)
+        auxiliary = [c for c in table.coords if c not in shape and {*table[c].dims} <= {*dims}]
+        if auxiliary:
+            attributes["coordinates"] = " ".join(auxiliary)
+        _describe(variable, attributes)
+
+
+def _label_cases(file: netCDF4.Dataset, labels: tuple[str, ...]) -> None:
+    """Write the names of the rows of [[cases]]: as characters, since few programs read netCDF strings."""
+    if not labels:
+        return
+    text = np.array([label.encode() for label in labels])
+    file.createDimension("label_length", text.dtype.itemsize)
+    variable = file.createVariable("label", "S1", ("case", "label_length"))
+    variable.set_auto_chartostring(False)
+    _describe(variable, {"long_name": "name of the case", "_Encoding": "utf-8"})
+    variable[:] = text.view("S1").reshape(len(labels), -1)
+    for other in file.variables.values():
+        if "case" in other.dimensions and "coordinates" in other.ncattrs():
+            _describe(other, {"coordinates": f"{other.getncattr('coordinates')} label"})
+
+
+def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[str, Any]) -> None:
+    """Set attributes: text as characters in UTF-8, flag values in the type of their variable."""
+    for name, value in attributes.items():
+        if isinstance(value, str):
+            # as bytes: the library would write text beyond ASCII as a netCDF string
+            target.setncattr(name, value.encode())
+        elif name in ("flag_values", "flag_masks"):
+            target.setncattr(name, np.asarray(value, target.dtype))
+        elif isinstance(value, int):
+            target.setncattr(name, np.int32(value))  # not every program reads 64-bit attributes
+        else:
+            target.setncattr(name, value)
+
+
+def history_of(command: str) -> str:
+    """The `history` of a file that `command` makes now."""
+    return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
+
+
+def _provenance(history: str) -> dict[str, str]:
+    return {"Conventions": "CF-1.11", "history": history}
+
+
+def write_head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[str, ...], history: str) -> None:
+    """Write all of a sweep's file but its results."""
+    _define(file, table, spec.dtype)
+    _label_cases(file, labels)
+    _describe(file, {**table.attrs, "title": spec.output.title, **_provenance(history), "sweep": spec.text})
+    file.set_auto_maskandscale(False)
+    for name, coordinate in table.coords.items():
+        file[name][...] = coordinate.values
+    if spec.record is not None:
+        _embed(file, spec.record)
+
+
+def _embed(file: netCDF4.Dataset, record: Record) -> None:
+    """Write the samples of a record, from which the run can be repeated when its file is gone."""
+    file.createDimension(RECORD_DIM, record.times.size)
+    for name, values in zip(RECORD_SAMPLES, (record.times, record.acceleration), strict=True):
+        variable = file.createVariable(name, "f8", (RECORD_DIM,))
+        _describe(variable, RECORD_SAMPLES[name])
+        variable[:] = values
+
+
+def rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """A result as the file holds it; what is too large for that is an error, and not infinite."""
+    if values.dtype == dtype:
+        return values
+    with np.errstate(over="ignore"):
+        stored = values.astype(dtype)
+    beyond = np.isinf(stored)
+    if beyond.any() and np.isfinite(worst := np.abs(values[beyond]).max()):
+        raise InputError(
+            f'output.dtype = "{dtype}": {name} reaches {worst:.4g}, more than the {np.finfo(dtype).max:.4g} that it '
+            'holds; must be "float64"'
+        )
+    return stored
+
+
+def write_table(
+    table: Table, path: Path, *, title: str, command: str, overwrite: bool = False, record: Record | None = None
+) -> None:
+    """Write a table that is in memory (a time history) by the rules that sweeps are written by.
+
+    The `record` that it is the response to is written with it.
+    """
+    check_output(path, overwrite)
+    with (
+        complete_or_absent(path, overwrite) as temporary,
+        new_file(temporary, path) as file,
+        writing(path),
+    ):
+        _define(file, table, lambda name: table[name].values.dtype)
+        _describe(file, {**table.attrs, "title": title, **_provenance(history_of(command))})
+        file.set_auto_maskandscale(False)
+        for name, array in {**table.coords, **table.data_vars}.items():
+            file[name][...] = array.values
+        if record is not None:
+            _embed(file, record)
+
+
+def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str, overwrite: bool = False) -> None:
+    """Write the statistics of a sweep with uncertain inputs: with its text, so that it can be repeated from them."""
+    check_output(path, overwrite)
+    with (
+        complete_or_absent(path, overwrite) as temporary,
+        new_file(temporary, path) as file,
+        writing(path),
+    ):
+        write_head(file, spec, table, spec.labels, history_of(command))
+        for name, array in table.data_vars.items():
+            file[name][...] = rounded(name, array.values, spec.dtype(name))
+
+
+def without_time_axis(table: Table) -> Table:
+    """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
+
+    A dimension `time` is a time axis of the CF conventions (4.4), whose values are dates.  Seconds
+    since the shaking began are none, and given a made-up date they would be read back as dates.
+    """
+    dims = {"time": "instant"}
+    coords, data_vars = (
+        {
+            name: Variable(tuple(dims.get(dim, dim) for dim in array.dims), array.values, array.attrs)
+            for name, array in arrays.items()
+        }
+        for arrays in (table.coords, table.data_vars)
+    )
+    return Table(coords, data_vars, table.attrs)
+
+
+# --------------------------------------------------------------------------- reading a file
+
+
+@dataclass
+class Tally:
+    """Counts of cells, and among them of each sliding mode and each flag (None: not stored)."""
+
+    cells: int = 0
+    modes: dict[SlidingMode, int] | None = None
+    flags: dict[Validity, int] | None = None
+
+    def add(self, results: Mapping[str, NDArray[Any]]) -> None:
+        """Count one block; `results` holds its arrays by variable name."""
+        if "sliding_mode" in results:
+            self.modes = self.modes or dict.fromkeys(SlidingMode, 0)
+            for mode in SlidingMode:
+                # int(): numpy would take a member of an enumeration for 64 bits, and all cells with it
+                self.modes[mode] += int(np.count_nonzero(results["sliding_mode"] == int(mode)))
+        if "validity" in results:
+            self.flags = self.flags or dict.fromkeys(Validity, 0)
+            seen = int(np.bitwise_or.reduce(results["validity"], axis=None))
+            for flag in Validity(seen & 255):
+                self.flags[flag] += int(np.count_nonzero(results["validity"] & int(flag)))
+
+    def merge(self, other: "Tally") -> None:
+        """Add the counts of other cells."""
+        self.cells += other.cells
+        if other.modes is not None:
+            self.modes = {mode: (self.modes or {}).get(mode, 0) + count for mode, count in other.modes.items()}
+        if other.flags is not None:
+            self.flags = {flag: (self.flags or {}).get(flag, 0) + count for flag, count in other.flags.items()}
+
+
+@dataclass
+class Contents:
+    """What a file of slipsweep holds and how it was made; coordinates and variables in words."""
+
+    path: Path
+    nbytes: int
+    attributes: dict[str, str]
+    coordinates: dict[str, str]
+    variables: dict[str, str]
+    tally: Tally
+
+
+@contextmanager
+def open_result(path: Path) -> Iterator[netCDF4.Dataset]:
+    """Open a file of slipsweep to read from.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is not netCDF, or was not written by slipsweep.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    try:
+        file = netCDF4.Dataset(path)
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
+    with file:
+        if not str(getattr(file, "source", "")).startswith("slipsweep "):
+            raise InputError(f"{path}: not written by slipsweep")
+        yield file
+
+
+def coordinate_names(file: netCDF4.Dataset) -> set[str]:
+    """Names of a file's coordinate variables, auxiliary and scalar ones among them."""
+    named = (
+        variable.coordinates.split() for variable in file.variables.values() if "coordinates" in variable.ncattrs()
+    )
+    return {*file.dimensions, *itertools.chain.from_iterable(named)}
+
+
+def read_contents(path: Path) -> Contents:
+    """Describe a file of slipsweep; memory stays small whatever its size.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is not netCDF, or was not written by slipsweep.
+    """
+    with open_result(path) as file:
+        try:
+            coordinates = coordinate_names(file)
+            return Contents(
+                path,
+                path.stat().st_size,
+                {name: str(file.getncattr(name)) for name in file.ncattrs()},
+                {name: _values_text(file[name]) for name in file.variables if name in coordinates},
+                {name: _variable_text(file[name]) for name in file.variables if name not in coordinates},
+                _count(file),
+            )
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
+
+
+def _count(file: netCDF4.Dataset) -> Tally:
+    tally = Tally()
+    for name in ("sliding_mode", "validity"):
+        if name in file.variables:
+            variable = file[name]
+            variable.set_auto_mask(False)
+            tally.cells = variable.size
+            for block in grid_blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
+                tally.add({name: variable[tuple(block.values())]})
+    return tally
+
+
+def stored_tally(path: Path) -> Tally:
+    """Count what is in a file, or in the files of a folder."""
+    tally = Tally()
+    for name in sorted(path.iterdir()) if path.is_dir() else [path]:
+        with netCDF4.Dataset(name) as file:
+            tally.merge(_count(file))
+    return tally
+
+
+def _values_text(variable: netCDF4.Variable) -> str:
+    values = variable[...]
+    if variable.dtype == "S1":
+        return ", ".join(values)
+    units = "" if variable.units == "1" else f" {variable.units}"
+    if values.size == 1:
+        return f"{values.item():.6g}{units}"
+    return f"{values.size} values, {values.min():.6g} to {values.max():.6g}{units}"
+
+
+def _variable_text(variable: netCDF4.Variable) -> str:
+    units = f", {variable.units}" if "units" in variable.ncattrs() and variable.units != "1" else ""
+    return f"{variable.long_name}{units} ({variable.dtype})"

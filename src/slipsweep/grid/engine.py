@@ -1,0 +1,271 @@
+"""Arrays in, arrays out: the sweep without labels.
+
+Knows numpy and the kernels; no xarray, no files.  Every input is an array that broadcasts
+to the shape of the result; a dimension along which only the frequency varies is served
+by the scaling law and costs no kernel call.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.grid import threads
+from slipsweep.kernels import block as physics
+from slipsweep.kernels import step
+from slipsweep.kernels.block import Cell, Options
+from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
+from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
+from slipsweep.motion.waveforms import Waveform, wave_of
+
+#: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
+_FRICTION_CELLS = 65536
+
+#: Results in which `mark_flexible_blocks` sets flags together.
+_FLAGS = 65536
+
+RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": step.SIMPSON}
+RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
+RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
+
+#: Results that come out of a kernel, in the order of `grid.Results`.
+MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
+
+Array = NDArray[np.float64]
+
+#: Makes the array of a result, of a shape and dtype: `np.empty`, or what hands out memory again.
+Empty = Callable[[tuple[int, ...], str], NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What all cells of a grid share: the options of `slipsweep.sweep`, checked."""
+
+    waveform: Waveform
+    model: str
+    rise: str
+    recoupling: str
+    cycles: int
+    solver: str
+    rule: str
+    steps_per_cycle: int
+    g: float
+
+    def options(self, wants_peak: bool) -> Options:
+        """The options as the kernels want them."""
+        newmark = self.model == "newmark"
+        return Options(
+            rise=physics.NEWMARK if newmark else RISES[self.rise],
+            recoupling=physics.INTEGRATE if newmark else RECOUPLINGS[self.recoupling],
+            cycles=self.cycles,
+            rule=RULES[self.rule],
+            steps_per_cycle=self.steps_per_cycle,
+            wants_peak=wants_peak,
+            g=self.g,
+        )
+
+
+def solver_of(problem: Problem) -> str:
+    """The solver that a problem is given to: "auto" takes "cycle", faster and exact to rounding for every waveform."""
+    return "cycle" if problem.solver == "auto" else problem.solver
+
+
+def cell_inputs(arrays: Mapping[str, Array], dimensions: int) -> list[Array]:
+    """The seven fields of `Cell` as arrays of `dimensions` dimensions; what is not given is NaN."""
+    inputs = []
+    for name in Cell._fields:
+        source = arrays.get("theta" if name == "tan_theta" else name)
+        values = np.full((1,) * dimensions, math.nan) if source is None else np.asarray(source, np.float64)
+        inputs.append(np.tan(np.radians(values)) if name == "tan_theta" else values)
+    return inputs
+
+
+def scaled_dimension(shape: tuple[int, ...], inputs: list[Array], frequency: Array) -> int | None:
+    """The longest dimension along which the frequency varies and no other input does."""
+    only = [
+        axis
+        for axis in range(len(shape))
+        if frequency.shape[axis] > 1 and all(values.shape[axis] == 1 for values in inputs)
+    ]
+    return max(only, key=lambda axis: shape[axis]) if only else None
+
+
+def cells_to_solve(shape: tuple[int, ...], inputs: list[Array], frequency: Array) -> int:
+    """Number of cells a kernel solves for a grid: all, but for the dimension that the scaling law serves."""
+    scaled = scaled_dimension(shape, inputs, frequency)
+    return math.prod(size for axis, size in enumerate(shape) if axis != scaled)
+
+
+def solve(
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
+) -> dict[str, NDArray[Any]]:
+    """Solve a grid.
+
+    Parameters
+    ----------
+    problem : Problem
+        Options common to all cells.
+    shape : tuple of int
+        Shape of the results.
+    arrays : mapping of str to array
+        `theta` (degrees), `mu_s`, `amplitude`, `frequency` (Hz) and the optional
+        parameters, each with as many dimensions as `shape`, of length 1 where it does
+        not vary.
+    wanted : tuple of str
+        Names from `MOTION_RESULTS`; nothing else is computed.
+    progress : callable, optional
+        Called with a number of result cells as they are finished, from any thread.
+    empty : callable
+        Makes the arrays of the results.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
+    """
+    inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
+    scaled = scaled_dimension(shape, inputs, frequency)
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    grid = layout(shape, scaled, [*inputs, frequency])
+    targets = Results(
+        *(results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS)
+    )
+    periods = flat(1.0 / (2.0 * math.pi * frequency))
+    rows = tuple(flat(values) for values in inputs)
+    options = problem.options("peak_relative_velocity" in wanted)
+    wave = wave_of(problem.waveform, problem.cycles)
+    # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
+    work_per_cell = 1 + grid.frequencies // 32
+    if solver_of(problem) == "step":
+        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, problem.steps_per_cycle)
+        work_per_cell += problem.steps_per_cycle // 16
+
+    def work(first: int, last: int) -> None:
+        if solver_of(problem) == "step":
+            kernel(grid, first, last, rows, periods, options, steps, targets)
+        else:
+            stretches = np.array([[first, last]])
+            if problem.waveform.is_sine:
+                rest = np.empty(((last - first + 1) // 2, 2), np.int64)
+                stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
+            if stretches.size:
+                WAVE_KERNEL(grid, stretches, rows, periods, options, wave, targets)
+        if progress is not None:
+            progress((last - first) * grid.frequencies)
+
+    if math.prod(shape):
+        threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
+    if "structure_frequency" in arrays and "validity" in results:
+        mark_flexible_blocks(results["validity"], frequency, arrays["structure_frequency"])
+    return results
+
+
+def friction_parameters(
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
+) -> dict[str, NDArray[Any]]:
+    """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion.
+
+    Parameters and results as in `solve`; there is no frequency.
+    """
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    options = problem.options(False)
+    parts = list(slabs(shape, _FRICTION_CELLS))
+
+    def solve_slab(slab: tuple[slice, ...]) -> None:
+        inputs = cell_inputs(cut(arrays, slab), len(shape))
+        sizes = tuple(part.stop - part.start for part in slab)
+        grid = layout(sizes, None, [*inputs, np.ones((1,) * len(shape))])
+        cells = math.prod(sizes)
+        parameters = np.empty((len(FRICTION_PARAMETERS), cells))
+        codes = {name: np.empty(cells, RESULT_DTYPES[name]) for name in ("sliding_mode", "validity")}
+        rows = tuple(flat(values) for values in inputs)
+        parameter_grid(grid, 0, cells, rows, options, parameters, codes["sliding_mode"], codes["validity"])
+        found = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
+        for name in wanted:
+            results[name][slab] = found[name].reshape(sizes)
+        if progress is not None:
+            progress(cells)
+
+    def work(first: int, last: int) -> None:
+        for slab in parts[first:last]:
+            solve_slab(slab)
+
+    # the kernel gives all parameters: slab by slab, those not wanted take no room
+    threads.spread(len(parts), work, _FRICTION_CELLS)
+    return results
+
+
+def mark_flexible_blocks(validity: NDArray[np.int16], frequency: Array, structure_frequency: Array) -> None:
+    """Set the validity bit of blocks that are not rigid, 0.2 ≤ f/fs ≤ 1.3."""
+    varying = np.broadcast_shapes(frequency.shape, structure_frequency.shape)
+    # in slabs: temporaries stay small even where the two vary along every dimension
+    for slab in slabs(varying, _FLAGS):
+        part = cut({"f": frequency, "fs": structure_frequency}, slab)
+        ratio = part["f"] / part["fs"]
+        flags = ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(Validity.FLEXIBLE_BLOCK)
+        where: Any = (one if size > 1 else slice(None) for one, size in zip(slab, varying, strict=True))
+        validity[(*where, ...)] |= flags
+
+
+def cut(arrays: Mapping[str, Array], slices: tuple[slice, ...]) -> dict[str, Array]:
+    """A part of a grid: `arrays` cut along the dimensions in which they vary."""
+    parts: dict[str, Array] = {}
+    for name, values in arrays.items():
+        where: Any = (part if size > 1 else slice(None) for part, size in zip(slices, values.shape, strict=True))
+        parts[name] = values[(*where, ...)]  # the dots keep an array without dimensions an array
+    return parts
+
+
+def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
+    """Cut a grid into slabs of at most `most` cells, whole along its last dimensions."""
+    axis, row = 0, math.prod(shape[1:])
+    while row > most:
+        axis += 1
+        row //= shape[axis]
+    lengths = [1] * axis + [max(1, most // max(row, 1))] + list(shape[axis + 1 :])
+    starts = (range(0, size, length) for size, length in zip(shape, lengths, strict=False))
+    for corner in itertools.product(*starts):
+        yield tuple(
+            slice(start, min(start + length, size)) for start, length, size in zip(corner, lengths, shape, strict=False)
+        )
+
+
+def flat(values: Array) -> Array:
+    """One row of float64 as the kernels are compiled for; a copy only where there is no other way."""
+    return np.require(values, np.float64, ["C", "ALIGNED", "WRITEABLE"]).reshape(-1)
+
+
+def layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:
+    """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart."""
+    dimensions = [axis for axis in range(len(shape)) if axis != scaled]
+    rows = [_strides(values.shape) for values in arrays] + [_strides(shape)]
+    return Grid(
+        # a grid without dimensions is one cell along one
+        shape=np.array([shape[axis] for axis in dimensions] or [1], np.int64),
+        strides=np.array([[row[axis] for axis in dimensions] or [0] for row in rows], np.int64),
+        frequencies=1 if scaled is None else shape[scaled],
+        frequency_stride=0 if scaled is None else rows[-2][scaled],
+        result_stride=0 if scaled is None else rows[-1][scaled],
+    )
+
+
+def _strides(shape: tuple[int, ...]) -> list[int]:
+    """Strides in elements of a C-contiguous array, 0 along dimensions of length 1."""
+    strides = []
+    for axis, size in enumerate(shape):
+        strides.append(math.prod(shape[axis + 1 :]) if size > 1 else 0)
+    return strides

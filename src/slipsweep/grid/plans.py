@@ -1,0 +1,358 @@
+"""What a caller asks for, checked and laid out: parameters in, a plan, a table out.
+
+A plan holds the checked options, the coordinates, and the tasks that give the results:
+one for the motion, one for the friction parameters, which have no frequency dimension.
+A task can be cut into parts; solved at once or part by part, it gives the same bits.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from slipsweep._version import __version__
+from slipsweep.errors import InputError
+from slipsweep.grid import engine
+from slipsweep.grid.engine import MOTION_RESULTS, Problem
+from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.parameters import (
+    BOUNDS,
+    MODELS,
+    MOST_CYCLES,
+    MOST_STEPS,
+    RECOUPLINGS,
+    RISES,
+    RULES,
+    SOLVERS,
+    STEPS_PER_CYCLE,
+    check_choice,
+    check_values,
+    check_whole,
+    number_text,
+)
+from slipsweep.model.variables import (
+    DEFAULT_RESULTS,
+    DIMENSION_ORDER,
+    FRICTION_PARAMETERS,
+    PARAMETERS,
+    RECORD_RESULTS,
+    REFERENCE,
+    RESULT_DTYPES,
+    RESULTS,
+)
+from slipsweep.motion.waveforms import check_waveform
+
+_FRICTION_INPUTS = (
+    "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
+)  # fmt: skip
+
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Task:
+    """Results that lie on the same dimensions, and all it takes to compute them.
+
+    Attributes
+    ----------
+    solver : callable
+        `engine.solve`, `engine.friction_parameters`, or what solves a record (`record_sweeps`).
+    problem : Problem
+    names : tuple of str
+        Results to compute.
+    sizes : dict of str to int
+        Their dimensions.
+    inputs : dict of str to ndarray
+        Parameters, with all dimensions, of length 1 where they do not vary.
+    """
+
+    solver: Callable[..., dict[str, np.ndarray]]
+    problem: Problem
+    names: tuple[str, ...]
+    sizes: dict[str, int]
+    inputs: Arrays
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the results."""
+        return math.prod(self.sizes.values()) * sum(
+            np.dtype(RESULT_DTYPES.get(name, "float64")).itemsize for name in self.names
+        )
+
+    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Arrays:
+        """Compute the results; `progress` is told of cells as they are finished, `empty` makes the arrays."""
+        return self.solver(self.problem, tuple(self.sizes.values()), self.inputs, self.names, progress, empty)
+
+    def part(self, slices: tuple[slice, ...]) -> "Task":
+        """The task cut to a slice of every dimension."""
+        sizes = {dim: cut.stop - cut.start for dim, cut in zip(self.sizes, slices, strict=True)}
+        return replace(self, sizes=sizes, inputs=engine.cut(self.inputs, slices))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep that has been checked and only needs computing.
+
+    Attributes
+    ----------
+    sizes : dict of str to int
+        Dimensions of the grid in the order of the results, and their lengths.
+    coords : dict of str to Variable
+        The parameters.
+    tasks : tuple of Task
+    names : tuple of str
+        Results in the order they are returned in.
+    attrs : dict
+        What the results say of themselves.
+    """
+
+    sizes: dict[str, int]
+    coords: dict[str, Variable]
+    tasks: tuple[Task, ...]
+    names: tuple[str, ...]
+    attrs: dict[str, Any]
+
+    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
+        """Compute everything at once; `progress` and `empty` as in `engine.solve`.
+
+        Raises
+        ------
+        InputError
+            The results do not fit in memory.
+        """
+        sizes = max((task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()))
+        check_memory(sizes, sum(task.nbytes for task in self.tasks))
+        # all tasks cover the same cells: one of them counts
+        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
+
+    def empty(self) -> Table:
+        """The results with their dimensions and coordinates but no values: zeros that take no memory."""
+
+        def zeros(task: Task) -> dict[str, np.ndarray]:
+            shape = tuple(task.sizes.values())
+            return {name: np.broadcast_to(np.zeros((), RESULT_DTYPES.get(name, "f8")), shape) for name in task.names}
+
+        return self.table(zeros)
+
+    def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> Table:
+        """The results, with `evaluate` giving a task's arrays."""
+        described = RESULTS | RECORD_RESULTS
+        found = {
+            name: Variable(tuple(task.sizes), values, described[name])
+            for task in self.tasks
+            for name, values in evaluate(task).items()
+        }
+        return Table(self.coords, {name: found[name] for name in self.names}, self.attrs)
+
+
+def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
+    """Plan of a sweep.
+
+    Parameters
+    ----------
+    variables, given
+        Keyword arguments of `slipsweep.sweep` but for `chunks` and `progress`; arrays with
+        dimensions of their own are `Variable` instead of DataArray.
+
+    Raises
+    ------
+    InputError
+        As `slipsweep.sweep`.
+    """
+    parameters = {name: given.pop(name) for name in PARAMETERS if given.get(name) is not None}
+    if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
+        raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
+    if "frequency" not in parameters:
+        raise InputError("frequency: must be given")
+    problem = check_options(**{name: value for name, value in given.items() if name not in PARAMETERS})
+    wanted = check_variables(variables)
+    coords = checked(parameters)
+    if "displacement_amplitude" in coords:
+        coords["amplitude"] = _amplitude(coords["displacement_amplitude"], coords["frequency"])
+    inputs = {name: variable for name, variable in coords.items() if name != "displacement_amplitude"}
+    sizes = grid_sizes(inputs)
+
+    tasks = []
+    motion = tuple(name for name in MOTION_RESULTS if name in wanted)
+    if motion:
+        tasks.append(Task(engine.solve, problem, motion, sizes, aligned(inputs, sizes)))
+    # one that was given is a coordinate already
+    friction = tuple(name for name in FRICTION_PARAMETERS if name in wanted and name not in inputs)
+    if friction:
+        tasks.append(_friction_task(problem, friction, inputs))
+    return Plan(
+        sizes,
+        coords,
+        tuple(tasks),
+        tuple(name for name in wanted if name in motion + friction),
+        _attributes("Permanent displacement of a rigid block, swept", problem),
+    )
+
+
+def plan_friction_parameters(*, g: float, **given: Any) -> Plan:
+    """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
+    problem = check_options(g=g)
+    coords = checked({name: values for name, values in given.items() if values is not None})
+    names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
+    task = _friction_task(problem, names, coords)
+    attrs = {"title": "Friction parameters", **_SOURCE, "g": problem.g}
+    return Plan(task.sizes, coords, (task,), names, attrs)
+
+
+def check_options(
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    harmonics: Mapping[str, Sequence[float]] | str | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
+    cycles: int = 10,
+    solver: str = "auto",
+    steps_per_cycle: int = STEPS_PER_CYCLE,
+    rule: str = "trapezoid",
+    g: float = 9.81,
+) -> Problem:
+    """The options of `slipsweep.sweep`, checked (InputError names the one that is not allowed)."""
+    cycles = check_whole("cycles", cycles, 1, MOST_CYCLES)
+    return Problem(
+        waveform=check_waveform(waveform, harmonics, ramp_in, ramp_out, cycles),
+        model=check_choice("model", model, MODELS),
+        rise=check_choice("rise", rise, RISES),
+        recoupling=check_choice("recoupling", recoupling, RECOUPLINGS),
+        cycles=cycles,
+        solver=check_choice("solver", solver, SOLVERS),
+        rule=check_choice("rule", rule, RULES),
+        steps_per_cycle=check_whole("steps_per_cycle", steps_per_cycle, 8, MOST_STEPS, multiple_of=4),
+        g=_single("g", g),
+    )
+
+
+def check_variables(variables: Sequence[str] | None) -> tuple[str, ...]:
+    """The names of the results wanted, in the order of `variables.RESULTS`."""
+    if variables is None:
+        return DEFAULT_RESULTS
+    if isinstance(variables, str):
+        raise InputError(f"variables = {variables!r}: must be a list of names")
+    for name in variables:
+        check_choice("variables", name, RESULTS)
+    if not len(variables):
+        raise InputError(f"variables = {variables!r}: must name one of {', '.join(map(repr, RESULTS))} at least")
+    return tuple(name for name in RESULTS if name in variables)
+
+
+def _single(name: str, value: Any) -> float:
+    values = check_values(name, value)
+    if values.ndim:
+        raise InputError(f"{name} = {value!r}: must be a single number")
+    return float(values)
+
+
+def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]] = PARAMETERS) -> dict[str, Variable]:
+    """Every parameter as a float64 array with named dimensions, within its bounds, described as in `known`."""
+    checked = {}
+    for name, given in parameters.items():
+        if isinstance(given, Variable):
+            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **known[name]})
+        else:
+            values = check_values(name, given)
+            if values.ndim > 1:
+                raise InputError(
+                    f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
+                    "that names its dimensions"
+                )
+            variable = Variable((name,) if values.ndim else (), values, known[name])
+        if variable.values.size == 0:
+            raise InputError(f"{name} = []: must hold at least one value")
+        checked[name] = variable
+    return checked
+
+
+def _amplitude(displacement_amplitude: Variable, frequency: Variable) -> Variable:
+    """A = (2πf)² d."""
+    sizes = grid_sizes({"displacement_amplitude": displacement_amplitude, "frequency": frequency})
+    both = aligned({"d": displacement_amplitude, "f": frequency}, sizes)
+    omega = 2.0 * math.pi * both["f"]
+    with np.errstate(over="ignore"):
+        values = omega * omega * both["d"]
+    if not BOUNDS["amplitude"].holds(values).all():
+        worst = both["d"].max()
+        raise InputError(
+            f"displacement_amplitude = {number_text(float(worst))}: (2 pi frequency)^2 of it is no finite number"
+        )
+    return Variable(tuple(sizes), values, PARAMETERS["amplitude"])
+
+
+def grid_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
+    """Dimensions of the grid in the order of the results, and their lengths."""
+    sizes: dict[str, int] = {}
+    for name, variable in variables.items():
+        for dim, size in variable.sizes.items():
+            if sizes.setdefault(dim, size) != size:
+                raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
+    ordered = [dim for dim in DIMENSION_ORDER if dim in sizes] + [dim for dim in sizes if dim not in DIMENSION_ORDER]
+    return {dim: sizes[dim] for dim in ordered}
+
+
+def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arrays:
+    """Plain arrays with all dimensions, of length 1 where they do not vary."""
+    aligned = {}
+    for name, variable in variables.items():
+        own = variable.values.transpose([variable.dims.index(dim) for dim in sizes if dim in variable.dims])
+        aligned[name] = own.reshape([variable.sizes.get(dim, 1) for dim in sizes])
+    return aligned
+
+
+def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, Variable]) -> Task:
+    """Eqs. 7-11 on the dimensions they depend on."""
+    own = {name: variable for name, variable in variables.items() if name in _FRICTION_INPUTS}
+    sizes = grid_sizes(own)
+    return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
+
+
+def check_memory(sizes: Mapping[str, int], needed: int) -> None:
+    """Refuse what memory cannot hold, before any of it is taken."""
+    free = available_memory()
+    if free is not None and needed > free:
+        grid = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
+        raise InputError(
+            f"grid of {grid}: {math.prod(sizes.values()):.4g} cells take {size_text(needed)}, but {size_text(free)} "
+            "of memory is free; ask for fewer variables or cells, or give chunks= for a lazy result"
+        )
+
+
+_SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
+
+
+def _attributes(title: str, problem: Problem) -> dict[str, Any]:
+    """What the results of a sweep say of themselves."""
+    attributes: dict[str, Any] = {
+        "title": title,
+        **_SOURCE,
+        "g": problem.g,
+        "model": problem.model,
+        **problem.waveform.attributes,
+        "cycles": problem.cycles,
+    }
+    if problem.model == "mendez":
+        attributes |= {"rise": problem.rise, "recoupling": problem.recoupling}
+    attributes["solver"] = engine.solver_of(problem)
+    if attributes["solver"] == "step":
+        attributes |= {"rule": problem.rule, "steps_per_cycle": problem.steps_per_cycle}
+    return attributes
+
+
+def record_attributes(problem: Problem, name: str, read: Mapping[str, str]) -> dict[str, Any]:
+    """What the results of a recorded motion say of themselves; `read` is how the record was read."""
+    attributes = {
+        "title": "Response of a rigid block to a recorded motion",
+        **_SOURCE,
+        "g": problem.g,
+        "model": problem.model,
+        "record": name,
+        **read,
+    }
+    return attributes | ({} if problem.model == "newmark" else {"rise": problem.rise, "recoupling": problem.recoupling})

@@ -1,0 +1,136 @@
+"""The equations of Mendez, Romo and Botero (2012), one small function each.
+
+Scalars in, a scalar out, SI units, angles already as tangents; the equation number of
+the paper stands in each docstring.  The kernels call these functions as they are, so
+that what is written here is what is computed; but Eq. 5, which Eq. 6 replaces, and Eq. 12, which
+they take over a whole interval at once (`kernels.train.attenuate`).  The operators of the printed equations
+were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
+"""
+
+import math
+
+from slipsweep.jit.decorators import in_lanes
+from slipsweep.jit.elementary import exp, log
+from slipsweep.model.variables import SlidingMode
+
+STUCK = int(SlidingMode.STUCK)
+STICK_SLIP = int(SlidingMode.STICK_SLIP)
+CONTINUOUS = int(SlidingMode.CONTINUOUS)
+
+#: Friction that remains at the peak of a continuous slide: "zero, or very close to it".
+CONTINUOUS_MINIMUM_FRICTION = 0.01
+
+
+@in_lanes
+def coulomb_yield_acceleration(mu_s: float, tan_theta: float, g: float) -> float:
+    """Üy of a Coulomb interface, g tan(φs − θ), m/s²."""
+    return g * (mu_s - tan_theta) / (1.0 + mu_s * tan_theta)
+
+
+@in_lanes
+def normal_acceleration(ground_acceleration: float, tan_theta: float, g: float) -> float:
+    """Eqs. 2 and 3: normal force over m cos θ, n(t) = g + Üg tan θ, m/s²."""
+    return g + ground_acceleration * tan_theta
+
+
+@in_lanes
+def mobilised_friction(
+    ground_acceleration: float, block_acceleration: float, mu_s: float, tan_theta: float, g: float
+) -> float:
+    """Eq. 1: the friction coefficient that goes with a block acceleration."""
+    n = normal_acceleration(ground_acceleration, tan_theta, g)
+    return mu_s - tan_theta - (abs(ground_acceleration) - abs(block_acceleration) - g * tan_theta) / n
+
+
+@in_lanes
+def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
+    """Eq. 4 as what the block falls short of the plane's acceleration, |Üg| − |Ü|, m/s².
+
+    n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
+    failure Üg is small against g tan θ, which would take its digits.
+    """
+    return g * (mu_s - friction) + ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
+
+
+@in_lanes
+def relative_acceleration(
+    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
+) -> float:
+    """Eq. 4 as the rate of the relative velocity while the block slides, Üg − Ü, m/s²."""
+    return math.copysign(1.0, ground_acceleration) * lag(ground_acceleration, friction, mu_s, tan_theta, g)
+
+
+@in_lanes
+def block_acceleration(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
+    """Eq. 4: response of the sliding block to the plane's acceleration, m/s²."""
+    return ground_acceleration - relative_acceleration(ground_acceleration, friction, mu_s, tan_theta, g)
+
+
+@in_lanes
+def original_friction_coefficient(ground_acceleration: float, mu_s: float, decay_rate: float, g: float) -> float:
+    """Eq. 5: the original friction law, which starts from the static coefficient."""
+    return friction_coefficient(ground_acceleration, mu_s, 0.0, decay_rate, g)
+
+
+@in_lanes
+def friction_coefficient(
+    ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
+) -> float:
+    """Eq. 6: friction that decays with the loading rate from μs + Δμ."""
+    return (mu_s + delta_mu) * exp(-decay_rate * abs(ground_acceleration) / g)
+
+
+@in_lanes
+def limit_denominator(mu_s: float, tan_theta: float) -> float:
+    """Denominator of Eq. 7; where it is not positive the interface has no limit."""
+    return 1.0 - tan_theta * (mu_s - tan_theta)
+
+
+@in_lanes
+def limiting_acceleration(yield_acceleration: float, mu_s: float, tan_theta: float, g: float) -> float:
+    """Eq. 7: the largest acceleration the interface transmits (Eq. 4 with μ = 0, Ü = Üy), m/s²."""
+    return (yield_acceleration + g * mu_s) / limit_denominator(mu_s, tan_theta)
+
+
+@in_lanes
+def acceleration_ratio(amplitude: float, limiting_acceleration: float) -> float:
+    """Eq. 8: ξ, the plane's peak acceleration over the limiting one."""
+    return amplitude / limiting_acceleration
+
+
+@in_lanes
+def minimum_friction(mu_s: float, ratio: float) -> float:
+    """Eq. 9: friction that remains at the peak, μs² ξ in stick-slip, 0.01 in continuous sliding."""
+    return mu_s * mu_s * ratio if ratio <= 1.0 else CONTINUOUS_MINIMUM_FRICTION
+
+
+@in_lanes
+def delta_mu(mu_s: float, ratio: float) -> float:
+    """Eqs. 10 (continuous, ξ > 1) and 11 (stick-slip, ξ ≤ 1): friction above static."""
+    # without a branch, which would keep loops over cells from becoming SIMD
+    return mu_s * (max(ratio, 1.0 / ratio) - 1.0)
+
+
+@in_lanes
+def decay_rate(amplitude: float, mu_s: float, delta_mu: float, minimum_friction: float, g: float) -> float:
+    """Eq. 6 solved for λ with μ = μmin at the peak of the motion."""
+    return g / amplitude * log((mu_s + delta_mu) / minimum_friction)
+
+
+@in_lanes
+def attenuation_coefficient(peak_block_acceleration: float, g: float) -> float:
+    """Eq. 12: Kd = Ümax / g."""
+    return peak_block_acceleration / g
+
+
+@in_lanes
+def attenuated_velocity(velocity: float, attenuation_coefficient: float, duration: float, g: float) -> float:
+    """Eq. 12: relative velocity after `duration` of attenuation, not below zero, m/s."""
+    return max(velocity - g * attenuation_coefficient * duration, 0.0)
+
+
+@in_lanes
+def sliding_mode(amplitude: float, yield_acceleration: float, limiting_acceleration: float) -> int:
+    """Mode of the motion: stuck up to the yield acceleration, continuous beyond Eq. 7, else stick-slip."""
+    slides = CONTINUOUS if amplitude > limiting_acceleration else STICK_SLIP
+    return STUCK if amplitude <= yield_acceleration else slides

@@ -1,0 +1,661 @@
+"""The public functions: parameters as scalars, axes or DataArrays in, an xarray.Dataset out.
+
+A thin translation over `slipsweep.grid.plans` and `slipsweep.studies.history`: coordinates that came
+with DataArrays are kept, and `chunks` makes a dask graph of a plan's tasks.
+"""
+
+import itertools
+import operator
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from slipsweep.errors import InputError
+from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.parameters import STEPS_PER_CYCLE
+from slipsweep.model.variables import RESULT_DTYPES
+from slipsweep.motion.records import Record
+from slipsweep.studies.history import history_table
+from slipsweep.studies.limits import AMPLITUDE_STEPS, limit_table
+from slipsweep.studies.record_sweeps import plan_record
+
+#: What a caller may give for a parameter.
+Values = float | Sequence[float] | np.ndarray | xr.DataArray
+
+#: A sum of harmonics, by columns.
+Harmonics = Mapping[str, Sequence[float]]
+
+
+def sweep(
+    theta: Values,
+    mu_s: Values,
+    amplitude: Values | None = None,
+    frequency: Values | None = None,
+    *,
+    displacement_amplitude: Values | None = None,
+    cycles: int = 10,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    structure_frequency: Values | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    harmonics: Harmonics | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
+    solver: str = "auto",
+    steps_per_cycle: int = STEPS_PER_CYCLE,
+    rule: str = "trapezoid",
+    g: float = 9.81,
+    variables: Sequence[str] | None = None,
+    chunks: Any = None,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Response of a sliding block over a grid of parameters.
+
+    A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own
+    name; the grid is the outer product of all of them.  A DataArray keeps its dimensions,
+    so that several on one shared dimension are taken together instead of crossed.
+
+    Parameters
+    ----------
+    theta : float, array or DataArray
+        Plane inclination, degrees, 0 ≤ θ < 90.
+    mu_s : float, array or DataArray
+        Static friction coefficient, > 0.
+    amplitude : float, array or DataArray
+        Peak ground acceleration A, m/s², ≥ 0.
+    frequency : float, array or DataArray
+        Excitation frequency, Hz, > 0.
+    displacement_amplitude : float, array or DataArray
+        Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.
+    cycles : int
+        Whole cycles of shaking, from rest.
+    yield_acceleration : float, array or DataArray, optional
+        Üy, m/s²; by default Coulomb's, g tan(φs − θ).
+    decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
+        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11).
+    structure_frequency : float, array or DataArray, optional
+        Natural frequency of the sliding structure, Hz, for the `flexible_block` flag.
+    model : {"mendez", "newmark"}
+        The paper's friction law, or the classical rigid block.
+    rise : {"monotone", "literal"}
+        Stick-slip rise of the block's acceleration: not below the yield value and never
+        falling, or Eq. 4 as printed.
+    recoupling : {"eq12", "integrate"}
+        After the plane's acceleration has reversed: Eq. 12, or integration until the stop.
+    waveform : {"sine", "cosine", "triangle", "square", "harmonics"}
+        Shape of the ground acceleration, of peak A.
+    harmonics : mapping, optional
+        With "harmonics": ``amplitudes``, ``multiples`` (of the frequency, whole numbers) and
+        ``phases`` (degrees; 0 if left out) of its terms a sin(mφ + p).  Their scale does not
+        matter: the sum's largest magnitude is A.
+    ramp_in, ramp_out : float
+        Cycles at the beginning and at the end over which the shaking grows and fades linearly.
+    solver : {"auto", "cycle", "step"}
+        Event by event, or time stepping.  "auto" takes "cycle".
+    steps_per_cycle : int
+        Steps of the "step" solver, a multiple of 4, at least 8.
+    rule : {"trapezoid", "rectangle", "simpson"}
+        Rule of the "step" solver; orders 2, 1 and 4.
+    g : float
+        Gravity, m/s².
+    variables : sequence of str, optional
+        Results to compute: `permanent_displacement`, `peak_relative_velocity`,
+        `sliding_mode`, `validity` (these by default) and the parameters of Eqs. 7-11.
+    chunks : int, tuple, dict or "auto", optional
+        Chunks as dask takes them; the result is then lazy.  Frequency is best left whole.
+    progress : callable, optional
+        Called with the number of cells just finished, from any thread; not with `chunks`.
+
+    Returns
+    -------
+    Dataset
+        Dimensions theta, mu_s, amplitude, frequency, then others.  The parameters of
+        Eqs. 7-11 do not vary with frequency and have no such dimension.
+
+    Raises
+    ------
+    InputError
+        A value that no physics allows, an unknown option, a grid that memory cannot hold.
+    """
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "displacement_amplitude": displacement_amplitude,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+        "structure_frequency": structure_frequency,
+    }
+    plan = plan_sweep(
+        **_plain(given),
+        cycles=cycles,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
+        solver=solver,
+        steps_per_cycle=steps_per_cycle,
+        rule=rule,
+        g=g,
+        variables=variables,
+    )
+    brought = _brought(given, plan.coords)
+    return _dataset(plan.solve(progress) if chunks is None else _lazy(plan, chunks), brought)
+
+
+def friction_parameters(
+    theta: Values,
+    mu_s: Values,
+    amplitude: Values,
+    *,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    g: float = 9.81,
+) -> xr.Dataset:
+    """Friction parameters of the paper's Eqs. 7-11, and λ, over a grid.
+
+    Parameters are those of `sweep`.
+
+    Returns
+    -------
+    Dataset
+        `yield_acceleration`, `limiting_acceleration` (m/s²), `acceleration_ratio`,
+        `minimum_friction`, `delta_mu`, `decay_rate`, `sliding_mode`, and the part of
+        `validity` that is known before the motion.  A parameter that was given is a coordinate.
+
+    Raises
+    ------
+    InputError
+        A value that no physics allows.
+    """
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+    }
+    plan = plan_friction_parameters(**_plain(given), g=g)
+    return _dataset(plan.solve(), _brought(given, plan.coords))
+
+
+def simulate(
+    theta: float,
+    mu_s: float,
+    amplitude: float | None = None,
+    frequency: float | None = None,
+    *,
+    times: Sequence[float] | np.ndarray | None = None,
+    points_per_cycle: int = 512,
+    displacement_amplitude: float | None = None,
+    cycles: int = 10,
+    yield_acceleration: float | None = None,
+    decay_rate: float | None = None,
+    delta_mu: float | None = None,
+    minimum_friction: float | None = None,
+    structure_frequency: float | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    harmonics: Harmonics | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
+    g: float = 9.81,
+) -> xr.Dataset:
+    """Time history of one block, event by event: the samples carry rounding errors only.
+
+    Parameters
+    ----------
+    theta, mu_s, amplitude, frequency : float
+        One case; these and the remaining parameters as in `slipsweep.sweep`.
+    times : array, optional
+        Times to sample, s, increasing and not negative; by default `points_per_cycle` a
+        cycle, from 0 to the end of the shaking, or until the block has come to rest if later.
+    points_per_cycle : int
+        Samples a cycle where `times` is not given.
+
+    Returns
+    -------
+    Dataset
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²),
+        `friction_coefficient` (what Eq. 1 gives for the two), `relative_velocity` (m/s)
+        and `relative_displacement` (m); and the results of `sweep` for the case.  NaN where
+        the case has no value (`validity`).
+
+    Raises
+    ------
+    InputError
+        As `sweep`; or times that are not increasing.
+    """
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "displacement_amplitude": displacement_amplitude,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+        "structure_frequency": structure_frequency,
+    }
+    table = history_table(
+        **_plain(given),
+        times=times,
+        points_per_cycle=points_per_cycle,
+        cycles=cycles,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
+        g=g,
+    )
+    return _dataset(table, {})
+
+
+def sweep_record(
+    record: Record,
+    theta: Values,
+    mu_s: Values,
+    *,
+    scale: Values = 1.0,
+    time_scale: Values = 1.0,
+    polarity: int | Sequence[int] | str = 1,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    g: float = 9.81,
+    variables: Sequence[str] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Response of a sliding block to a recorded motion, over a grid of parameters.
+
+    The record is taken as straight between its samples, and the response to that is exact: it
+    carries rounding errors only.  Parameters span a grid as in `sweep`, whose remaining arguments
+    mean here what they mean there.
+
+    Parameters
+    ----------
+    record : Record
+        From `read_record`, or ``Record(times, acceleration)``, s and m/s².
+    theta, mu_s : float, array or DataArray
+        Plane inclination, degrees, and static friction coefficient.
+    scale : float, array or DataArray
+        Factor on the recorded acceleration, > 0.
+    time_scale : float, array or DataArray
+        Factor on its time, > 0: 2 makes it last twice as long.
+    polarity : {1, -1}, list of these, or "both"
+        Factor on the record: 1 takes its positive accelerations for those that move the block
+        downslope, -1 its negative ones.
+    yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
+        What replaces its estimate; by default each pulse has those of its own peak.
+    model, rise, recoupling, g
+        As in `sweep`.
+    variables : sequence of str, optional
+        Which of the results below to return, by default all.
+    progress : callable, optional
+        Called with the number of cells just finished, from any thread.
+
+    Returns
+    -------
+    Dataset
+        `permanent_displacement` (m), `peak_relative_velocity` (m/s), `number_of_slips` (that
+        begin at rest), `stick_slip_pulses`, `continuous_pulses` (pulses by mode, Eq. 7 with each
+        pulse's own peak: an extension of the paper's harmonic motion) and `validity`.
+        Dimensions theta, mu_s, given parameters, scale, time_scale, polarity.
+
+    Raises
+    ------
+    InputError
+        A value that no physics allows, an unknown option, a grid that memory cannot hold.
+    """
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+        "scale": scale,
+        "time_scale": time_scale,
+    }
+    plan = plan_record(
+        record,
+        **_plain(given),
+        polarity=polarity,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        g=g,
+        variables=variables,
+    )
+    return _dataset(plan.solve(progress), _brought(given, plan.coords))
+
+
+def limit_amplitude(
+    displacement: Values,
+    theta: Values,
+    mu_s: Values,
+    frequency: Values,
+    *,
+    cycles: int = 10,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    structure_frequency: Values | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    harmonics: Harmonics | None = None,
+    ramp_in: float = 0.0,
+    ramp_out: float = 0.0,
+    g: float = 9.81,
+    maximum_amplitude: float | None = None,
+    amplitude_steps: int = AMPLITUDE_STEPS,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Smallest amplitude at which the permanent displacement reaches a tolerable one.
+
+    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at
+    least `displacement` at the amplitude returned, and less (or no value) at the
+    double-precision number before it.
+
+    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has
+    gaps where the model gives no value (`validity`), so that a displacement may be reached at
+    several amplitudes, or passed in a jump.  The smallest is returned: the first step of a scan
+    with ``u >= displacement`` holds it.  The scan runs from the yield acceleration to
+    `maximum_amplitude` in `amplitude_steps` equal ratios and has both sides of every change of
+    mode seen between two of its points; a peak of u within one sliding mode narrower than a
+    step can be missed.
+
+    Parameters
+    ----------
+    displacement : float, array or DataArray
+        Tolerable permanent displacement, m, > 0.
+    theta, mu_s, frequency : float, array or DataArray
+        These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".
+    maximum_amplitude : float, optional
+        Where the search ends, m/s²; by default 5 g.
+    amplitude_steps : int
+        Steps of the scan, 2 or more.
+    progress : callable, optional
+        Called with the number of cells just finished.
+
+    Returns
+    -------
+    Dataset
+        Dimensions theta, mu_s, frequency, then others, displacement last:
+
+        - `limit_amplitude`, m/s²; NaN where there is none.
+        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of
+          itself between neighbouring numbers, with and without a change of sliding mode),
+          3 after_gap (no value just below), 4 not_reached, 5 invalid (no value anywhere).
+        - `permanent_displacement`, m, and `sliding_mode` at the limit; more than
+          `displacement` where it is passed in a jump or after a gap.
+        - `validity` at the limit or, where there is none, at `maximum_amplitude`.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; or a displacement or a maximum amplitude that is not positive.
+    """
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+        "structure_frequency": structure_frequency,
+        "displacement": displacement,
+    }
+    table = limit_table(
+        **_plain(given),
+        cycles=cycles,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        waveform=waveform,
+        harmonics=harmonics,
+        ramp_in=ramp_in,
+        ramp_out=ramp_out,
+        g=g,
+        maximum_amplitude=maximum_amplitude,
+        amplitude_steps=amplitude_steps,
+        progress=progress,
+    )
+    return _dataset(table, _brought(given, table.coords))
+
+
+def sample(
+    theta: Values | None = None,
+    mu_s: Values | None = None,
+    amplitude: Values | None = None,
+    frequency: Values | None = None,
+    *,
+    uncertain: Mapping[str, Any],
+    samples: int = 4096,
+    method: str = "sobol",
+    seed: int = 0,
+    quantiles: float | Sequence[float] | np.ndarray = (0.05, 0.5, 0.95),
+    thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
+    correlation: Sequence[tuple[str, str, float]] = (),
+    displacement_amplitude: Values | None = None,
+    cycles: int = 10,
+    yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    waveform: str = "sine",
+    solver: str = "auto",
+    steps_per_cycle: int = STEPS_PER_CYCLE,
+    rule: str = "trapezoid",
+    g: float = 9.81,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
+
+    Parameters span a grid as in `sweep`; at every grid point those in `uncertain` are drawn.  The
+    draws are the same at all grid points.
+
+    Parameters
+    ----------
+    theta, mu_s, amplitude, frequency : float, array or DataArray
+        As in `sweep`.  One that is drawn with ``kind="absolute"`` must not be given.
+    uncertain : mapping of str to mapping or frozen distribution
+        For any of `theta`, `mu_s`, `amplitude`, `displacement_amplitude`, `frequency`,
+        `yield_acceleration`, `decay_rate`, `delta_mu` and `minimum_friction` either a frozen
+        distribution of scipy.stats, or a mapping with
+
+        - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
+          whose shape parameters, ``loc`` and ``scale`` are further keys;
+        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
+          at the grid point or, for the last four, the estimate) or "offset" (it is added to it);
+        - ``units``: of the draws, if not the parameter's own; not with factors.
+    samples : int
+        Samples a grid point; a power of 2 for Sobol's.
+    method : {"sobol", "latin_hypercube", "random"}
+        Scrambled Sobol sequence, Latin hypercube (scipy.stats.qmc) or pseudo-random numbers.
+    seed : int
+        The same seed gives the same draws.
+    quantiles : float or array
+        Increasing, between 0 and 1.
+    thresholds : float, str or list of these
+        Increasing displacements, m or with a unit ("50mm"), ≥ 0.
+    correlation : list of (str, str, float)
+        Pairs of drawn parameters and the correlation of their normal scores (a Gaussian copula).
+    progress : callable, optional
+        Called with the number of samples just solved, from any thread.
+
+    The remaining parameters are those of `sweep`.
+
+    Returns
+    -------
+    Dataset
+        Over the grid:
+
+        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and
+          `exceedance_probability`, dimension `threshold` (m): P(u > threshold).  They are of the
+          samples that have a value; NaN where none has.
+        - `mode_share`, dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
+          all samples, how many slide in which mode, have which flag, and have no value.  They do not
+          depend on the frequency and have no such dimension (but with `displacement_amplitude`).
+
+        How the inputs were drawn is in the attributes.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; a distribution that scipy.stats does not know, or draws that no physics allows.
+    """
+    from slipsweep.studies.uncertainty import check_sampling, plan_samples
+
+    given = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "displacement_amplitude": displacement_amplitude,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "decay_rate": decay_rate,
+        "delta_mu": delta_mu,
+        "minimum_friction": minimum_friction,
+    }
+    sampling = check_sampling(
+        uncertain,
+        samples=samples,
+        method=method,
+        seed=seed,
+        quantiles=quantiles,
+        thresholds=thresholds,
+        correlation=correlation,
+        g=g,
+    )
+    plan = plan_samples(
+        sampling,
+        **_plain(given),
+        cycles=cycles,
+        model=model,
+        rise=rise,
+        recoupling=recoupling,
+        waveform=waveform,
+        solver=solver,
+        steps_per_cycle=steps_per_cycle,
+        rule=rule,
+        g=g,
+    )
+    return _dataset(plan.solve(progress), _brought(given, plan.coords))
+
+
+def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters without xarray: DataArrays (computed, where they are lazy) as `Variable`."""
+    return {
+        name: Variable(tuple(map(str, values.dims)), values.values, {str(key): x for key, x in values.attrs.items()})
+        if isinstance(values, xr.DataArray)
+        else values
+        for name, values in given.items()
+    }
+
+
+def _brought(given: Mapping[str, Any], coords: Mapping[str, Variable]) -> dict[Hashable, xr.DataArray]:
+    """Coordinates that the DataArrays among the parameters brought along; they must agree."""
+    brought: dict[Hashable, xr.DataArray] = {}
+    for parameter, array in given.items():
+        if not isinstance(array, xr.DataArray):
+            continue
+        for name, coordinate in array.coords.items():
+            known: xr.Variable | None = brought[name].variable if name in brought else None
+            # a parameter of that name is the coordinate, and labels the dimension of that name
+            if name in array.dims and name in coords and name != parameter:
+                known = xr.Variable(coords[str(name)].dims, coords[str(name)].values)
+            if known is not None and not known.equals(coordinate.variable):
+                raise InputError(f"{parameter}: its coordinate {name!r} differs from that of another parameter")
+            brought[name] = coordinate
+    return {name: coordinate for name, coordinate in brought.items() if name not in coords}
+
+
+def _dataset(table: Table, brought: Mapping[Hashable, xr.DataArray]) -> xr.Dataset:
+    """A table as a Dataset; no array is copied."""
+
+    def labelled(variables: Mapping[str, Variable]) -> dict[Hashable, xr.Variable]:
+        return {name: xr.Variable(part.dims, part.values, part.attrs) for name, part in variables.items()}
+
+    return xr.Dataset(labelled(table.data_vars), {**brought, **labelled(table.coords)}, table.attrs)
+
+
+def _lazy(plan: Plan, chunks: Any) -> Table:
+    """The results as dask arrays."""
+    blocks = _blocks(chunks, plan.sizes)
+    return plan.table(lambda task: _lazy_arrays(task, {dim: blocks[dim] for dim in task.sizes}))
+
+
+def _lazy_arrays(task: Task, blocks: Mapping[str, tuple[int, ...]]) -> dict[str, Any]:
+    """One task as dask arrays: a node a chunk solves all results, another picks each out."""
+    from dask.array import Array
+    from dask.base import tokenize
+    from dask.highlevelgraph import HighLevelGraph
+
+    starts = [list(itertools.accumulate(lengths, initial=0)) for lengths in blocks.values()]
+    token = tokenize(task.solver.__name__, task.problem, task.names, blocks, task.inputs)
+    solved = f"slipsweep-{token}"
+    layers: dict[str, dict[Any, Any]] = {solved: {}} | {f"{name}-{token}": {} for name in task.names}
+    for index in itertools.product(*(range(len(lengths)) for lengths in blocks.values())):
+        slices = tuple(slice(begin[at], begin[at + 1]) for begin, at in zip(starts, index, strict=True))
+        layers[solved][solved, *index] = (task.part(slices).solve,)
+        for name in task.names:
+            layers[f"{name}-{token}"][f"{name}-{token}", *index] = (operator.getitem, (solved, *index), name)
+    arrays = {}
+    for name in task.names:
+        layer = f"{name}-{token}"
+        graph = HighLevelGraph({solved: layers[solved], layer: layers[layer]}, {solved: set(), layer: {solved}})
+        arrays[name] = Array(graph, layer, tuple(blocks.values()), dtype=RESULT_DTYPES.get(name, "float64"))
+    return arrays
+
+
+def _blocks(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
+    """Chunk lengths along every dimension; "auto" leaves frequency, which costs next to nothing, whole."""
+    from dask.array.core import normalize_chunks
+
+    asked = dict.fromkeys(sizes, "auto") | {"frequency": -1} if isinstance(chunks, str) and chunks == "auto" else chunks
+    if isinstance(asked, Mapping):
+        unknown = [dim for dim in asked if dim not in sizes and dim != "frequency"]
+        if unknown:
+            raise InputError(f"chunks = {chunks!r}: {unknown[0]!r} is not a dimension; they are {', '.join(sizes)}")
+        asked = tuple(asked.get(dim, -1) for dim in sizes)
+    try:
+        normal: tuple[tuple[int, ...], ...] = normalize_chunks(asked, tuple(sizes.values()), dtype=np.dtype("f8"))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"chunks = {chunks!r}: {error}") from None
+    return dict(zip(sizes, normal, strict=True))

@@ -1,0 +1,77 @@
+"""One time history, exact: the cycle solver's legs sampled on any time grid."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from slipsweep.errors import InputError
+from slipsweep.grid import engine
+from slipsweep.grid.plans import check_options, plan_sweep
+from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.kernels.block import TILE
+from slipsweep.kernels.history import history
+from slipsweep.model.parameters import check_whole
+from slipsweep.model.variables import HISTORY, PARAMETERS
+from slipsweep.motion.waveforms import wave_of
+
+
+def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: Any) -> Table:
+    """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
+    options = {name: value for name, value in given.items() if name not in PARAMETERS}
+    problem = check_options(**options)
+    for name in PARAMETERS:
+        value = given.get(name)
+        if value is not None and np.ndim(value.values if isinstance(value, Variable) else value):
+            raise InputError(f"{name}: simulate takes one case; must be a single number")
+    summary = plan_sweep(**given, solver="cycle").solve()
+    own = {name: variable.values for name, variable in summary.coords.items()}
+    omega = 2.0 * math.pi * float(own["frequency"])
+    cells = np.repeat([float(values) for values in engine.cell_inputs(own, 0)], TILE)
+    wave = wave_of(problem.waveform, problem.cycles)
+
+    def sampled(phases: np.ndarray) -> np.ndarray:
+        table = np.empty((phases.size, len(HISTORY)))
+        history(cells, problem.options(True), wave, phases, table)
+        return table
+
+    if times is None:
+        points = check_whole("points_per_cycle", points_per_cycle, 4)
+        shaken = points * problem.cycles
+        _check_memory(shaken)
+        last = sampled(np.array([2.0 * math.pi * problem.cycles]))[0]
+        # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
+        braking = last[1] - last[0]
+        after = last[3] / braking if summary["sliding_mode"].item() == 1 and last[3] > 0.0 else 0.0
+        phases = np.arange(shaken + math.ceil(after * points / (2.0 * math.pi)) + 1) * (2.0 * math.pi / points)
+        grid = phases / omega
+    else:
+        grid = np.atleast_1d(np.asarray(times, np.float64))
+        if grid.ndim != 1 or not np.isfinite(grid).all() or (grid < 0.0).any() or (np.diff(grid) <= 0.0).any():
+            raise InputError("times: must be one row of finite, increasing numbers >= 0")
+        phases = grid * omega
+    table = sampled(phases)
+    table[:, 3] /= omega
+    table[:, 4] /= omega * omega
+    columns = {
+        name: Variable(("time",), np.ascontiguousarray(column), attributes)
+        for (name, attributes), column in zip(HISTORY.items(), table.T, strict=True)
+    }
+    time = Variable(("time",), grid, {"units": "s", "long_name": "time"})
+    return Table(
+        {**summary.coords, "time": time},
+        columns | summary.data_vars,
+        summary.attrs | {"title": "Time history of a rigid block"},
+    )
+
+
+def _check_memory(samples: int) -> None:
+    """Refuse what memory cannot hold: the table, its columns apart, phases and times."""
+    needed = samples * 8 * (2 * len(HISTORY) + 2)
+    free = available_memory()
+    if free is not None and needed > free:
+        raise InputError(
+            f"a history of {samples:.4g} points takes {size_text(needed)}, but {size_text(free)} of memory is free; "
+            "take fewer cycles or points_per_cycle, or give times"
+        )

@@ -1,0 +1,309 @@
+"""The inverse of a sweep: the smallest amplitude at which a tolerable displacement is reached.
+
+The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall
+behind a jump, and has gaps where the model gives no value.  So every block is first scanned
+from its yield acceleration upwards, the places where its mode changes are found to the last
+bit and join the scan, and the first step of the scan that reaches the target is bisected until
+two neighbouring double-precision numbers are left.  Both the scan and the bisection ask the
+cycle solver, for all cells at once.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.grid import engine
+from slipsweep.grid.engine import Problem
+from slipsweep.grid.plans import plan_sweep
+from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.parameters import check_values, check_whole, number_text
+from slipsweep.model.variables import (
+    LIMIT_RESULTS,
+    MAXIMUM_AMPLITUDE_IN_G,
+    RESULT_DTYPES,
+    RESULTS,
+    TOLERABLE_DISPLACEMENT,
+    LimitStatus,
+    SlidingMode,
+)
+
+Floats = NDArray[np.float64]
+
+#: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
+AMPLITUDE_STEPS = 512
+
+#: Displacements scanned together: 16 MB, and as much again to compare them.
+_SCANNED = 2_000_000
+
+#: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
+JUMP = 1e-6
+
+#: Inputs that only scale the result, or only flag it.
+_SCALES = ("frequency", "structure_frequency")
+
+
+def limit_table(
+    *,
+    displacement: Any,
+    maximum_amplitude: float | None = None,
+    amplitude_steps: int = AMPLITUDE_STEPS,
+    progress: Callable[[int], None] | None = None,
+    **given: Any,
+) -> Table:
+    """Limit amplitudes; keyword arguments, results and errors of `slipsweep.limit_amplitude`.
+
+    Arrays with dimensions of their own are `Variable`.
+    """
+    values = displacement.values if isinstance(displacement, Variable) else displacement
+    checked = check_values("displacement", values)
+    if isinstance(displacement, Variable):
+        target = Variable(displacement.dims, checked)
+    elif checked.ndim <= 1:
+        target = Variable(("displacement",) * checked.ndim, checked)
+    else:
+        raise InputError(f"displacement: an array of {checked.ndim} dimensions; must be a scalar or a 1-D array")
+    if checked.size == 0:
+        raise InputError("displacement = []: must hold at least one value")
+    steps = check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
+
+    # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
+    plan = plan_sweep(**given, amplitude=target, solver="cycle", variables=["permanent_displacement"])
+    task = plan.tasks[0]
+    if maximum_amplitude is None:
+        maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.g
+    highest = check_values("maximum_amplitude", maximum_amplitude)
+    if highest.ndim:
+        raise InputError(f"maximum_amplitude = {maximum_amplitude!r}: must be a single number")
+    _check_memory(plan.sizes)
+
+    arrays = dict(task.inputs)
+    targets = arrays.pop("amplitude")
+    shape = tuple(plan.sizes.values())
+    found = solve(task.problem, shape, arrays, targets, float(highest), steps, progress)
+    coords = {name: variable for name, variable in plan.coords.items() if name != "amplitude"}
+    return Table(
+        {**coords, "displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
+        {
+            name: Variable(tuple(plan.sizes), found[name], LIMIT_RESULTS.get(name) or RESULTS[name])
+            for name in (*LIMIT_RESULTS, "sliding_mode", "validity")
+        },
+        plan.attrs
+        | {
+            "title": "Amplitudes at which a tolerable displacement is reached",
+            "maximum_amplitude": float(highest),
+            "amplitude_steps": steps,
+        },
+    )
+
+
+def solve(
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Floats],
+    displacement: Floats,
+    maximum_amplitude: float,
+    steps: int = AMPLITUDE_STEPS,
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Find the limit amplitudes of a grid.
+
+    Parameters
+    ----------
+    problem : Problem
+        Options common to all cells.
+    shape : tuple of int
+        Shape of the results.
+    arrays : mapping of str to array
+        Inputs of `engine.solve` but for the amplitude, laid out as there.
+    displacement : array
+        What is to be reached, m, laid out in the same way.
+    maximum_amplitude : float
+        Where the scan ends, m/s².
+    steps : int
+        Steps of the scan.
+    progress : callable, optional
+        Called with a number of result cells as they are finished.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Arrays of `shape`: the variables of `slipsweep.limit_amplitude`.
+    """
+    inputs = {**arrays, "displacement": displacement}
+    blocks = [values.shape for name, values in arrays.items() if name not in _SCALES]
+    moving = [axis for axis in range(len(shape)) if any(own[axis] > 1 for own in blocks)]
+    scaling = [axis for axis in range(len(shape)) if axis not in moving]
+    # two dimensions are enough: the blocks, and what is asked of each
+    table = tuple(math.prod(shape[axis] for axis in group) for group in (moving, scaling))
+    rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in inputs.items()}
+    results = {
+        name: np.empty(table, RESULT_DTYPES.get(name, "float64"))
+        for name in ("limit_amplitude", "limit_status", "permanent_displacement", "sliding_mode", "validity")
+    }
+    for slab in engine.slabs(table, max(1, _SCANNED // steps)):
+        part = engine.cut(rows, slab)
+        cells = tuple(cut.stop - cut.start for cut in slab)
+        for name, values in _solve_slab(problem, cells, part, maximum_amplitude, steps).items():
+            results[name][slab] = values
+        if progress is not None:
+            progress(math.prod(cells))
+    order = [[*moving, *scaling].index(axis) for axis in range(len(shape))]
+    sizes = [shape[axis] for axis in (*moving, *scaling)]
+    return {name: values.reshape(sizes).transpose(order).copy() for name, values in results.items()}
+
+
+def _two_dimensional(values: Floats, shape: tuple[int, ...], groups: tuple[list[int], list[int]]) -> Floats:
+    """An input with each group of dimensions made one, of length 1 where it does not vary along the group."""
+    sizes, lengths = list(values.shape), []
+    for group in groups:
+        if any(values.shape[axis] > 1 for axis in group):
+            for axis in group:
+                sizes[axis] = shape[axis]
+        lengths.append(math.prod(sizes[axis] for axis in group))
+    return np.broadcast_to(values, sizes).transpose([*groups[0], *groups[1]]).reshape(lengths)
+
+
+def _solve_slab(
+    problem: Problem, shape: tuple[int, int], arrays: dict[str, Floats], maximum_amplitude: float, steps: int
+) -> dict[str, NDArray[Any]]:
+    """Solve blocks (rows) for what is asked of each (columns)."""
+    displacement = np.broadcast_to(arrays.pop("displacement"), shape)
+    blocks = {name: values for name, values in arrays.items() if name not in _SCALES}
+    amplitudes = _scan(problem, shape[0], blocks, maximum_amplitude, steps)
+
+    # every amplitude of the scan, at every frequency
+    scanned = engine.solve(
+        problem,
+        (shape[0], amplitudes.shape[1], shape[1]),
+        {name: values[:, np.newaxis, :] for name, values in arrays.items()} | {"amplitude": amplitudes[:, :, None]},
+        ("permanent_displacement",),
+    )["permanent_displacement"]
+    reaches = scanned >= displacement[:, np.newaxis, :]
+    first = reaches.argmax(axis=1)
+    row, column = np.nonzero(reaches.any(axis=1))
+    at = first[row, column]
+    # the scan begins at yield, where no block has moved: there is always a step before
+    low, high = amplitudes[row, at - 1], amplitudes[row, at]
+    cells = _zipped(arrays, row, column)
+    target = displacement[row, column]
+
+    def displaced(amplitude: Floats, which: NDArray[np.intp]) -> NDArray[np.bool_]:
+        part = {name: values if values.size == 1 else values[which] for name, values in cells.items()}
+        found = engine.solve(problem, amplitude.shape, {**part, "amplitude": amplitude}, ("permanent_displacement",))
+        return np.asarray(found["permanent_displacement"] >= target[which])
+
+    low, high = _bisect(low, high, displaced)
+    wanted = ("permanent_displacement", "sliding_mode", "validity")
+    before = engine.solve(problem, low.shape, {**cells, "amplitude": low}, wanted[:2])
+    after = engine.solve(problem, high.shape, {**cells, "amplitude": high}, wanted)
+
+    # what is missing says why in its validity: that of the greatest amplitude
+    end = {"amplitude": np.full((1, 1), maximum_amplitude)}
+    results = engine.solve(problem, shape, {**arrays, **end}, ("validity",))
+    has_value = (~np.isnan(scanned)).any(axis=1)
+    results |= {
+        "limit_amplitude": np.full(shape, math.nan),
+        "limit_status": np.where(has_value, LimitStatus.NOT_REACHED, LimitStatus.INVALID).astype(np.int8),
+        "permanent_displacement": np.full(shape, math.nan),
+        "sliding_mode": np.full(shape, SlidingMode.MISSING, np.int8),
+    }
+    for name in wanted:
+        results[name][row, column] = after[name]
+    results["limit_amplitude"][row, column] = high
+    results["limit_status"][row, column] = _status(before, after)
+    return results
+
+
+def _scan(
+    problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_amplitude: float, steps: int
+) -> NDArray[np.float64]:
+    """Amplitudes to try for `count` blocks, increasing along each row; both sides of every change of mode are there."""
+    yields = engine.friction_parameters(
+        problem, (count, 1), {**blocks, "amplitude": np.zeros((1, 1))}, ("yield_acceleration",)
+    )["yield_acceleration"]
+    # without a yield acceleration there is no value at any amplitude
+    start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
+    amplitudes = start * (maximum_amplitude / start) ** np.linspace(0.0, 1.0, steps + 1)
+    amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
+    amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
+
+    def modes(amplitude: Floats, cells: Mapping[str, Floats]) -> NDArray[Any]:
+        given = {**cells, "amplitude": amplitude, "frequency": np.ones((1,) * amplitude.ndim)}
+        return engine.solve(problem, amplitude.shape, given, ("sliding_mode",))["sliding_mode"]
+
+    scanned = modes(amplitudes, blocks)
+    row, step = np.nonzero(scanned[:, 1:] != scanned[:, :-1])
+    if not row.size:
+        return amplitudes
+    own = scanned[row, step]
+
+    def has_changed(amplitude: Floats, which: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray(modes(amplitude, _zipped(blocks, row[which], None)) != own[which])
+
+    before, after = _bisect(amplitudes[row, step], amplitudes[row, step + 1], has_changed)
+    changes = np.bincount(row, minlength=count)
+    extra = np.full((count, changes.max()), maximum_amplitude)
+    place = np.arange(row.size) - np.repeat(np.cumsum(changes) - changes, changes)
+    beyond = extra.copy()
+    extra[row, place], beyond[row, place] = before, after
+    return np.sort(np.concatenate([amplitudes, extra, beyond], axis=1), axis=1)
+
+
+def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp] | None) -> dict[str, Floats]:
+    """Cells picked from two-dimensional inputs, one after the other; without columns the first."""
+    picked = {}
+    for name, values in arrays.items():
+        down = row if values.shape[0] > 1 else np.zeros_like(row)
+        across = column if column is not None and values.shape[1] > 1 else np.zeros_like(row)
+        picked[name] = values[down, across]
+    return picked
+
+
+def _bisect(
+    low: Floats, high: Floats, holds: Callable[[Floats, NDArray[np.intp]], NDArray[np.bool_]]
+) -> tuple[Floats, Floats]:
+    """Halve every interval until its ends are neighbours in double precision.
+
+    `holds` is false at `low` and true at `high`, and stays so; it is asked at amplitudes
+    together with the numbers of the intervals that they belong to.
+    """
+    low, high = low.copy(), high.copy()
+    active = np.arange(low.size)
+    while active.size:
+        middle = low[active] + 0.5 * (high[active] - low[active])
+        between = (low[active] < middle) & (middle < high[active])
+        active, middle = active[between], middle[between]
+        if active.size:
+            above = holds(middle, active)
+            high[active[above]] = middle[above]
+            low[active[~above]] = middle[~above]
+    return low, high
+
+
+def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
+    """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
+    below, above = before["permanent_displacement"], after["permanent_displacement"]
+    jumps = above - below > JUMP * above
+    other_mode = before["sliding_mode"] != after["sliding_mode"]
+    status = np.full(above.shape, LimitStatus.REACHED, np.int8)
+    status[jumps] = LimitStatus.AT_JUMP
+    status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP
+    status[np.isnan(below)] = LimitStatus.AFTER_GAP
+    return status
+
+
+def _check_memory(sizes: Mapping[str, int]) -> None:
+    """Refuse what memory cannot hold: results, inputs laid out over the grid, and their transposed copies."""
+    cells = math.prod(sizes.values())
+    needed, free = cells * 80, available_memory()
+    if free is not None and needed > free:
+        grid = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
+        raise InputError(
+            f"grid of {grid}: {number_text(float(cells))} limits take {size_text(needed)}, but {size_text(free)} of "
+            "memory is free; ask for fewer cells"
+        )

@@ -1,0 +1,160 @@
+"""A recorded motion over a grid of blocks: parameters in, a plan, a table out.
+
+A sweep over θ × μs × (given parameters) × scale goes through one kernel for each polarity;
+the factor on time needs none: everything depends on time only through t / time_scale, so that
+v ∝ time_scale and u ∝ time_scale², exactly.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from slipsweep.errors import InputError
+from slipsweep.grid import engine, threads
+from slipsweep.grid.engine import Array, Problem
+from slipsweep.grid.plans import Plan, Task, aligned, check_options, checked, grid_sizes, record_attributes
+from slipsweep.grid.tables import Variable
+from slipsweep.kernels.record import RECORD_KERNEL, History
+from slipsweep.model.parameters import check_choice
+from slipsweep.model.variables import PARAMETERS, RECORD_COUNTS, RECORD_PARAMETERS, RECORD_RESULTS, RESULT_DTYPES
+from slipsweep.motion.records import Record
+
+#: What a cell of a record takes, in cells of the cycle solver: some 2 µs against 0.1.
+_WORK_PER_CELL = 32
+
+#: Cells solved together, wanted results or not (30 bytes each).
+_SOLVED_CELLS = 65536
+
+#: How the results change with a factor on time: as its power.
+_POWERS = {"permanent_displacement": 2, "peak_relative_velocity": 1}
+
+
+def history_of(record: Record, polarity: float) -> History:
+    """A record with a polarity as the kernels want it, with its positive half waves."""
+    values = polarity * record.acceleration
+    above = np.concatenate([[False], values > 0.0, [False]])
+    edges = np.flatnonzero(above[1:] != above[:-1])
+    first, end = edges[::2], edges[1::2]
+    peaks = np.array([values[a:b].max() for a, b in zip(first, end, strict=True)], np.float64)
+    return History(
+        record.times.copy(), values, first.astype(np.int64), (end - 1).astype(np.int64), peaks, float(values.min())
+    )
+
+
+def plan_record(
+    record: Record,
+    *,
+    model: str = "mendez",
+    rise: str = "monotone",
+    recoupling: str = "eq12",
+    g: float = 9.81,
+    variables: Sequence[str] | None = None,
+    **given: Any,
+) -> Plan:
+    """Plan of the response of every block of a grid to a record.
+
+    Parameters
+    ----------
+    record, model, rise, recoupling, g, given
+        Arguments of `slipsweep.sweep_record`; arrays with dimensions of their own are `Variable`.
+    variables : sequence of str, optional
+        Names from `variables.RECORD_RESULTS`, by default all.
+
+    Raises
+    ------
+    InputError
+        As `slipsweep.sweep_record`.
+    """
+    if not isinstance(record, Record):
+        raise InputError(f"record = {record!r}: must be a Record (slipsweep.read_record, slipsweep.Record)")
+    problem = check_options(model=model, rise=rise, recoupling=recoupling, g=g)
+    wanted = tuple(RECORD_RESULTS if variables is None else variables)
+    for name in wanted:
+        check_choice("variables", name, RECORD_RESULTS)
+    polarity = _polarity(given.pop("polarity", 1))
+    known = PARAMETERS | RECORD_PARAMETERS
+    given = {"scale": 1.0, "time_scale": 1.0} | {name: values for name, values in given.items() if values is not None}
+    coords = checked({name: given[name] for name in known if name in given}, known)
+    if model == "newmark":
+        for name in ("decay_rate", "delta_mu", "minimum_friction"):
+            if name in coords:
+                raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
+    coords["polarity"] = polarity
+    sizes = grid_sizes(coords)
+    task = Task(partial(_solve, record), problem, wanted, sizes, aligned(coords, sizes))
+    return Plan(sizes, coords, (task,), wanted, record_attributes(problem, record.name, record.attrs))
+
+
+def _solve(
+    record: Record,
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+    empty: engine.Empty = np.empty,
+) -> dict[str, np.ndarray]:
+    """Solve a grid; parameters but for the record, and results, as those of `engine.solve`."""
+    factor, polarity = arrays["time_scale"], arrays["polarity"]
+    inputs = engine.cell_inputs({**arrays, "amplitude": arrays["scale"]}, len(shape))
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    # the dimensions that the kernel sees: along time_scale the laws of scaling serve, along polarity another history
+    own = tuple(max(values.shape[axis] for values in inputs) for axis in range(len(shape)))
+    rows = {str(at): values for at, values in enumerate(inputs)}
+    for side in np.ndindex(polarity.shape):
+        history = history_of(record, float(polarity[side]))
+        sided = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
+        for slab in engine.slabs(own, _SOLVED_CELLS):
+            # what of the results the slab's cells give
+            where = tuple(part if n > 1 else one for part, n, one in zip(slab, own, sided, strict=True))
+            cells = tuple(part.stop - part.start for part in slab)
+            shares = results[wanted[0]][where].size // math.prod(cells)
+            part = list(engine.cut(rows, slab).values())
+            told = None if progress is None else partial(_in_shares, progress, shares)
+            found = _solve_slab(problem, cells, part, history, told)
+            factors = engine.cut({"time_scale": factor}, where)["time_scale"]
+            for name, target in results.items():
+                values = found[name].reshape(cells)
+                target[where] = values * factors ** _POWERS[name] if name in _POWERS else values
+    return results
+
+
+def _in_shares(progress: Callable[[int], None], shares: int, cells: int) -> None:
+    """Tell of cells solved, each of which gives several of the results."""
+    progress(cells * shares)
+
+
+def _solve_slab(
+    problem: Problem,
+    cells: tuple[int, ...],
+    inputs: list[Array],
+    history: History,
+    progress: Callable[[int], None] | None,
+) -> dict[str, np.ndarray]:
+    """All results of some cells, each a row."""
+    grid = engine.layout(cells, None, [*inputs, np.ones((1,) * len(cells))])
+    rows, options, count = tuple(map(engine.flat, inputs)), problem.options(True), math.prod(cells)
+    motion, counts = np.empty((len(_POWERS), count)), np.empty((len(RECORD_COUNTS), count), np.int32)
+    validity = np.empty(count, np.int16)
+
+    def work(first: int, last: int) -> None:
+        RECORD_KERNEL(grid, first, last, rows, options, history, motion, counts, validity)
+        if progress is not None:
+            progress(last - first)
+
+    threads.spread(count, work, _WORK_PER_CELL)
+    return (
+        dict(zip(_POWERS, motion, strict=True)) | dict(zip(RECORD_COUNTS, counts, strict=True)) | {"validity": validity}
+    )
+
+
+def _polarity(given: Any) -> Variable:
+    """The signs asked for: 1, -1, both."""
+    values = np.array([1.0, -1.0]) if isinstance(given, str) and given == "both" else np.asarray(given)
+    if values.dtype.kind not in "if" or values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
+        raise InputError(f"polarity = {given!r}: must be 1, -1, a list of these, or 'both'")
+    dims = ("polarity",) if values.ndim else ()
+    return Variable(dims, values.astype(np.int8), RECORD_PARAMETERS["polarity"])
