@@ -8,8 +8,8 @@ import pytest
 from mpmath import mp, mpf
 
 from slipsweep import InputError
-from slipsweep.kernels.excitation import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TOP
-from slipsweep.motion.waveforms import MOST_RAMP, TERMS, Waveform, check_waveform, text_of, wave_of
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP
+from slipsweep.motion.waveforms import MOST_RAMP, Waveform, check_waveform, text_of, wave_of
 
 RICH = {"amplitudes": [1.0, 0.6, 0.35, 0.2], "multiples": [1, 2, 5, 50], "phases": [0.0, 40.0, 100.0, 7.0]}
 EVERY = {

@@ -43,28 +43,11 @@ from slipsweep.kernels.block import (
     slope_root,
     starting_acceleration,
 )
-from slipsweep.kernels.excitation import (
-    ARC,
-    BEGIN,
-    COEFFICIENTS,
-    DEGREE,
-    END,
-    FINISH,
-    FIRST,
-    JUMPS,
-    LAST,
-    START,
-    TOP,
-    Wave,
-    held_gain,
-    held_integrals,
-    offset_at,
-    phase_at,
-    plane,
-)
+from slipsweep.kernels.excitation import held_gain, held_integrals, offset_at, phase_at, plane
 from slipsweep.kernels.linear import exponential_moments
 from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
+from slipsweep.motion.pieces import ARC, BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
 
 #: 16 Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
 NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))

@@ -14,8 +14,8 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle, sine, step
 from slipsweep.kernels.block import TILE, Options, block_of, cell_of
-from slipsweep.kernels.excitation import Wave
 from slipsweep.kernels.lanes import LANES_SIZE
+from slipsweep.motion.pieces import Wave
 
 
 class Grid(NamedTuple):

@@ -13,10 +13,11 @@ from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle
 from slipsweep.kernels.block import NO_VALUE, Block, Options, block_at, response
 from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS
-from slipsweep.kernels.excitation import BEGIN, END, FINISH, START, Wave, held_integrals, phase_at, plane
+from slipsweep.kernels.excitation import held_integrals, phase_at, plane
 from slipsweep.kernels.train import beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS
+from slipsweep.motion.pieces import BEGIN, END, FINISH, START, Wave
 
 #: Columns of a history.
 GROUND, BLOCK, FRICTION, VELOCITY, DISPLACEMENT = range(5)

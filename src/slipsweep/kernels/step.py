@@ -58,26 +58,11 @@ from slipsweep.kernels.block import (
     starting_acceleration,
     whole_lanes,
 )
-from slipsweep.kernels.excitation import (
-    BEGIN,
-    COEFFICIENTS,
-    DEGREE,
-    END,
-    FINISH,
-    FIRST,
-    JUMPS,
-    LAST,
-    START,
-    TOP,
-    Wave,
-    from_top,
-    offset_at,
-    phase_at,
-    plane,
-)
+from slipsweep.kernels.excitation import from_top, offset_at, phase_at, plane
 from slipsweep.kernels.excitation import slope as w_slope
 from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 

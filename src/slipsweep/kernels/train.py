@@ -20,7 +20,8 @@ from slipsweep.kernels.block import (
     Options,
     stays_below_yield,
 )
-from slipsweep.kernels.excitation import BEGIN, END, FIRST, LAST, Wave, offset_at
+from slipsweep.kernels.excitation import offset_at
+from slipsweep.motion.pieces import BEGIN, END, FIRST, LAST, Wave
 
 
 class Pulse(NamedTuple):

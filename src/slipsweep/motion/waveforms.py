@@ -14,7 +14,7 @@ harmonics    Σ aₖ sin(mₖφ + pₖ) over its own largest magnitude
 A ramp multiplies it by an envelope that grows linearly from 0 over the first `ramp_in` cycles, and
 falls to 0 over the last `ramp_out`; A is the peak without it.
 
-How a solver uses the pieces.  `wave_of` gives a `kernels.excitation.Wave`: the shaking cut where w jumps,
+How a solver uses the pieces.  `wave_of` gives a `pieces.Wave`: the shaking cut where w jumps,
 bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece (and further
 where a smooth one would be too long for its polynomial).  `kernels.excitation` evaluates a piece
 (`plane`, `from_top`, `slope`), integrates it (`held_integrals`) and inverts it (`offset_at`); τ, the
@@ -34,25 +34,22 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import WAVEFORMS, check_choice, check_whole, number_text
-
-if TYPE_CHECKING:
-    from slipsweep.kernels.excitation import Wave
+from slipsweep.motion.pieces import ARC, BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP, Wave
 
 #: Largest multiple of a harmonic, and longest ramp in cycles (each of its cycles has pieces of its own).
 MOST_MULTIPLE = 100
 MOST_RAMP = 100
 
-#: Longest piece of a smooth wave, in radians of its fastest harmonic, and terms of its Taylor series
-#: about the anchor: the first one left out is below 1e-18.
+#: Longest piece of a smooth wave, in radians of its fastest harmonic: the first term of its Taylor series
+#: beyond `pieces.TERMS` is below 1e-18.
 _LONGEST = 0.5 * math.pi
-TERMS = 22
 
 #: Points of a cycle closer than this, as parts of it, are one.
 _SAME = 1e-12
@@ -432,22 +429,8 @@ def _smooth_pieces(period: _Period, i: int, low: float, high: float, envelope: t
 
 
 @functools.lru_cache(maxsize=32)
-def wave_of(waveform: Waveform, cycles: int) -> "Wave":
+def wave_of(waveform: Waveform, cycles: int) -> Wave:
     """The table of pieces of `cycles` cycles of a waveform."""
-    from slipsweep.kernels.excitation import (  # here: to check a sweep file takes no numba
-        ARC,
-        BEGIN,
-        DEGREE,
-        END,
-        FINISH,
-        FIRST,
-        JUMPS,
-        LAST,
-        START,
-        TOP,
-        Wave,
-    )
-
     plain = _pieces(Waveform(waveform.name, waveform.amplitudes, waveform.multiples, waveform.phases), 1, 0)
     wraps = plain[0].first > 0.0 and plain[-1].last > 0.0
     # a stretch that runs over from one cycle to the next makes the first cycle differ from the others
