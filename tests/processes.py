@@ -28,6 +28,7 @@ def slipsweep(
         env={**clean, **(environment or {})},
         capture_output=True,
         encoding="utf-8",
+        errors="surrogateescape",  # names of files may have any bytes
         timeout=TIMEOUT,
         check=False,
         preexec_fn=preexec_fn,

@@ -13,11 +13,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.files.names import open_netcdf
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
 
@@ -58,7 +58,7 @@ class Result:
         if not path.is_file():
             raise InputError(f"{path}: no such file")
         try:
-            self._file = netCDF4.Dataset(path)
+            self._file = open_netcdf(path)
         except (OSError, RuntimeError) as error:
             raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
         try:

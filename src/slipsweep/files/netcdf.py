@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import check_output, complete_or_absent, writing
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
@@ -34,7 +35,7 @@ RECORD_DIM = "record_sample"
 def new_file(temporary: Path, path: Path) -> Iterator[netCDF4.Dataset]:
     """Open a new netCDF file, and close it whatever happens."""
     with writing(path):
-        file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
+        file = open_netcdf(temporary, "w")
     file.set_fill_off()  # every value is written: filling the file first would write it twice
     try:
         yield file
@@ -90,7 +91,8 @@ def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[st
     for name, value in attributes.items():
         if isinstance(value, str):
             # as bytes: the library would write text beyond ASCII as a netCDF string
-            target.setncattr(name, value.encode())
+            # (a name with bytes that are no UTF-8 has them spelled out)
+            target.setncattr(name, value.encode(errors="backslashreplace"))
         elif name in ("flag_values", "flag_masks"):
             target.setncattr(name, np.asarray(value, target.dtype))
         elif isinstance(value, int):
@@ -253,7 +255,7 @@ def open_result(path: Path) -> Iterator[netCDF4.Dataset]:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     try:
-        file = netCDF4.Dataset(path)
+        file = open_netcdf(path)
     except (OSError, RuntimeError) as error:
         raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
     with file:
@@ -309,7 +311,7 @@ def stored_tally(path: Path) -> Tally:
     """Count what is in a file, or in the files of a folder."""
     tally = Tally()
     for name in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with netCDF4.Dataset(name) as file:
+        with open_netcdf(name) as file:
             tally.merge(_count(file))
     return tally
 

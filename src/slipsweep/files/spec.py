@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from slipsweep.errors import InputError
+from slipsweep.files.names import open_netcdf
 from slipsweep.grid.tables import Variable
 from slipsweep.model.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
 from slipsweep.model.suggest import did_you_mean
@@ -377,10 +378,8 @@ def load(path: str | Path) -> SweepSpec:
 
 
 def _load_result(path: Path) -> SweepSpec:
-    import netCDF4
-
     try:
-        with netCDF4.Dataset(path) as file:
+        with open_netcdf(path) as file:
             attributes = {name: str(file.getncattr(name)) for name in file.ncattrs()}
             kept = RECORD_SAMPLES.keys() <= file.variables.keys()
             times, acceleration = (np.asarray(file[name][...]) if kept else None for name in RECORD_SAMPLES)

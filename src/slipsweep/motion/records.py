@@ -174,7 +174,7 @@ def read_record(
             f"{path}: units: must be given, one of {', '.join(map(repr, UNITS))}: the file does not name the unit"
         )
     attrs = {
-        "record": path.name,
+        "record": path.name.encode(errors="backslashreplace").decode(),
         "record_format": kind,
         "record_units": unit,
         **({} if channel is None else {"record_channel": str(channel)}),

@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
+from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import Tally, history_of, rounded, stored_tally
 from slipsweep.files.outputs import appear, check_output, sync, writing
 from slipsweep.files.spec import SweepSpec
@@ -346,7 +346,7 @@ class _Files:
             raise  # no damage
         except OSError:
             return None
-        with netCDF4.Dataset(self._name(number)) as file:
+        with open_netcdf(self._name(number)) as file:
             file.set_auto_maskandscale(False)
             return {name: np.asarray(file[name][...]) for name in self.spec.output.variables}
 

@@ -1,0 +1,72 @@
+"""Names of files: what the system takes for a name is read and written by it, or refused in one line."""
+
+import os
+import sys
+from pathlib import Path
+
+import netCDF4
+import pytest
+from processes import slipsweep
+
+from slipsweep.cli import main
+
+CELL = "".join(
+    f"[axes.{name}]\nvalues = {values}\n"
+    for name, values in (("theta", [0, 5]), ("mu_s", [0.4]), ("amplitude", [3, 6]), ("frequency", [1, 2]))
+)
+
+#: Stems that the netCDF library, a shell or a terminal might take for something else.
+STEMS = [
+    b" blank in front", b"\ttab", b"[mode=zarr]", b"http:x", b"s3:x#mode=zarr", b"a#mode=bytes", b"no \xff UTF-8",
+    "ü".encode(), b"new\nline", b"\x1b[31m", b"%p", b"$HOME", b"~", b"-o", b"a'\"b",
+]  # fmt: skip
+
+
+def failed(done: object) -> str:
+    """The one line of an error."""
+    assert (done.returncode, done.stdout) in ((1, ""), (2, "")), done  # type: ignore[attr-defined]
+    text = str(done.stderr)  # type: ignore[attr-defined]
+    assert text.startswith("slipsweep: error: ")
+    assert text.count("\n") == 1
+    assert text[:-1].isprintable()
+    return text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its names are UTF-16 and may not hold these")
+@pytest.mark.parametrize("stem", STEMS, ids=ascii)
+def test_a_result_has_the_name_that_was_given(tmp_path: Path, stem: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that another file would be taken for is there as well, and is left alone."""
+    folder = tmp_path / os.fsdecode(stem)
+    folder.mkdir()
+    name = os.fsdecode(stem + b".nc")
+    decoys = {os.fsdecode(stem.strip() + b".nc"), "x.nc"} - {name}
+    for decoy in decoys:
+        (folder / decoy).write_text("not netCDF")
+    (folder / "a.toml").write_text(CELL)
+    before = {*os.listdir(folder)}
+    monkeypatch.chdir(folder)
+    assert slipsweep(folder, "run", "a.toml", f"--output={name}", "--quiet").returncode == 0
+    assert {*os.listdir(folder)} - before == {name}
+    for decoy in decoys:
+        assert (folder / decoy).read_text() == "not netCDF"
+    os.link(folder / name, tmp_path / "plain.nc")
+    with netCDF4.Dataset(tmp_path / "plain.nc") as file:
+        assert file["permanent_displacement"].shape == (2, 1, 2, 2)
+    for command in (
+        ["info"],
+        ["export", "-o", "a.csv"],
+        ["chart", "-o", "a.png", "-k", "contours"],
+        ["run", "-o", "b.nc"],
+    ):
+        assert main([*command, "--", name]) == 0
+
+
+def test_a_backslash_is_refused_by_name(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(CELL)
+    message = "the netCDF library takes no backslash in a name"
+    assert message in failed(slipsweep(tmp_path, "run", "a.toml", "-o", "b\\c.nc"))
+    assert os.listdir(tmp_path) == ["a.toml"]
+    slipsweep(tmp_path, "run", "a.toml")
+    (tmp_path / "a.nc").rename(tmp_path / "b\\c.nc")
+    for command in (["info"], ["export", "-o", "a.csv"], ["chart"], ["run", "-o", "b.nc"]):
+        assert message in failed(slipsweep(tmp_path, *command, "b\\c.nc"))
