@@ -125,3 +125,26 @@ def test_cells_do_not_depend_on_their_neighbours(wave: str) -> None:
     for i in (0, 17, 59):
         alone = slipsweep.sweep(theta=18.0, mu_s=0.34, amplitude=whole.amplitude.values[i], **options)
         assert float(alone.permanent_displacement) == float(whole.permanent_displacement[i])
+
+
+#: Waves whose slide runs past the end of a cycle into the next one; with a ramp, one that enters the repeated cycle.
+RUNS_OVER: tuple[dict[str, Any], ...] = (
+    {"harmonics": "1:1:180"},
+    {"harmonics": "1:1:180", "ramp_in": 1.5},
+    {"harmonics": "1:1:180", "ramp_in": 2.0, "ramp_out": 1.0},
+    {"harmonics": "1:1:200,0.3:3:0"},
+    {"harmonics": "1:2:180,0.4:5:90"},
+)
+
+
+@pytest.mark.parametrize("given", OPTIONS, ids=str)
+@pytest.mark.parametrize("wave", RUNS_OVER, ids=str)
+def test_slides_that_run_past_the_end_of_a_cycle(wave: dict[str, Any], given: dict[str, Any]) -> None:
+    """A cycle that does not begin at rest does not stand for those that begin otherwise."""
+    block: dict[str, Any] = {"theta": [0.0, 4.0], "mu_s": 0.57, "yield_acceleration": 0.73, "frequency": 1.0}
+    block |= {"amplitude": [1.7, 2.6, 3.4], "waveform": "harmonics", "cycles": 10}
+    exact = slipsweep.sweep(**block, **wave, **given, solver="cycle")
+    found = slipsweep.sweep(**block, **wave, **given, solver="step", rule="simpson", steps_per_cycle=2048)
+    np.testing.assert_array_equal(found.validity, exact.validity)
+    for name in ("permanent_displacement", "peak_relative_velocity"):
+        np.testing.assert_allclose(found[name], exact[name], rtol=1e-7, err_msg=name)

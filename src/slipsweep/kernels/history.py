@@ -11,12 +11,12 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle
-from slipsweep.kernels.block import NO_VALUE, Block, Options, block_at, response
+from slipsweep.kernels.block import Block, Options, block_at, response
 from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
 from slipsweep.kernels.train import beginning, first_pulse
 from slipsweep.model import equations as eq
-from slipsweep.model.equations import CONTINUOUS
+from slipsweep.model.equations import CONTINUOUS, STICK_SLIP
 from slipsweep.motion.pieces import BEGIN, END, FINISH, START, Wave
 
 #: Columns of a history.
@@ -151,11 +151,9 @@ def _history(cells: np.ndarray, options: Options, wave: Wave, phases: np.ndarray
     history[:] = 0.0
     ground_history(block, options, wave, phases, history)
     history[:, BLOCK] = history[:, GROUND]
-    if block.validity & NO_VALUE:
-        history[:, BLOCK:] = math.nan
-    elif block.sliding_mode == CONTINUOUS:
+    if block.sliding_mode == CONTINUOUS:
         continuous_history(block, options, wave, phases, history)
-    elif block.amplitude > block.yield_acceleration:
+    elif block.sliding_mode == STICK_SLIP:
         stick_slip_history(block, options, wave, phases, history)
     for at in range(phases.size):
         history[at, FRICTION] = eq.mobilised_friction(

@@ -644,12 +644,12 @@ def sided_slip(block: Block, wave: Wave, p: int, x: float) -> float:
 
 #: The first rows of the lanes' states, and the rows of the lanes beside the block's: D (or E) at the last node,
 #: whether something happens in the step, whether the cell goes on without the lanes, |w| up to which
-#: friction is a layer thinner than steps, V, W and the largest V before the cycle.  Row + j is cell j.
+#: friction is a layer thinner than steps, W, V, b and the largest V before the cycle.  Row + j is cell j.
 _VELOCITY, _DISPLACEMENT, _HELD, _PEAK, _LEAST, _SLIDES, _FOLLOWS = range(0, 7 * TILE, TILE)
-_ASKED, _HAPPENS, _ALONE, _THIN, _BEFORE, _BEFORE_V, _BEFORE_PEAK, _GAIN = range(
-    LANE_ROWS * TILE, (LANE_ROWS + 8) * TILE, TILE
+_ASKED, _HAPPENS, _ALONE, _THIN, _BEFORE, _BEFORE_V, _BEFORE_HELD, _BEFORE_PEAK, _GAIN = range(
+    LANE_ROWS * TILE, (LANE_ROWS + 9) * TILE, TILE
 )
-_LANE_SIZE = (LANE_ROWS + 8) * TILE
+_LANE_SIZE = (LANE_ROWS + 9) * TILE
 
 
 @scalar
@@ -840,11 +840,16 @@ def stick_slip_lanes(
         if c == wave.lead and wave.repeats > 0:
             times = wave.repeats + (1.0 if wave.alike else 0.0)
         for j in range(whole):
-            lanes[_BEFORE + j] = states[_DISPLACEMENT + j]
+            lanes[_BEFORE + j], lanes[_BEFORE_V + j] = states[_DISPLACEMENT + j], states[_VELOCITY + j]
+            lanes[_BEFORE_HELD + j] = states[_HELD + j] if states[_SLIDES + j] > 0.0 else 0.0
         stick_slip_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
         for j in range(whole):
             before = lanes[_BEFORE + j]
             states[_DISPLACEMENT + j] = before + times * (states[_DISPLACEMENT + j] - before)
+            # one cycle stands for all only if it ends in the state in which it began
+            held = states[_HELD + j] if states[_SLIDES + j] > 0.0 else 0.0
+            if times > 1.0 and (states[_VELOCITY + j] != lanes[_BEFORE_V + j] or held != lanes[_BEFORE_HELD + j]):
+                set_aside(lanes, states, j)
         if c == wave.lead and wave.alike:
             break
     highest = 0.0

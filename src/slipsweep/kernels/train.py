@@ -131,6 +131,8 @@ def train_of(
             before = velocity
             now, after = pulses(block, options, wave, table, k, wave.cycle[wave.lead + 1], before)
             validity |= now.validity
+            if validity & NO_VALUE:
+                break
             velocity = now.velocity
             displacement += now.displacement
             peak = max(peak, now.peak)

@@ -13,7 +13,7 @@ from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history
 from slipsweep.model.parameters import check_whole
-from slipsweep.model.variables import HISTORY, PARAMETERS
+from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
 from slipsweep.motion.waveforms import wave_of
 
 
@@ -30,10 +30,13 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
     omega = 2.0 * math.pi * float(own["frequency"])
     cells = np.repeat([float(values) for values in engine.cell_inputs(own, 0)], TILE)
     wave = wave_of(problem.waveform, problem.cycles)
+    valueless = int(summary["validity"].item()) & VALUELESS
 
     def sampled(phases: np.ndarray) -> np.ndarray:
         table = np.empty((phases.size, len(HISTORY)))
         history(cells, problem.options(True), wave, phases, table)
+        if valueless:  # from the beginning on, also where the flag is raised later
+            table[:, 1:] = math.nan
         return table
 
     if times is None:
