@@ -6,7 +6,7 @@ A task can be cut into parts; solved at once or part by part, it gives the same 
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,6 +29,10 @@ from slipsweep.model.parameters import (
     SOLVERS,
     STEPS_PER_CYCLE,
     check_choice,
+    check_choices,
+    check_given,
+    check_progress,
+    check_single,
     check_values,
     check_whole,
     number_text,
@@ -115,6 +119,9 @@ class Plan:
     names: tuple[str, ...]
     attrs: dict[str, Any]
 
+    def __post_init__(self) -> None:
+        check_dimensions(self.sizes, self.coords, self.names)
+
     def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
         """Compute everything at once; `progress` and `empty` as in `engine.solve`.
 
@@ -123,7 +130,10 @@ class Plan:
         InputError
             The results do not fit in memory.
         """
-        sizes = max((task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()))
+        check_progress(progress)
+        sizes: dict[str, int] = max(
+            (task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()), default={}
+        )
         check_memory(sizes, sum(task.nbytes for task in self.tasks))
         # all tasks cover the same cells: one of them counts
         return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
@@ -165,10 +175,9 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
     parameters = {name: given.pop(name) for name in PARAMETERS if given.get(name) is not None}
     if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
         raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
-    if "frequency" not in parameters:
-        raise InputError("frequency: must be given")
+    check_given(parameters, ("theta", "mu_s", "frequency"))
     problem = check_options(**{name: value for name, value in given.items() if name not in PARAMETERS})
-    wanted = check_variables(variables)
+    wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
     coords = checked(parameters)
     if "displacement_amplitude" in coords:
         coords["amplitude"] = _amplitude(coords["displacement_amplitude"], coords["frequency"])
@@ -195,6 +204,7 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
 def plan_friction_parameters(*, g: float, **given: Any) -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
     problem = check_options(g=g)
+    check_given(given, ("theta", "mu_s", "amplitude"))
     coords = checked({name: values for name, values in given.items() if values is not None})
     names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
@@ -227,28 +237,8 @@ def check_options(
         solver=check_choice("solver", solver, SOLVERS),
         rule=check_choice("rule", rule, RULES),
         steps_per_cycle=check_whole("steps_per_cycle", steps_per_cycle, 8, MOST_STEPS, multiple_of=4),
-        g=_single("g", g),
+        g=check_single("g", g),
     )
-
-
-def check_variables(variables: Sequence[str] | None) -> tuple[str, ...]:
-    """The names of the results wanted, in the order of `variables.RESULTS`."""
-    if variables is None:
-        return DEFAULT_RESULTS
-    if isinstance(variables, str):
-        raise InputError(f"variables = {variables!r}: must be a list of names")
-    for name in variables:
-        check_choice("variables", name, RESULTS)
-    if not len(variables):
-        raise InputError(f"variables = {variables!r}: must name one of {', '.join(map(repr, RESULTS))} at least")
-    return tuple(name for name in RESULTS if name in variables)
-
-
-def _single(name: str, value: Any) -> float:
-    values = check_values(name, value)
-    if values.ndim:
-        raise InputError(f"{name} = {value!r}: must be a single number")
-    return float(values)
 
 
 def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]] = PARAMETERS) -> dict[str, Variable]:
@@ -257,6 +247,8 @@ def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]
     for name, given in parameters.items():
         if isinstance(given, Variable):
             variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **known[name]})
+            if len(set(given.dims)) < len(given.dims):
+                raise InputError(f"{name}: dimensions {', '.join(given.dims)}: must be named each once")
         else:
             values = check_values(name, given)
             if values.ndim > 1:
@@ -284,6 +276,15 @@ def _amplitude(displacement_amplitude: Variable, frequency: Variable) -> Variabl
             f"displacement_amplitude = {number_text(float(worst))}: (2 pi frequency)^2 of it is no finite number"
         )
     return Variable(tuple(sizes), values, PARAMETERS["amplitude"])
+
+
+def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, Variable], results: Collection[str]) -> None:
+    """Refuse dimensions, which DataArrays name as they like, that no dataset can have beside what is in it."""
+    for dim in sizes:
+        if dim in results:
+            raise InputError(f"{dim}: is the name of a result: must not be that of a dimension as well")
+        if dim in coords and dim not in coords[dim].dims:
+            raise InputError(f"{dim}: is a dimension of another parameter: must have values along it")
 
 
 def grid_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:

@@ -4,8 +4,11 @@
 """
 
 import math
-from collections.abc import Collection
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
+from decimal import Decimal
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -73,6 +76,65 @@ def number_text(value: float) -> str:
     return repr(value).removesuffix(".0")
 
 
+def shown(value: Any) -> str:
+    """A value as an error shows it: one line, and not a long one."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 160 else f"{text[:157]}..."
+
+
+def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
+    """Return `values` as float64; every number that a caller gives comes through here.
+
+    Raises
+    ------
+    InputError
+        They are no real numbers, or entries of them are masked: a masked entry has a number, but means none.
+    """
+    array: Any = computed(values)
+    among = array if isinstance(array, (list, tuple)) else [array]
+    masked = sum(int(np.ma.count_masked(one)) for one in among if isinstance(one, np.ma.MaskedArray))
+    if masked:
+        size = np.size(array) if among is not array else len(array)
+        raise InputError(f"{key}: {masked} of {size} values are masked: must be numbers, every one of them")
+    try:
+        array = np.asarray(array)
+        exact = array.dtype == object and all(isinstance(one, (Real, Decimal)) for one in array.flat)
+        if array.dtype.kind not in "iuf" and not exact:
+            raise TypeError
+        with np.errstate(over="ignore"):  # what is beyond double precision becomes infinite, and is refused as such
+            return np.asarray(array.astype(np.float64))
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{key} = {shown(values)}: must be a number, or an array of numbers") from None
+
+
+def computed(values: Any) -> Any:
+    """What lies within a lazy array or one of xarray, masks with it, which `numpy.asarray` would drop."""
+    xarray = sys.modules.get("xarray")  # is loaded if one of its arrays is here
+    if xarray and isinstance(values, (xarray.DataArray, xarray.Variable)):
+        values = values.data
+    dask = sys.modules.get("dask.array")
+    return values.compute() if dask and isinstance(values, dask.Array) else values
+
+
+def check_single(name: str, value: Any, key: str | None = None) -> float:
+    """Return a single number within the bounds of parameter `name`, called `key` in errors."""
+    values = check_values(name, value, key)
+    if values.ndim:
+        raise InputError(f"{key or name} = {shown(value)}: must be a single number")
+    return float(values)
+
+
+def check_finite(key: str, value: Any) -> float:
+    """Return a single finite number of whatever sign."""
+    try:
+        number = check_numbers(key, value)
+    except InputError:
+        number = np.array(np.nan)
+    if number.ndim or not np.isfinite(number):
+        raise InputError(f"{key} = {shown(value)}: must be a finite number")
+    return float(number)
+
+
 def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.float64]:
     """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors.
 
@@ -81,13 +143,7 @@ def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.f
     InputError
         Naming the parameter, the first value that is not allowed, and what is.
     """
-    try:
-        array = np.asarray(values)
-        if array.dtype.kind not in "iufb":
-            raise TypeError
-        array = array.astype(np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{key or name} = {values!r}: must be a number, or an array of numbers") from None
+    array = check_numbers(key or name, values)
     bound = BOUNDS[name]
     wrong = ~bound.holds(array)
     if wrong.any():
@@ -95,24 +151,62 @@ def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.f
     return array
 
 
+def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:
+    """Refuse to go on without a parameter that has no default; None is none."""
+    for name in names:
+        if given.get(name) is None:
+            raise InputError(f"{name}: must be given")
+
+
 def check_choice(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return `value` if it is one of `allowed`; InputError otherwise."""
-    if value not in allowed:
-        raise InputError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}")
+    if not isinstance(value, str) or value not in allowed:
+        raise InputError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, allowed))}")
     return str(value)
+
+
+def check_choices(name: str, values: Any, allowed: Collection[str]) -> tuple[str, ...]:
+    """Return which of `allowed` a caller names, one at least, in the order of `allowed`."""
+    entries = list(values) if isinstance(values, (set, frozenset)) else check_list(name, values, "names")
+    wanted = [check_choice(name, value, allowed) for value in entries]
+    if not wanted:
+        raise InputError(f"{name} = []: must name one of {', '.join(map(repr, allowed))} at least")
+    return tuple(one for one in allowed if one in wanted)
+
+
+def check_list(key: str, values: Any, what: str) -> list[Any]:
+    """Return what stands in a list, an array or anything else that has an order."""
+    if isinstance(values, Iterable) and not isinstance(values, (str, bytes, Mapping, Set)):
+        try:
+            return list(values)
+        except TypeError:  # an array without dimensions
+            pass
+    raise InputError(f"{key} = {shown(values)}: must be a list of {what}")
+
+
+def check_progress(progress: Any) -> Callable[[int], None] | None:
+    """Return what is to be told of progress, if it can be called."""
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress = {shown(progress)}: must be a function of a number of cells")
+    told: Callable[[int], None] | None = progress
+    return told
 
 
 def check_whole(name: str, value: Any, least: int, most: int | None = None, multiple_of: int = 1) -> int:
     """Return `value` as an int if it is a whole number from `least` to `most`, and a multiple of `multiple_of`."""
     kind = "a whole number" if multiple_of == 1 else f"a multiple of {multiple_of}"
-    try:
-        if isinstance(value, (bool, str)) or float(value) != math.floor(float(value)):
-            raise ValueError
-        whole = int(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} = {value!r}: must be {kind} >= {least}") from None
+    if isinstance(value, int) and not isinstance(value, bool):
+        whole = value  # which may have more digits than a double
+    else:
+        try:
+            number = check_finite(name, value)
+        except InputError:
+            number = math.nan
+        if not number.is_integer():
+            raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
+        whole = int(number)
     if whole < least or whole % multiple_of:
-        raise InputError(f"{name} = {value!r}: must be {kind} >= {least}")
+        raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
     if most is not None and whole > most:
-        raise InputError(f"{name} = {value!r}: must be {kind} <= {most}")
+        raise InputError(f"{name} = {shown(value)}: must be {kind} <= {most}")
     return whole

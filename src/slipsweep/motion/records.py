@@ -20,7 +20,7 @@ hundred packages along.  Values in COSMOS files need no blanks between them: the
 import hashlib
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_choice
+from slipsweep.model.parameters import check_choice, check_finite, check_numbers, check_whole, shown
 
 Floats = NDArray[np.float64]
 
@@ -75,12 +75,15 @@ class Record:
     attrs: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        try:
-            times, acceleration = (np.array(values, np.float64) for values in (self.times, self.acceleration))
-        except (TypeError, ValueError):
-            raise InputError(f"{self.name}: times and acceleration must be two rows of numbers") from None
+        if not isinstance(self.name, str) or not isinstance(self.attrs, Mapping):
+            raise InputError(f"name = {shown(self.name)}, attrs = {shown(self.attrs)}: must be a text and a mapping")
+        times, acceleration = (
+            check_numbers(f"{self.name}: {what}", values)
+            for what, values in (("times", self.times), ("acceleration", self.acceleration))
+        )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "acceleration", acceleration)
+        object.__setattr__(self, "attrs", dict(self.attrs))
         if times.ndim != 1 or times.shape != acceleration.shape:
             raise InputError(
                 f"{self.name}: times {times.shape} and acceleration {acceleration.shape}: must be rows of equal length"
@@ -99,18 +102,21 @@ class Record:
     @classmethod
     def sampled(cls, acceleration: ArrayLike, interval: float, name: str = "record") -> "Record":
         """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
-        if not (math.isfinite(interval) and interval > 0.0):
+        step = check_finite("interval", interval)
+        if step <= 0.0:
             raise InputError(f"interval = {interval!r}: must be a finite number > 0")
-        values = np.array(acceleration, np.float64)
-        return cls(_even(values.size, interval), values, name)
+        values = check_numbers("acceleration", acceleration)
+        return cls(_even(values.size, step), values, name)
 
     def corrected(self, baseline: str) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
         check_choice("baseline", baseline, BASELINES)
-        shape = {"none": self.acceleration, "mean": self.acceleration - self.acceleration.mean()}.get(baseline)
-        if shape is None:
-            line = np.polynomial.Polynomial.fit(self.times, self.acceleration, 1)
-            shape = self.acceleration - line(self.times)
+        shape = self.acceleration
+        with np.errstate(all="ignore"):  # what is not finite then is refused
+            if baseline == "mean":
+                shape = shape - shape.mean()
+            elif baseline == "linear":
+                shape = shape - np.polynomial.Polynomial.fit(self.times, shape, 1)(self.times)
         return replace(self, acceleration=shape, attrs=self.attrs | {"baseline": baseline})
 
 
@@ -146,17 +152,24 @@ def read_record(
     InputError
         The file cannot be read, or something in it is no record: with the number of the line.
     """
-    path = Path(path)
+    try:
+        path = Path(path)
+    except TypeError:
+        raise InputError(f"path = {shown(path)}: must be a path") from None
     check_choice("baseline", baseline, BASELINES)
     check_choice("file_format", file_format, FORMATS)
     if units is not None:
         check_choice("units", units, UNITS)
+    if channel is not None:
+        channel = check_whole("channel", channel, 1)
     try:
         if path.stat().st_size > MOST_BYTES:
             raise InputError(f"{path}: {path.stat().st_size} bytes: a record must have {MOST_BYTES} at most")
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a name that no system has
+        raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
     # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     kind = _format_of(lines) if file_format == "auto" else file_format

@@ -40,7 +40,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import WAVEFORMS, check_choice, check_whole, number_text
+from slipsweep.model.parameters import (
+    WAVEFORMS,
+    check_choice,
+    check_finite,
+    check_list,
+    check_whole,
+    number_text,
+    shown,
+)
 from slipsweep.motion.pieces import ARC, BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP, Wave
 
 #: Largest multiple of a harmonic, and longest ramp in cycles (each of its cycles has pieces of its own).
@@ -144,9 +152,9 @@ def check_waveform(
     if (name == "harmonics") != (harmonics is not None):
         if harmonics is None:
             raise InputError("harmonics: must be given with waveform = 'harmonics'")
-        raise InputError(f"harmonics = {harmonics!r}: not allowed with waveform = {name!r}, only with 'harmonics'")
+        raise InputError(f"harmonics = {shown(harmonics)}: not allowed with waveform = {name!r}, only with 'harmonics'")
     amplitudes, multiples, phases = ((), (), ()) if harmonics is None else _harmonics(harmonics)
-    ramps = [_number(key, value) for key, value in (("ramp_in", ramp_in), ("ramp_out", ramp_out))]
+    ramps = [check_finite(key, value) for key, value in (("ramp_in", ramp_in), ("ramp_out", ramp_out))]
     for key, ramp in zip(("ramp_in", "ramp_out"), ramps, strict=True):
         if not 0.0 <= ramp <= MOST_RAMP:
             raise InputError(f"{key} = {number_text(ramp)}: must be 0 to {MOST_RAMP} cycles")
@@ -160,38 +168,27 @@ def check_waveform(
     return checked
 
 
-def _number(key: str, value: Any) -> float:
-    try:
-        if isinstance(value, (bool, str)) or not math.isfinite(number := float(value)):
-            raise ValueError
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{key} = {value!r}: must be a finite number") from None
-    return number
-
-
 def _harmonics(given: Any) -> tuple[tuple[float, ...], tuple[int, ...], tuple[float, ...]]:
     """Amplitudes, multiples and phases."""
     if isinstance(given, str):
         given = _parsed(given)
     keys = ("amplitudes", "multiples", "phases")
     if not isinstance(given, Mapping) or not {"amplitudes", "multiples"} <= set(given) <= set(keys):
-        raise InputError(f"harmonics = {given!r}: must have amplitudes, multiples and, if wanted, phases")
-    columns = {}
-    for key, values in given.items():
-        if isinstance(values, str) or not isinstance(values, (Iterable, np.ndarray)):
-            raise InputError(f"harmonics.{key} = {values!r}: must be a list of numbers")
-        columns[key] = list(values)
+        raise InputError(f"harmonics = {shown(given)}: must have amplitudes, multiples and, if wanted, phases")
+    columns = {key: check_list(f"harmonics.{key}", values, "numbers") for key, values in given.items()}
     count = len(columns["amplitudes"])
     for key, column in columns.items():
         if len(column) != count or not count:
             raise InputError(f"harmonics.{key}: {len(column)} numbers; must be as many as amplitudes, one at least")
-    amplitudes = tuple(_number(f"harmonics.amplitudes[{i}]", x) for i, x in enumerate(columns["amplitudes"]))
+    amplitudes = tuple(check_finite(f"harmonics.amplitudes[{i}]", x) for i, x in enumerate(columns["amplitudes"]))
     multiples = tuple(
         check_whole(f"harmonics.multiples[{i}]", x, 1, MOST_MULTIPLE) for i, x in enumerate(columns["multiples"])
     )
     if len(set(multiples)) < count:
         raise InputError(f"harmonics.multiples = {list(multiples)}: must not be repeated")
-    phases = tuple(_number(f"harmonics.phases[{i}]", x) for i, x in enumerate(columns.get("phases", [0.0] * count)))
+    phases = tuple(
+        check_finite(f"harmonics.phases[{i}]", x) for i, x in enumerate(columns.get("phases", [0.0] * count))
+    )
     return amplitudes, multiples, phases
 
 

@@ -6,17 +6,19 @@ with DataArrays are kept, and `chunks` makes a dask graph of a plan's tasks.
 
 import itertools
 import operator
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
 from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import STEPS_PER_CYCLE
-from slipsweep.model.variables import RESULT_DTYPES
+from slipsweep.model.parameters import STEPS_PER_CYCLE, computed, shown
+from slipsweep.model.variables import RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.records import Record
 from slipsweep.studies.history import history_table
 from slipsweep.studies.limits import AMPLITUDE_STEPS, limit_table
@@ -153,7 +155,7 @@ def sweep(
         g=g,
         variables=variables,
     )
-    brought = _brought(given, plan.coords)
+    brought = _brought(given, plan.coords, plan.names)
     return _dataset(plan.solve(progress) if chunks is None else _lazy(plan, chunks), brought)
 
 
@@ -194,7 +196,8 @@ def friction_parameters(
         "minimum_friction": minimum_friction,
     }
     plan = plan_friction_parameters(**_plain(given), g=g)
-    return _dataset(plan.solve(), _brought(given, plan.coords))
+    brought = _brought(given, plan.coords, plan.names)
+    return _dataset(plan.solve(), brought)
 
 
 def simulate(
@@ -355,7 +358,8 @@ def sweep_record(
         g=g,
         variables=variables,
     )
-    return _dataset(plan.solve(progress), _brought(given, plan.coords))
+    brought = _brought(given, plan.coords, plan.names)
+    return _dataset(plan.solve(progress), brought)
 
 
 def limit_amplitude(
@@ -453,7 +457,7 @@ def limit_amplitude(
         amplitude_steps=amplitude_steps,
         progress=progress,
     )
-    return _dataset(table, _brought(given, table.coords))
+    return _dataset(table, _brought(given, table.coords, table.data_vars))
 
 
 def sample(
@@ -576,37 +580,53 @@ def sample(
         rule=rule,
         g=g,
     )
-    return _dataset(plan.solve(progress), _brought(given, plan.coords))
+    brought = _brought(given, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
+    return _dataset(plan.solve(progress), brought)
 
 
 def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters without xarray: DataArrays (computed, where they are lazy) as `Variable`."""
+    """The parameters without xarray: its arrays (computed, where they are lazy) as `Variable`."""
     return {
-        name: Variable(tuple(map(str, values.dims)), values.values, {str(key): x for key, x in values.attrs.items()})
-        if isinstance(values, xr.DataArray)
+        name: Variable(tuple(map(str, values.dims)), computed(values), {str(key): x for key, x in values.attrs.items()})
+        if isinstance(values, (xr.DataArray, xr.Variable))
         else values
         for name, values in given.items()
     }
 
 
-def _brought(given: Mapping[str, Any], coords: Mapping[str, Variable]) -> dict[Hashable, xr.DataArray]:
-    """Coordinates that the DataArrays among the parameters brought along; they must agree."""
-    brought: dict[Hashable, xr.DataArray] = {}
+def _brought(
+    given: Mapping[str, Any], coords: Mapping[str, Variable], results: Collection[str]
+) -> dict[Hashable, xr.Variable]:
+    """Coordinates that the DataArrays among the parameters brought along; they must agree.
+
+    The levels of stacked coordinates come along as coordinates of their own; their tuples, which the levels
+    say again and no file can hold, do not.
+    """
+    brought: dict[Hashable, xr.Variable] = {}
+    dims = {dim for variable in coords.values() for dim in variable.dims}
     for parameter, array in given.items():
         if not isinstance(array, xr.DataArray):
             continue
+        stacked = [name for name, index in array.xindexes.items() if isinstance(index, PandasMultiIndex)]
         for name, coordinate in array.coords.items():
-            known: xr.Variable | None = brought[name].variable if name in brought else None
+            if name in stacked and name in array.dims:
+                continue
+            variable = coordinate.variable.to_base_variable()
+            known = brought.get(name)
             # a parameter of that name is the coordinate, and labels the dimension of that name
             if name in array.dims and name in coords and name != parameter:
                 known = xr.Variable(coords[str(name)].dims, coords[str(name)].values)
-            if known is not None and not known.equals(coordinate.variable):
+            if known is not None and not known.equals(variable):
                 raise InputError(f"{parameter}: its coordinate {name!r} differs from that of another parameter")
-            brought[name] = coordinate
-    return {name: coordinate for name, coordinate in brought.items() if name not in coords}
+            if name in results:
+                raise InputError(f"{parameter}: its coordinate {name!r} has the name of a result: must have another")
+            if name in dims and name not in coords and name not in variable.dims:
+                raise InputError(f"{parameter}: its coordinate {name!r} has the name of a dimension: must have another")
+            brought[name] = variable
+    return {name: variable for name, variable in brought.items() if name not in coords}
 
 
-def _dataset(table: Table, brought: Mapping[Hashable, xr.DataArray]) -> xr.Dataset:
+def _dataset(table: Table, brought: Mapping[Hashable, xr.Variable]) -> xr.Dataset:
     """A table as a Dataset; no array is copied."""
 
     def labelled(variables: Mapping[str, Variable]) -> dict[Hashable, xr.Variable]:
@@ -652,10 +672,17 @@ def _blocks(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]
     if isinstance(asked, Mapping):
         unknown = [dim for dim in asked if dim not in sizes and dim != "frequency"]
         if unknown:
-            raise InputError(f"chunks = {chunks!r}: {unknown[0]!r} is not a dimension; they are {', '.join(sizes)}")
+            raise InputError(
+                f"chunks = {shown(chunks)}: {unknown[0]!r} is not a dimension; they are {', '.join(sizes)}"
+            )
         asked = tuple(asked.get(dim, -1) for dim in sizes)
     try:
         normal: tuple[tuple[int, ...], ...] = normalize_chunks(asked, tuple(sizes.values()), dtype=np.dtype("f8"))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"chunks = {chunks!r}: {error}") from None
+    except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError) as error:
+        raise InputError(f"chunks = {shown(chunks)}: {error}") from None
+    for lengths, size in zip(normal, sizes.values(), strict=True):
+        if sum(lengths) != size or not all(isinstance(length, Integral) and length > 0 for length in lengths):
+            raise InputError(
+                f"chunks = {shown(chunks)}: must be whole numbers > 0 that make up {size} along a dimension"
+            )
     return dict(zip(sizes, normal, strict=True))

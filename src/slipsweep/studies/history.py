@@ -12,7 +12,7 @@ from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history
-from slipsweep.model.parameters import check_whole
+from slipsweep.model.parameters import check_numbers, check_whole
 from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
 from slipsweep.motion.waveforms import wave_of
 
@@ -23,7 +23,7 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
     problem = check_options(**options)
     for name in PARAMETERS:
         value = given.get(name)
-        if value is not None and np.ndim(value.values if isinstance(value, Variable) else value):
+        if value is not None and check_numbers(name, value.values if isinstance(value, Variable) else value).ndim:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
     summary = plan_sweep(**given, solver="cycle").solve()
     own = {name: variable.values for name, variable in summary.coords.items()}
@@ -50,7 +50,7 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
         phases = np.arange(shaken + math.ceil(after * points / (2.0 * math.pi)) + 1) * (2.0 * math.pi / points)
         grid = phases / omega
     else:
-        grid = np.atleast_1d(np.asarray(times, np.float64))
+        grid = np.atleast_1d(check_numbers("times", times))
         if grid.ndim != 1 or not np.isfinite(grid).all() or (grid < 0.0).any() or (np.diff(grid) <= 0.0).any():
             raise InputError("times: must be one row of finite, increasing numbers >= 0")
         phases = grid * omega

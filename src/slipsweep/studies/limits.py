@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.engine import Problem
-from slipsweep.grid.plans import plan_sweep
+from slipsweep.grid.plans import check_dimensions, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import check_values, check_whole, number_text
+from slipsweep.model.parameters import check_progress, check_single, check_values, check_whole, number_text
 from slipsweep.model.variables import (
     LIMIT_RESULTS,
     MAXIMUM_AMPLITUDE_IN_G,
@@ -76,15 +76,15 @@ def limit_table(
     task = plan.tasks[0]
     if maximum_amplitude is None:
         maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.g
-    highest = check_values("maximum_amplitude", maximum_amplitude)
-    if highest.ndim:
-        raise InputError(f"maximum_amplitude = {maximum_amplitude!r}: must be a single number")
+    highest = check_single("maximum_amplitude", maximum_amplitude)
+    check_progress(progress)
+    check_dimensions(plan.sizes, {}, {*LIMIT_RESULTS, "sliding_mode", "validity"})
     _check_memory(plan.sizes)
 
     arrays = dict(task.inputs)
     targets = arrays.pop("amplitude")
     shape = tuple(plan.sizes.values())
-    found = solve(task.problem, shape, arrays, targets, float(highest), steps, progress)
+    found = solve(task.problem, shape, arrays, targets, highest, steps, progress)
     coords = {name: variable for name, variable in plan.coords.items() if name != "amplitude"}
     return Table(
         {**coords, "displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
@@ -95,7 +95,7 @@ def limit_table(
         plan.attrs
         | {
             "title": "Amplitudes at which a tolerable displacement is reached",
-            "maximum_amplitude": float(highest),
+            "maximum_amplitude": highest,
             "amplitude_steps": steps,
         },
     )

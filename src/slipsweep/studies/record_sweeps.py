@@ -18,7 +18,7 @@ from slipsweep.grid.engine import Array, Problem
 from slipsweep.grid.plans import Plan, Task, aligned, check_options, checked, grid_sizes, record_attributes
 from slipsweep.grid.tables import Variable
 from slipsweep.kernels.record import RECORD_KERNEL, History
-from slipsweep.model.parameters import check_choice
+from slipsweep.model.parameters import check_choices, check_given, check_numbers, shown
 from slipsweep.model.variables import PARAMETERS, RECORD_COUNTS, RECORD_PARAMETERS, RECORD_RESULTS, RESULT_DTYPES
 from slipsweep.motion.records import Record
 
@@ -69,11 +69,10 @@ def plan_record(
         As `slipsweep.sweep_record`.
     """
     if not isinstance(record, Record):
-        raise InputError(f"record = {record!r}: must be a Record (slipsweep.read_record, slipsweep.Record)")
+        raise InputError(f"record = {shown(record)}: must be a Record (slipsweep.read_record, slipsweep.Record)")
     problem = check_options(model=model, rise=rise, recoupling=recoupling, g=g)
-    wanted = tuple(RECORD_RESULTS if variables is None else variables)
-    for name in wanted:
-        check_choice("variables", name, RECORD_RESULTS)
+    check_given(given, ("theta", "mu_s"))
+    wanted = tuple(RECORD_RESULTS) if variables is None else check_choices("variables", variables, RECORD_RESULTS)
     polarity = _polarity(given.pop("polarity", 1))
     known = PARAMETERS | RECORD_PARAMETERS
     given = {"scale": 1.0, "time_scale": 1.0} | {name: values for name, values in given.items() if values is not None}
@@ -153,8 +152,12 @@ def _solve_slab(
 
 def _polarity(given: Any) -> Variable:
     """The signs asked for: 1, -1, both."""
-    values = np.array([1.0, -1.0]) if isinstance(given, str) and given == "both" else np.asarray(given)
-    if values.dtype.kind not in "if" or values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
-        raise InputError(f"polarity = {given!r}: must be 1, -1, a list of these, or 'both'")
+    both = isinstance(given, str) and given == "both"
+    try:
+        values = check_numbers("polarity", (1, -1) if both else given)
+    except InputError:
+        values = np.empty(0)
+    if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
+        raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
     dims = ("polarity",) if values.ndim else ()
     return Variable(dims, values.astype(np.int8), RECORD_PARAMETERS["polarity"])

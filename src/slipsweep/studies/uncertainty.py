@@ -22,10 +22,22 @@ from slipsweep.files.netcdf import Tally
 from slipsweep.files.spec import quantity, unit_factor
 from slipsweep.grid import engine, threads
 from slipsweep.grid.engine import Problem
-from slipsweep.grid.plans import aligned, grid_sizes, plan_sweep
+from slipsweep.grid.plans import aligned, check_dimensions, grid_sizes, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import BOUNDS, check_choice, check_values, check_whole, number_text
+from slipsweep.model.parameters import (
+    BOUNDS,
+    check_choice,
+    check_finite,
+    check_list,
+    check_numbers,
+    check_progress,
+    check_values,
+    check_whole,
+    computed,
+    number_text,
+    shown,
+)
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     FRICTION_PARAMETERS,
@@ -272,11 +284,16 @@ def check_sampling(
             "latin_hypercube takes any number"
         )
     wanted = _increasing(f"{keys}quantiles", quantiles, "quantile")
-    lengths = [
-        quantity(f"{keys}thresholds", one, "displacement_amplitude", g) if isinstance(one, str) else one
-        for one in ([thresholds] if isinstance(thresholds, str | float | int) else thresholds)
-    ]
-    limits = _increasing(f"{keys}thresholds", lengths, "threshold")
+    thresholds = computed(thresholds)
+    strings = isinstance(thresholds, np.ndarray) and thresholds.ndim and thresholds.dtype.kind in "UO"
+    if isinstance(thresholds, (list, tuple)) or strings:
+        thresholds = check_list(f"{keys}thresholds", thresholds, "displacements")
+    if isinstance(thresholds, (str, list)):
+        thresholds = [
+            quantity(f"{keys}thresholds", one, "displacement_amplitude", g) if isinstance(one, str) else one
+            for one in ([thresholds] if isinstance(thresholds, str) else thresholds)
+        ]
+    limits = _increasing(f"{keys}thresholds", thresholds, "threshold")
     pairs = _pairs(f"{keys}correlation", correlation, distributions)
     sampling = Sampling(
         distributions, samples, method, check_whole(f"{keys}seed", seed, 0, _MOST_SEED), wanted, limits, pairs, keys
@@ -295,21 +312,28 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
     kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
     units = entries.pop("units", None)
     if units is not None and kind == "factor":
-        raise InputError(f"{key}.units = {units!r}: not allowed with kind = 'factor', which has no unit")
+        raise InputError(f"{key}.units = {shown(units)}: not allowed with kind = 'factor', which has no unit")
     if units is not None and not isinstance(units, str):
-        raise InputError(f"{key}.units = {units!r}: must be a unit that converts to {PARAMETERS[parameter]['units']}")
+        raise InputError(
+            f"{key}.units = {shown(units)}: must be a unit that converts to {PARAMETERS[parameter]['units']}"
+        )
     if isinstance(chosen, str):
         frozen = _named(key, chosen, entries)
     elif not callable(getattr(chosen, "ppf", None)):
         raise InputError(
-            f"{key}.distribution = {chosen!r}: must be the name of a distribution of scipy.stats, or a frozen one"
+            f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, or a frozen one"
         )
     elif entries:
         raise InputError(f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own")
     else:
         frozen = chosen
-    with np.errstate(all="ignore"):
-        middle = np.asarray(frozen.ppf(0.5))
+    try:
+        with np.errstate(all="ignore"):
+            middle = check_numbers(f"{key}: its median", frozen.ppf(0.5))
+    except InputError:
+        raise
+    except Exception as error:  # of a class that is not ours
+        raise InputError(f"{key}.distribution = {shown(chosen)}: its median cannot be had: {shown(error)}") from None
     if middle.ndim:
         raise InputError(f"{key}: is {middle.size} distributions; must be one")
     about = _described(frozen)
@@ -325,12 +349,7 @@ def _numbers(key: str, given: Mapping[str, Any]) -> dict[str, float]:
     """Parameters of a distribution as floats."""
     numbers = {}
     for name, value in given.items():
-        try:
-            if isinstance(value, bool) or not math.isfinite(value):
-                raise ValueError
-            numbers[str(name)] = float(value)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError(f"{key}.{name} = {value!r}: must be a finite number") from None
+        numbers[str(name)] = check_finite(f"{key}.{name}", value)
     return numbers
 
 
@@ -370,7 +389,7 @@ def _increasing(key: str, given: Any, bound: str) -> Floats:
     """A list of numbers, one at least, as an increasing coordinate."""
     values = np.atleast_1d(check_values(bound, given, key))
     if values.ndim > 1 or not values.size:
-        raise InputError(f"{key} = {given!r}: must be a list of one number or more")
+        raise InputError(f"{key} = {shown(given)}: must be a list of one number or more")
     for before, after in itertools.pairwise(values):
         if after <= before:
             raise InputError(
@@ -382,15 +401,15 @@ def _increasing(key: str, given: Any, bound: str) -> Floats:
 def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tuple[str, str, float], ...]:
     """Correlations: pairs of drawn parameters with a number between -1 and 1."""
     pairs: dict[frozenset[str], tuple[str, str, float]] = {}
-    for entry in given or ():
+    for entry in () if given is None else check_list(key, given, '["NAME", "OTHER", NUMBER]'):
         try:
-            first, second, value = entry
-            value = float(value)
-        except (TypeError, ValueError):
-            raise InputError(f'{key} = {entry!r}: must be ["NAME", "OTHER", NUMBER]') from None
+            first, second, value = check_list(key, entry, "names and a number")
+            value = check_finite(key, value)
+        except ValueError:  # as InputError is
+            raise InputError(f'{key} = {shown(entry)}: must be ["NAME", "OTHER", NUMBER]') from None
         for name in (first, second):
-            if name not in known:
-                raise InputError(f"{key}: {name!r} is not drawn; {did_you_mean(str(name), tuple(known))}")
+            if not isinstance(name, str) or name not in known:
+                raise InputError(f"{key}: {shown(name)} is not drawn; {did_you_mean(str(name), tuple(known))}")
         pair = frozenset((first, second))
         if first == second or pair in pairs:
             raise InputError(f"{key}: {first}, {second}: must be two different parameters, and each pair once")
@@ -493,6 +512,7 @@ class SamplePlan:
         offset = "frequency" in draws and sampling.distributions["frequency"].kind == "offset"
         # A = ω²d, and (f + offset)/f, depend on the frequency itself: no scaling law along its dimensions then
         self.sizes = grid_sizes(everything)
+        check_dimensions(self.sizes, coords, {*STATISTICS, *STATISTIC_COORDINATES})
         self.solved = grid_sizes(everything if self.by_displacement or offset else own)
         self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in self.solved}
         self.base = aligned(everything if "frequency" in everything and not self.scaled else own, self.solved)
@@ -518,6 +538,7 @@ class SamplePlan:
         progress : callable, optional
             Called with a number of samples just solved, from any thread.
         """
+        check_progress(progress)
         coordinates: dict[str, NDArray[Any]] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,

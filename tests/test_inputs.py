@@ -1,0 +1,227 @@
+"""Arguments of the public functions: what is no value, and what cannot stand in a dataset, is refused by name."""
+
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import dask.array
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import slipsweep
+from slipsweep import InputError
+
+RECORD = slipsweep.Record(np.arange(5) / 10, np.array([0.0, 4.0, -4.0, 2.0, 0.0]))
+UNCERTAIN = {"mu_s": {"distribution": "lognorm", "s": 0.1, "kind": "factor"}}
+CELL: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency": 1.0}
+BLOCK = {"theta": 5.0, "mu_s": 0.38}
+
+#: Every public function of parameters, with arguments that are good.
+FUNCTIONS: dict[str, tuple[Callable[..., xr.Dataset], dict[str, Any]]] = {
+    "sweep": (slipsweep.sweep, CELL),
+    "friction_parameters": (slipsweep.friction_parameters, {**BLOCK, "amplitude": 3.0}),
+    "simulate": (slipsweep.simulate, CELL),
+    "sweep_record": (slipsweep.sweep_record, {"record": RECORD, **BLOCK}),
+    "limit_amplitude": (slipsweep.limit_amplitude, {"displacement": 0.1, **BLOCK, "frequency": 1.0}),
+    "sample": (slipsweep.sample, {**CELL, "uncertain": UNCERTAIN, "samples": 8}),
+}
+
+#: Functions whose parameters may be arrays.
+GRIDS = [name for name in FUNCTIONS if name != "simulate"]
+
+_BLOCK = ("theta", "mu_s")
+_GIVEN = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
+
+#: Parameters that a function takes as numbers.
+NUMBERS = {
+    "sweep": (*CELL, *_GIVEN, "structure_frequency"),
+    "friction_parameters": (*_BLOCK, "amplitude", *_GIVEN),
+    "simulate": (*CELL, *_GIVEN, "times"),
+    "sweep_record": (*_BLOCK, *_GIVEN, "scale", "time_scale"),
+    "limit_amplitude": ("displacement", *_BLOCK, "frequency", *_GIVEN, "structure_frequency"),
+    "sample": (*CELL, *_GIVEN, "quantiles", "thresholds"),
+}
+
+
+def call(function: str, **changed: Any) -> xr.Dataset:
+    """A public function with good arguments but for some."""
+    called, good = FUNCTIONS[function]
+    return called(**{**good, **changed})
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_what_has_to_be_given_is_given(function: str) -> None:
+    for name in FUNCTIONS[function][1]:
+        if name == "samples":
+            continue
+        with pytest.raises(InputError, match=name):
+            call(function, **{name: None})
+
+
+def test_nothing_drawn_needs_a_value() -> None:
+    drawn = {"mu_s": {"distribution": "uniform", "loc": 0.3, "scale": 0.1}}
+    assert call("sample", mu_s=None, uncertain=drawn).mean_displacement.item() > 0.0
+
+
+# ---------------------------------------------------------------------------------- masked
+
+MASKED = np.ma.masked_array([0.2, 0.4, 0.6, 0.8], [False, True, True, False])
+
+
+#: One whose mask shows only when it is computed: what is masked beforehand xarray makes NaN.
+LAZY = dask.array.from_array(MASKED.data).map_blocks(
+    lambda part: np.ma.masked_inside(part, 0.3, 0.7), dtype="f8", meta=np.empty(0)
+)
+
+
+@pytest.mark.parametrize(
+    "masked",
+    [
+        MASKED,
+        xr.DataArray(LAZY, dims="case"),
+        dask.array.from_array(MASKED),
+        [0.2, np.ma.masked, np.ma.masked, 0.8],
+    ],
+    ids=["array", "DataArray", "dask", "list"],
+)
+@pytest.mark.parametrize("function", FUNCTIONS)
+@pytest.mark.filterwarnings("error")
+def test_masked_entries_are_no_values(function: str, masked: Any) -> None:
+    for name in NUMBERS[function]:
+        with pytest.raises(InputError, match=f"{name}: 2 of 4 values are masked"):
+            call(function, **{name: masked})
+
+
+def test_masked_entries_are_nan_to_xarray() -> None:
+    for function in GRIDS:
+        with pytest.raises(InputError, match="theta = nan: must be 0 <= theta < 90 degrees"):
+            call(function, theta=xr.DataArray(MASKED, dims="case"))
+
+
+def test_a_mask_without_entries_is_none() -> None:
+    plain = np.ma.masked_array([0.2, 0.4], [False, False])
+    xr.testing.assert_identical(call("sweep", mu_s=plain), call("sweep", mu_s=[0.2, 0.4]))
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_masked_samples_of_a_record(column: int) -> None:
+    columns: list[Any] = [np.arange(4.0), np.array([0.0, 1.0, -1.0, 0.0])]
+    columns[column] = np.ma.masked_array(columns[column], [False, True, False, False])
+    with pytest.raises(InputError, match=r"(times|acceleration): 1 of 4 values are masked"):
+        slipsweep.Record(*columns)
+    with pytest.raises(InputError, match="acceleration: 2 of 4 values are masked"):
+        slipsweep.Record.sampled(MASKED, 0.1)
+
+
+# -------------------------------------------------------------------- names of a dataset
+
+
+def test_stacked_coordinates_come_apart() -> None:
+    grid = xr.Dataset(coords={"mu_s": ("mu_s", [0.3, 0.4]), "site": ("site", ["a", "b", "c"])})
+    grid["theta"] = grid.mu_s * 0.0 + xr.DataArray([0.0, 5.0, 8.0], dims="site")
+    cases = grid.stack(case=("mu_s", "site"))
+    found = call("sweep", theta=cases.theta, mu_s=cases.mu_s)
+    assert found.permanent_displacement.dims == ("case",)
+    assert found.site.values.tolist() == ["a", "b", "c"] * 2
+    np.testing.assert_array_equal(found.mu_s, np.repeat([0.3, 0.4], 3))
+    crossed = call("sweep", theta=grid.theta, mu_s=grid.mu_s).permanent_displacement
+    np.testing.assert_array_equal(found.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel())
+
+
+RESULT_OF = {
+    "sweep": "validity",
+    "friction_parameters": "sliding_mode",
+    "sweep_record": "number_of_slips",
+    "limit_amplitude": "limit_status",
+    "sample": "quantile",
+}
+
+
+@pytest.mark.parametrize("function", GRIDS)
+def test_coordinates_and_dimensions_named_like_a_result(function: str) -> None:
+    name = RESULT_OF[function]
+    for theta in (
+        xr.DataArray([1.0, 2.0], dims="case", coords={name: ("case", [1, 2])}),
+        xr.DataArray(1.0, coords={name: 3}),
+        xr.DataArray([1.0, 2.0], dims=name),
+    ):
+        with pytest.raises(InputError, match=f"{name}.* is the name of a result|{name}.* has the name of a result"):
+            call(function, theta=theta)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"theta": xr.DataArray([1.0, 2.0], dims="mu_s")}, "mu_s: is a dimension of another parameter"),
+        (
+            {"theta": xr.DataArray([1.0], dims="case"), "mu_s": xr.DataArray(0.4, coords={"case": 1})},
+            "mu_s: its coordinate 'case' has the name of a dimension",
+        ),
+        ({"theta": xr.Variable(("x", "x"), np.ones((2, 2)))}, "theta: dimensions x, x: must be named each once"),
+    ],
+)
+def test_names_that_no_dataset_can_have(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call("sweep", **changed)
+
+
+def test_a_variable_keeps_its_dimensions() -> None:
+    assert call("sweep", theta=xr.Variable("x", [1.0, 2.0])).validity.dims == ("x",)
+
+
+# -------------------------------------------------------------------------- other arguments
+
+REFUSED: list[tuple[str, dict[str, Any], str]] = [
+    ("sweep_record", {"variables": []}, r"variables = \[\]: must name one of 'permanent_displacement'"),
+    ("sweep", {"variables": 5}, "variables = 5: must be a list of names"),
+    ("sweep", {"variables": [["validity"]]}, r"variables = \['validity'\]: must be one of"),
+    ("sweep", {"theta": [1.0, 2.0], "chunks": 0}, "chunks = 0: "),
+    ("sweep", {"theta": [1.0, 2.0], "chunks": {"theta": 0}}, r"chunks = \{'theta': 0\}: "),
+    ("sweep", {"theta": True}, "theta = True: must be a number"),
+    ("sweep", {"rise": ["monotone"]}, r"rise = \['monotone'\]: must be one of 'monotone', 'literal'"),
+    ("sweep", {"solver": np.zeros(3)}, r"solver = array\(\[0., 0., 0.\]\): must be one of"),
+    ("sweep", {"cycles": np.array([3.0])}, r"cycles = array\(\[3.\]\): must be a whole number >= 1"),
+    ("sweep", {"progress": 3}, "progress = 3: must be a function"),
+    ("limit_amplitude", {"progress": 3}, "progress = 3: must be a function"),
+    ("sample", {"progress": 3}, "progress = 3: must be a function"),
+    ("sample", {"thresholds": None}, "thresholds = "),
+    ("sample", {"correlation": 5}, "correlation = 5: must be a list"),
+    ("sample", {"correlation": [["mu_s", ["theta"], 0.1]]}, r"correlation: \['theta'\] is not drawn"),
+    ("sample", {"correlation": [[["mu_s"], {}, 0.1]]}, r"correlation: \['mu_s'\] is not drawn"),
+    ("sample", {"uncertain": {"mu_s": stats.beta}}, "uncertain.mu_s.distribution = .*: its median cannot be had"),
+    ("sweep_record", {"polarity": {1}}, r"polarity = \{1\}: must be 1, -1"),
+]
+
+
+@pytest.mark.parametrize(("function", "changed", "message"), REFUSED)
+def test_refused(function: str, changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message) as raised:
+        call(function, **changed)
+    assert "\n" not in str(raised.value)
+
+
+def test_long_values_are_cut_short() -> None:
+    with pytest.raises(InputError) as raised:
+        call("sweep", theta=xr.Dataset({"a": ("x", np.arange(1000.0))}))
+    assert len(str(raised.value)) < 250
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("number", [np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2), xr.DataArray(0.5)])
+def test_numbers_of_other_types(number: Any) -> None:
+    for function, name in [
+        ("sample", "thresholds"),
+        ("sweep", "ramp_in"),
+        ("sweep", "mu_s"),
+        ("sweep_record", "scale"),
+    ]:
+        xr.testing.assert_identical(call(function, **{name: number}), call(function, **{name: 0.5}))
+
+
+def test_a_result_that_is_given_is_a_coordinate() -> None:
+    found = call("sweep", yield_acceleration=0.5, variables=["yield_acceleration"])
+    assert not found.data_vars
+    assert found.yield_acceleration.item() == 0.5
