@@ -220,7 +220,7 @@ def test_blocks_of_another_sweep_are_refused_with_the_difference(
     with pytest.raises(InputError, match="--memory: too little for the blocks of 4000 cells"):
         run(path, resume=True, block_cells=3000)
     with monkeypatch.context() as other:
-        other.setattr(parts, "numerics", lambda: "other")
+        other.setattr(parts.sources, "keys", lambda: parts.sources.Keys("other", "other"))
         with pytest.raises(InputError, match=r"slipsweep sources was .*, is other"):
             run(path, resume=True)
     # refusing has harmed nothing

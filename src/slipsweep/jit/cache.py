@@ -8,8 +8,8 @@ would not be noticed.  `_Disk` takes its place:
 
 * A file holds one kernel for one signature, after a checksum; it is written under another
   name and renamed.  One that is missing or damaged is compiled anew.
-* Its name is a digest of all that the machine code depends on; the folder's name one of the
-  content of every source file that a kernel is made of.  Folders of the four latest versions
+* Its name is a digest of all that the machine code depends on; the folder's name one of all
+  sources that kernels are made of (`slipsweep.jit.sources`).  Folders of the four latest versions
   are kept, older ones removed when a kernel is compiled.
 * The first process to need a kernel compiles it under a lock, the others wait and load.
   Where there is no lock to be had (some network folders) each compiles for itself.
@@ -27,10 +27,8 @@ import gc
 import hashlib
 import os
 import pickle
-import shutil
 import signal
 import sys
-import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterator
@@ -40,7 +38,6 @@ from typing import Any
 import filelock  # here: imported in the middle of a fork, its own fork handlers would fail
 import llvmlite.binding
 import numba.core.compiler
-import platformdirs
 from numba import njit
 from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
@@ -48,7 +45,7 @@ from numba.core.compiler import CompileResult
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
-_SOURCES = ("jit/*.py", "model/*.py", "motion/*.py", "kernels/*.py")
+from slipsweep.jit import folders, sources
 
 #: Versions whose kernels are kept.
 _KEPT_FOLDERS = 4
@@ -67,46 +64,16 @@ if hasattr(os, "register_at_fork"):
     )
 
 
-@functools.cache
 def cache_folder() -> Path | None:
     """Folder of the compiled kernels, or None where no folder can be written."""
-    here = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for pattern in _SOURCES:
-        for source in sorted(here.glob(pattern)):
-            digest.update(source.read_bytes())
-    name = f"slipsweep-{digest.hexdigest()[:16]}"
-    given = numba.config.CACHE_DIR
-    for base in [Path(given)] if given else [platformdirs.user_cache_path("slipsweep"), _temporary_folder()]:
-        folder = base / name
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
+    base = folders.base()
+    if base is None:
+        return None
+    folder = base / f"slipsweep-{sources.keys().machine_code}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(exist_ok=True)
+        return folder
     return None
-
-
-def _temporary_folder() -> Path:
-    """A folder of this user's in the system's temporary one, where others may write, too."""
-    if not hasattr(os, "getuid"):
-        return Path(tempfile.gettempdir()) / "slipsweep"
-    folder = Path(tempfile.gettempdir()) / f"slipsweep-{os.getuid()}"
-    with contextlib.suppress(OSError):
-        folder.mkdir(mode=0o700, exist_ok=True)
-        status = folder.lstat()
-        # files are unpickled: none that another user could have put there
-        if status.st_uid == os.getuid() and not status.st_mode & 0o022:
-            return folder
-    return Path(os.devnull)
-
-
-def _remove_stale(folder: Path) -> None:
-    """Remove the kernels of all versions but the latest few."""
-    with contextlib.suppress(OSError):
-        others = [other for other in folder.parent.glob("slipsweep-" + "[0-9a-f]" * 16) if other != folder]
-        others.sort(key=lambda other: other.stat().st_mtime, reverse=True)
-        for other in others[_KEPT_FOLDERS - 1 :]:
-            shutil.rmtree(other, ignore_errors=True)
 
 
 @contextlib.contextmanager
@@ -172,14 +139,8 @@ class _Disk(NullCache):
             if cres.library.has_dynamic_globals:
                 return
             data = dumps(cres._reduce())
-            with tempfile.NamedTemporaryFile(dir=self.path.parent, delete=False) as file:
-                try:
-                    file.write(hashlib.sha256(data).digest() + data)
-                    file.close()
-                    Path(file.name).replace(self.path)
-                finally:
-                    Path(file.name).unlink(missing_ok=True)
-            _remove_stale(self.path.parent)
+            folders.write(self.path, hashlib.sha256(data).digest() + data)
+            folders.keep_latest(_KEPT_FOLDERS, f"slipsweep-{'[0-9a-f]' * 16}", self.path.parent)
 
 
 class _Sealed(JITCodeLibrary):

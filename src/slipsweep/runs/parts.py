@@ -25,7 +25,6 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -39,26 +38,13 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.outputs import sync
 from slipsweep.files.spec import SweepSpec
+from slipsweep.jit import sources
 from slipsweep.runs.placed import Layout
-
-#: Sources whose change may change a result or the blocks it is cut into.
-_SOURCES = ("jit/*.py", "model/*.py", "motion/*.py", "kernels/*.py", "grid/*.py", "studies/*.py", "files/spec.py")
 
 _COMPLETE = "complete"
 
 #: A line of the journal, which a run that was killed may have left without its end.
 _LINE = re.compile(r"(\d+) ([0-9a-f]+)\n")
-
-
-@cache
-def numerics() -> str:
-    """Digest of all sources that a result depends on."""
-    here = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for pattern in _SOURCES:
-        for source in sorted(here.glob(pattern)):
-            digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
@@ -79,7 +65,7 @@ def installation() -> dict[str, str]:
     """What two processes must have in common to compute the same."""
     return {
         "slipsweep version": __version__,
-        "slipsweep sources": numerics(),
+        "slipsweep sources": sources.keys().results,
         "numpy version": version("numpy"),
         "numba version": version("numba"),
     }
