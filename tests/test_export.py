@@ -93,7 +93,7 @@ def test_units_stand_in_the_header(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     export.export(folder / "grid.nc", path, variables=["validity", "permanent_displacement"])
     assert path.read_text().splitlines()[0] == (
-        "theta (degree),mu_s (1),displacement_amplitude (m),frequency (Hz),decay_rate (1),amplitude (m s-2),"
+        "theta (degree),mu_s (1),displacement_amplitude (m),frequency (Hz),decay_rate (1),"
         "validity,permanent_displacement (m)"
     )
 

@@ -124,7 +124,7 @@ def test_blocks_are_whole_along_the_last_dimensions() -> None:
 
 @pytest.mark.parametrize("most", [7, 96, 1000])
 def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> None:
-    names = ", ".join(f'"{name}"' for name in variables.RESULTS)
+    names = ", ".join(f'"{name}"' for name in variables.RESULTS if name != "amplitude")
     checked = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml")
     cut = dict(enumerate(blocks.grid_blocks(checked.shape, most)))
     whole = blocks.plan_of(checked.arguments()).solve()
@@ -328,13 +328,21 @@ def test_cases_have_labels_and_no_string_type(tmp_path: Path) -> None:
         assert dataset["delta_mu"].item() == 0.1
 
 
-def test_displacement_amplitude_brings_the_amplitude_along(tmp_path: Path) -> None:
+def test_the_amplitudes_of_displacement_amplitudes_are_written_if_asked_for(tmp_path: Path) -> None:
     text = GRID.replace("axes.amplitude", "axes.displacement_amplitude").replace("stop = 9", "stop = 0.6")
     run(text, tmp_path / "a.nc", block_cells=100)
     with xr.open_dataset(tmp_path / "a.nc") as dataset:
-        expected = (2 * np.pi * dataset["frequency"]) ** 2 * dataset["displacement_amplitude"]
-        np.testing.assert_allclose(dataset["amplitude"], expected.transpose(*dataset["amplitude"].dims))
-        assert dataset["amplitude"].units == "m s-2"
+        assert "amplitude" not in dataset
+        values = sum(variable.nbytes for variable in dataset.variables.values())
+        assert (tmp_path / "a.nc").stat().st_size < values + 50_000
+    for split in (False, True):
+        path = tmp_path / f"with_{split}.nc"
+        run(text + '[output]\nvariables = ["validity", "amplitude"]\n', path, block_cells=100, split=split)
+        for part in path.glob("*.nc") if split else [path]:
+            with xr.open_dataset(part) as dataset:
+                expected = (2 * np.pi * dataset["frequency"]) ** 2 * dataset["displacement_amplitude"]
+                np.testing.assert_allclose(dataset["amplitude"], expected.transpose(*dataset["amplitude"].dims))
+                assert dataset["amplitude"].units == "m s-2"
 
 
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump is not installed")

@@ -22,6 +22,7 @@ from slipsweep.model.variables import (
     RESULTS,
     Validity,
 )
+from slipsweep.motion.waveforms import peak_acceleration
 
 AXES: dict[str, Any] = {
     "theta": [0.0, 5.0, 12.0],
@@ -150,13 +151,71 @@ def test_parameters_are_copied() -> None:
 
 def test_displacement_amplitude() -> None:
     frequency, displacement = np.array([0.5, 1.0, 2.0]), np.array([0.01, 0.05])
-    result = slipsweep.sweep(5.0, 0.38, frequency=frequency, displacement_amplitude=displacement)
+    wanted = ["permanent_displacement", "acceleration_ratio", "amplitude"]
+    result = slipsweep.sweep(5.0, 0.38, frequency=frequency, displacement_amplitude=displacement, variables=wanted)
     assert result.permanent_displacement.dims == ("displacement_amplitude", "frequency")
     np.testing.assert_allclose(result.amplitude, np.multiply.outer(displacement, (2 * np.pi * frequency) ** 2))
     assert result.amplitude.attrs == PARAMETERS["amplitude"]
     for i, j in np.ndindex(2, 3):
-        one = slipsweep.sweep(5.0, 0.38, result.amplitude.values[i, j], frequency[j])
-        assert one.permanent_displacement.item() == result.permanent_displacement.values[i, j]
+        one = slipsweep.sweep(5.0, 0.38, result.amplitude.values[i, j], frequency[j], variables=wanted)
+        for name in wanted[:2]:
+            assert one[name].item() == result[name].values[i, j]
+
+
+@pytest.mark.parametrize(
+    ("displacement", "frequency", "dims"),
+    [
+        ([0.01, 0.02], 1.0, ("displacement_amplitude",)),
+        (0.01, [1.0, 2.0], ("frequency",)),
+        (0.01, 1.0, ()),
+        (xr.DataArray([0.01, 0.02], dims="case"), xr.DataArray([1.0, 2.0], dims="case"), ("case",)),
+        ([0.01, 0.02], [1.0, 2.0], None),
+    ],
+)
+def test_the_amplitude_is_a_coordinate_where_it_costs_nothing(
+    displacement: Any, frequency: Any, dims: tuple[str, ...] | None
+) -> None:
+    """On a grid of d and f it would take as much as a result: it is one then, for those who ask."""
+    given: dict[str, Any] = {"displacement_amplitude": displacement, "frequency": frequency}
+    result = slipsweep.sweep([0.0, 5.0], 0.38, **given)
+    assert (result.amplitude.dims if "amplitude" in result.coords else None) == dims
+    asked = slipsweep.sweep([0.0, 5.0], 0.38, **given, variables=["validity", "amplitude"])
+    assert asked.amplitude.dims == (("displacement_amplitude", "frequency") if dims is None else dims)
+    expected = (2 * np.pi * asked.frequency) ** 2 * asked.displacement_amplitude
+    np.testing.assert_allclose(asked.amplitude, expected.transpose(*asked.amplitude.dims))
+
+
+def test_slabs_of_amplitudes_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {
+        "theta": [0.0, 5.0], "mu_s": 0.38, "displacement_amplitude": np.linspace(0.01, 0.4, 7),
+        "frequency": np.linspace(0.3, 3.0, 5), "structure_frequency": [1.0, 4.0],
+    }  # fmt: skip
+    whole = slipsweep.sweep(**given)
+    shapes = []
+
+    def watched(d: Any, f: Any) -> Any:
+        shapes.append(np.broadcast_shapes(d.shape, f.shape))
+        return peak_acceleration(d, f)
+
+    monkeypatch.setattr(engine, "peak_acceleration", watched)
+    monkeypatch.setattr(engine, "_AMPLITUDES", 12)
+    counts: list[int] = []
+    xr.testing.assert_identical(slipsweep.sweep(**given, progress=counts.append), whole)
+    assert max(map(math.prod, shapes)) <= 12
+    assert sum(counts) == whole.validity.size
+
+
+def test_a_grid_of_displacement_amplitudes_is_lazy() -> None:
+    """4e10 amplitudes would take 320 GB."""
+    given: dict[str, Any] = {
+        "theta": 5.0, "mu_s": 0.38,
+        "displacement_amplitude": np.linspace(0.01, 0.4, 200_000), "frequency": np.linspace(0.1, 3.0, 200_000),
+    }  # fmt: skip
+    with pytest.raises(InputError, match="of memory is free"):
+        slipsweep.sweep(**given)
+    lazy = slipsweep.sweep(**given, chunks="auto", variables=["permanent_displacement", "amplitude"])
+    assert sum(coordinate.nbytes for coordinate in lazy.coords.values()) < 4e6
+    assert lazy.amplitude.shape == lazy.permanent_displacement.shape == (200_000, 200_000)
 
 
 def test_structure_frequency_sets_a_flag_and_no_more() -> None:
@@ -341,7 +400,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"amplitude": None}, "amplitude, displacement_amplitude: exactly one of them must be given"),
     ({"displacement_amplitude": 0.1}, "amplitude, displacement_amplitude: exactly one of them must be given"),
     ({"frequency": None}, "frequency: must be given"),
-    ({"amplitude": None, "displacement_amplitude": 1e306, "frequency": 9.0}, "displacement_amplitude = "),
+    (
+        {"amplitude": None, "displacement_amplitude": [1e306, 1.0], "frequency": [1.0, 9.0]},
+        "displacement_amplitude = 1e+306: with frequency = 9 its amplitude A = (2 pi f)^2 d must be a finite",
+    ),
     ({"cycles": 0}, "cycles = 0: must be a whole number >= 1"),
     ({"cycles": 2.5}, "cycles = 2.5: must be a whole number >= 1"),
     ({"cycles": True}, "cycles = True: must be a whole number >= 1"),

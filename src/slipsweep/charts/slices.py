@@ -235,6 +235,8 @@ class Result:
             return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, parts), attrs)
 
         coords = {name: variable(name) for name in self.coordinates}
+        if "displacement_amplitude" in coords and "amplitude" not in coords:
+            coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
         chosen = {"case": self.labels[where["case"]]} if self.labels and "case" not in keep else {}
         attrs = {**self.attrs, **chosen}
         return Table(coords, {name: variable(name) for name in names}, attrs)
@@ -260,6 +262,18 @@ def _suggest(name: str, known: Sequence[str]) -> str:
 
 
 # ------------------------------------------------------------- what is computed on a slice
+
+
+def amplitude_of(displacement_amplitude: Variable, frequency: Variable) -> Variable:
+    """The amplitude A = ω²d on a slice: files do not hold it where d and the frequency span a grid."""
+    from slipsweep.motion.waveforms import peak_acceleration
+
+    dims = (*displacement_amplitude.dims, *(dim for dim in frequency.dims if dim not in displacement_amplitude.dims))
+    both = (
+        variable.values.reshape([variable.sizes.get(dim, 1) for dim in dims])
+        for variable in (displacement_amplitude, frequency)
+    )
+    return Variable(dims, np.asarray(peak_acceleration(*both), np.float64), PARAMETERS["amplitude"])
 
 
 def boundaries(table: Table) -> dict[str, Variable]:

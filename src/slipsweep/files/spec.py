@@ -624,6 +624,10 @@ def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> No
             raise InputError(f"{where}: unknown variable; {did_you_mean(name, tuple(known))}")
         if name in parameters:
             raise InputError(f"{where}: it is an input of this sweep, hence a coordinate of the result already")
+        if name == "amplitude":
+            d, f = (parameters[one].dim for one in ("displacement_amplitude", "frequency"))
+            if d is None or f is None or d == f:
+                raise InputError(f"{where}: is a coordinate of the result already, as d and f do not span a grid")
         if name in variables[: number - 1]:
             raise InputError(f"{where}: must not be repeated")
 

@@ -20,10 +20,13 @@ from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
 from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
-from slipsweep.motion.waveforms import Waveform, wave_of
+from slipsweep.motion.waveforms import Waveform, peak_acceleration, wave_of
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
+
+#: Amplitudes that are computed from peak displacements at a time (2 MB).
+_AMPLITUDES = 262144
 
 #: Results in which `mark_flexible_blocks` sets flags together.
 _FLAGS = 65536
@@ -75,7 +78,13 @@ def solver_of(problem: Problem) -> str:
 
 
 def cell_inputs(arrays: Mapping[str, Array], dimensions: int) -> list[Array]:
-    """The seven fields of `Cell` as arrays of `dimensions` dimensions; what is not given is NaN."""
+    """The seven fields of `Cell` as arrays of `dimensions` dimensions; what is not given is NaN.
+
+    The amplitude may be given as a peak displacement with its frequency.
+    """
+    if "displacement_amplitude" in arrays:
+        amplitude = peak_acceleration(arrays["displacement_amplitude"], arrays["frequency"])
+        arrays = {**arrays, "amplitude": amplitude}
     inputs = []
     for name in Cell._fields:
         source = arrays.get("theta" if name == "tan_theta" else name)
@@ -117,8 +126,8 @@ def solve(
     shape : tuple of int
         Shape of the results.
     arrays : mapping of str to array
-        `theta` (degrees), `mu_s`, `amplitude`, `frequency` (Hz) and the optional
-        parameters, each with as many dimensions as `shape`, of length 1 where it does
+        `theta` (degrees), `mu_s`, `amplitude` or `displacement_amplitude`, `frequency` (Hz) and the
+        optional parameters, each with as many dimensions as `shape`, of length 1 where it does
         not vary.
     wanted : tuple of str
         Names from `MOTION_RESULTS`; nothing else is computed.
@@ -132,16 +141,42 @@ def solve(
     dict of str to ndarray
         Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
     """
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    if _amplitudes(arrays) <= _AMPLITUDES:
+        _solve_into(results, problem, shape, arrays, progress)
+        return results
+    # A = ω²d where d and ω span a grid: as large as a result, and there for a slab at a time only
+    for slab in slabs(shape, _AMPLITUDES):
+        sizes = tuple(part.stop - part.start for part in slab)
+        parts = {name: values[slab] for name, values in results.items()}
+        _solve_into(parts, problem, sizes, cut(arrays, slab), progress)
+    return results
+
+
+def _amplitudes(arrays: Mapping[str, Array]) -> int:
+    """How many amplitudes the peak displacements of a grid make."""
+    if "displacement_amplitude" not in arrays:
+        return 0
+    return math.prod(np.broadcast_shapes(arrays["displacement_amplitude"].shape, arrays["frequency"].shape))
+
+
+def _solve_into(
+    results: Mapping[str, NDArray[Any]],
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    progress: Callable[[int], None] | None,
+) -> None:
+    """Solve a grid, or a slab of one; `results` lie without gaps."""
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
-    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     grid = layout(shape, scaled, [*inputs, frequency])
     targets = Results(
         *(results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS)
     )
     periods = flat(1.0 / (2.0 * math.pi * frequency))
     rows = tuple(flat(values) for values in inputs)
-    options = problem.options("peak_relative_velocity" in wanted)
+    options = problem.options("peak_relative_velocity" in results)
     wave = wave_of(problem.waveform, problem.cycles)
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
@@ -166,6 +201,22 @@ def solve(
         threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
     if "structure_frequency" in arrays and "validity" in results:
         mark_flexible_blocks(results["validity"], frequency, arrays["structure_frequency"])
+
+
+def amplitudes(
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
+) -> dict[str, NDArray[Any]]:
+    """The amplitude A = ω²d of every cell; arguments as those of `solve`."""
+    results = {name: empty(shape, "float64") for name in wanted}
+    for values in results.values():
+        np.copyto(values, peak_acceleration(arrays["displacement_amplitude"], arrays["frequency"]))
+    if progress is not None:
+        progress(math.prod(shape))
     return results
 
 

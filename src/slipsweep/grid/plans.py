@@ -47,7 +47,7 @@ from slipsweep.model.variables import (
     RESULT_DTYPES,
     RESULTS,
 )
-from slipsweep.motion.waveforms import check_waveform
+from slipsweep.motion.waveforms import check_waveform, peak_acceleration
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
@@ -179,10 +179,18 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
     problem = check_options(**{name: value for name, value in given.items() if name not in PARAMETERS})
     wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
     coords = checked(parameters)
-    if "displacement_amplitude" in coords:
-        coords["amplitude"] = _amplitude(coords["displacement_amplitude"], coords["frequency"])
-    inputs = {name: variable for name, variable in coords.items() if name != "displacement_amplitude"}
-    sizes = grid_sizes(inputs)
+    sizes = grid_sizes(coords)
+    inputs = dict(coords)
+    drive: dict[str, Variable] = {
+        name: coords[name] for name in ("displacement_amplitude", "frequency") if name in coords
+    }
+    if len(drive) == 2:
+        _check_amplitudes(**drive)
+        dims = grid_sizes(drive)
+        # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
+        if any(dims.keys() == set(variable.dims) for variable in drive.values()):
+            both = aligned(drive, dims)
+            coords["amplitude"] = Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])
 
     tasks = []
     motion = tuple(name for name in MOTION_RESULTS if name in wanted)
@@ -192,11 +200,14 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
     friction = tuple(name for name in FRICTION_PARAMETERS if name in wanted and name not in inputs)
     if friction:
         tasks.append(_friction_task(problem, friction, inputs))
+    amplitude = ("amplitude",) if "amplitude" in wanted and "amplitude" not in coords else ()
+    if amplitude:
+        tasks.append(Task(engine.amplitudes, problem, amplitude, dims, aligned(drive, dims)))
     return Plan(
         sizes,
         coords,
         tuple(tasks),
-        tuple(name for name in wanted if name in motion + friction),
+        tuple(name for name in wanted if name in motion + friction + amplitude),
         _attributes("Permanent displacement of a rigid block, swept", problem),
     )
 
@@ -263,19 +274,24 @@ def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]
     return checked
 
 
-def _amplitude(displacement_amplitude: Variable, frequency: Variable) -> Variable:
-    """A = (2πf)² d."""
-    sizes = grid_sizes({"displacement_amplitude": displacement_amplitude, "frequency": frequency})
-    both = aligned({"d": displacement_amplitude, "f": frequency}, sizes)
-    omega = 2.0 * math.pi * both["f"]
-    with np.errstate(over="ignore"):
-        values = omega * omega * both["d"]
-    if not BOUNDS["amplitude"].holds(values).all():
-        worst = both["d"].max()
-        raise InputError(
-            f"displacement_amplitude = {number_text(float(worst))}: (2 pi frequency)^2 of it is no finite number"
-        )
-    return Variable(tuple(sizes), values, PARAMETERS["amplitude"])
+def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> None:
+    """Refuse peak displacements that make an amplitude out of its bounds at a frequency of theirs."""
+    shared = set(displacement_amplitude.dims) & set(frequency.dims)
+    # A grows with both: their extremes, apart along dimensions of their own, have those of A
+    for extreme in (np.min, np.max):
+        reduced = {}
+        for name, variable in (("displacement_amplitude", displacement_amplitude), ("frequency", frequency)):
+            own = tuple(at for at, dim in enumerate(variable.dims) if dim not in shared)
+            left = tuple(dim for dim in variable.dims if dim in shared)
+            reduced[name] = Variable(left, np.asarray(extreme(variable.values, axis=own)))
+        both = aligned(reduced, grid_sizes(reduced))
+        wrong = ~BOUNDS["amplitude"].holds(peak_acceleration(**both))
+        if wrong.any():
+            d, f = (float(np.broadcast_to(values, wrong.shape)[wrong].flat[0]) for values in both.values())
+            raise InputError(
+                f"displacement_amplitude = {number_text(d)}: with frequency = {number_text(f)} its amplitude "
+                f"A = (2 pi f)^2 d must be {BOUNDS['amplitude'].text}"
+            )
 
 
 def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, Variable], results: Collection[str]) -> None:
@@ -309,7 +325,8 @@ def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arra
 
 def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, Variable]) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
-    own = {name: variable for name, variable in variables.items() if name in _FRICTION_INPUTS}
+    made = ("displacement_amplitude", "frequency") if "displacement_amplitude" in variables else ()
+    own = {name: variable for name, variable in variables.items() if name in (*_FRICTION_INPUTS, *made)}
     sizes = grid_sizes(own)
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
 

@@ -144,6 +144,8 @@ RESULTS: dict[str, dict[str, Any]] = {
     "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient (Eq. 9)"},
     "delta_mu": {"units": "1", "long_name": "friction above static (Eqs. 10, 11)"},
     "decay_rate": {"units": "1", "long_name": "friction decay with loading rate (Eq. 6 at the peak)"},
+    # where the displacement amplitude and the frequency span a grid; elsewhere it is a coordinate
+    "amplitude": PARAMETERS["amplitude"],
 }
 
 #: The target of `limit_amplitude`.

@@ -126,6 +126,13 @@ def text_of(attributes: Mapping[str, Any]) -> str:
     return text
 
 
+def peak_acceleration(displacement_amplitude: NDArray[np.float64], frequency: NDArray[np.float64]) -> Exact:
+    """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
+    omega = 2.0 * math.pi * frequency
+    with np.errstate(over="ignore"):  # `plans.plan_sweep` refuses what has no finite A
+        return omega * omega * displacement_amplitude
+
+
 def check_waveform(
     waveform: Any = "sine", harmonics: Any = None, ramp_in: Any = 0.0, ramp_out: Any = 0.0, cycles: int = 10
 ) -> Waveform:

@@ -76,7 +76,8 @@ def sweep(
     frequency : float, array or DataArray
         Excitation frequency, Hz, > 0.
     displacement_amplitude : float, array or DataArray
-        Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.
+        Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.  The result has A as a
+        coordinate, but where d and `frequency` span a grid: there it is a result to ask for.
     cycles : int
         Whole cycles of shaking, from rest.
     yield_acceleration : float, array or DataArray, optional
@@ -110,7 +111,7 @@ def sweep(
         Gravity, m/s².
     variables : sequence of str, optional
         Results to compute: `permanent_displacement`, `peak_relative_velocity`,
-        `sliding_mode`, `validity` (these by default) and the parameters of Eqs. 7-11.
+        `sliding_mode`, `validity` (these by default), the parameters of Eqs. 7-11, and `amplitude`.
     chunks : int, tuple, dict or "auto", optional
         Chunks as dask takes them; the result is then lazy.  Frequency is best left whole.
     progress : callable, optional
