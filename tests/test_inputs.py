@@ -225,3 +225,17 @@ def test_a_result_that_is_given_is_a_coordinate() -> None:
     found = call("sweep", yield_acceleration=0.5, variables=["yield_acceleration"])
     assert not found.data_vars
     assert found.yield_acceleration.item() == 0.5
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (None, "data = None: must be a Dataset or a DataArray"),
+        (xr.DataArray(np.int8(1), attrs={"flag_masks": [1, 300], "flag_meanings": "a b"}), r"flag_masks = \[1, 300\]"),
+        (xr.DataArray(np.int8(1), attrs={"flag_masks": [0.5], "flag_meanings": "a"}), r"flag_masks = \[0.5\]"),
+        (xr.DataArray(np.int8(1), {"a": 2}, attrs={"flag_masks": [1], "flag_meanings": "a"}), "has a coordinate 'a'"),
+    ],
+)
+def test_bit_masks_that_are_none(data: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        slipsweep.flags(data)

@@ -78,7 +78,8 @@ def number_text(value: float) -> str:
 
 def shown(value: Any) -> str:
     """A value as an error shows it: one line, and not a long one."""
-    text = " ".join(repr(value).split())
+    with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
+        text = " ".join(repr(value).split())
     return text if len(text) <= 160 else f"{text[:157]}..."
 
 

@@ -77,8 +77,9 @@ class Record:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not isinstance(self.attrs, Mapping):
             raise InputError(f"name = {shown(self.name)}, attrs = {shown(self.attrs)}: must be a text and a mapping")
+        name = self.name if self.name.isprintable() else repr(self.name)
         times, acceleration = (
-            check_numbers(f"{self.name}: {what}", values)
+            check_numbers(f"{name}: {what}", values)
             for what, values in (("times", self.times), ("acceleration", self.acceleration))
         )
         object.__setattr__(self, "times", times)
@@ -86,16 +87,16 @@ class Record:
         object.__setattr__(self, "attrs", dict(self.attrs))
         if times.ndim != 1 or times.shape != acceleration.shape:
             raise InputError(
-                f"{self.name}: times {times.shape} and acceleration {acceleration.shape}: must be rows of equal length"
+                f"{name}: times {times.shape} and acceleration {acceleration.shape}: must be rows of equal length"
             )
         if times.size < 2:
-            raise InputError(f"{self.name}: {times.size} samples: must be at least 2")
+            raise InputError(f"{name}: {times.size} samples: must be at least 2")
         for what, values in (("time", times), ("acceleration", acceleration)):
             for at in np.flatnonzero(~np.isfinite(values))[:1]:
-                raise InputError(f"{self.name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
+                raise InputError(f"{name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
         for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
             raise InputError(
-                f"{self.name}: time of sample {at + 2} = {times[at + 1]:.15g}: must be greater than {times[at]:.15g}, "
+                f"{name}: time of sample {at + 2} = {times[at + 1]:.15g}: must be greater than {times[at]:.15g}, "
                 "the time before it"
             )
 
@@ -104,7 +105,7 @@ class Record:
         """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
         step = check_finite("interval", interval)
         if step <= 0.0:
-            raise InputError(f"interval = {interval!r}: must be a finite number > 0")
+            raise InputError(f"interval = {shown(interval)}: must be a finite number > 0")
         values = check_numbers("acceleration", acceleration)
         return cls(_even(values.size, step), values, name)
 

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.errors import InputError
+from slipsweep.model.parameters import shown
 from slipsweep.model.variables import VALIDITY_TEXT
 
 _TEXT = {(flag.name or "").lower(): text for flag, text in VALIDITY_TEXT.items()}
@@ -45,6 +46,8 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
                 f"validity: not in this dataset, which has {', '.join(map(str, data.data_vars)) or 'nothing'}"
             )
         data = data["validity"]
+    if not isinstance(data, xr.DataArray):
+        raise InputError(f"data = {shown(data)}: must be a Dataset or a DataArray")
     mask = data.variable
     names = str(mask.attrs.get("flag_meanings", "")).split()
     bits = np.atleast_1d(mask.attrs.get("flag_masks", ()))
@@ -54,6 +57,12 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
         )
     if mask.dtype.kind not in "iu":
         raise InputError(f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)")
+    limits = np.iinfo(mask.dtype)
+    if bits.dtype.kind not in "iu" or bits.min() < limits.min or bits.max() > limits.max:
+        raise InputError(f"{data.name}: flag_masks = {shown(bits.tolist())}: must be whole numbers of {mask.dtype}")
+    for name in names:
+        if name in data.coords or name in data.dims:
+            raise InputError(f"{data.name}: has a coordinate {name!r}, as its flag is called: must have another name")
     return xr.Dataset(
         {
             name: _flag(mask, bit, _TEXT.get(name, name.replace("_", " ")))

@@ -27,6 +27,7 @@ from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.parameters import (
     BOUNDS,
+    MODELS,
     check_choice,
     check_finite,
     check_list,
@@ -471,7 +472,7 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     for name in ("theta", "mu_s", "frequency"):
         if name not in (*names, *sampling.absolute):
             raise InputError(f"{name}: must be given, or drawn")
-    if given.get("model") == "newmark":
+    if check_choice("model", given.get("model", "mendez"), MODELS) == "newmark":
         for name in ("decay_rate", "delta_mu", "minimum_friction"):
             if name in sampling.distributions:
                 raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
