@@ -32,9 +32,33 @@ def test_eq6_without_an_excess_is_eq5() -> None:
 
 
 def test_eq12_brakes_evenly_and_not_backwards() -> None:
-    kd = eq.attenuation_coefficient(1.5, G)
-    assert eq.attenuated_velocity(0.3, kd, 0.1, G) == pytest.approx(0.3 - 1.5 * 0.1, rel=1e-14)
-    assert eq.attenuated_velocity(0.3, kd, 0.5, G) == 0.0
+    held = G * eq.attenuation_coefficient(1.5, G)
+    assert eq.attenuated_velocity(0.3, held, 0.1) == pytest.approx(0.3 - 1.5 * 0.1, rel=1e-14)
+    assert eq.attenuated_velocity(0.3, held, 0.5) == 0.0
+    assert eq.attenuated_displacement(0.3, held, 0.1) == pytest.approx(0.3 * 0.1 - 1.5 * 0.1**2 / 2, rel=1e-14)
+    for after_the_stop in (0.2, 0.5, math.inf):
+        assert eq.attenuated_displacement(0.3, held, after_the_stop) == pytest.approx(0.3**2 / 3.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("ground", [-6.0, -0.4, 0.2, 3.5])
+def test_slopes_of_eq4_are_those_of_its_values(ground: float) -> None:
+    """By central differences, whose error is the square of their step."""
+    decay, delta_mu, step = 0.3, 0.1, 1e-4
+
+    def friction(x: float) -> float:
+        return eq.friction_coefficient(x, MU_S, delta_mu, decay, 1.0)
+
+    def rate(x: float) -> float:
+        return eq.relative_acceleration(x, friction(x), MU_S, TAN_THETA, G)
+
+    def slope(x: float) -> float:
+        return eq.relative_acceleration_slope(x, friction(x), MU_S, TAN_THETA, decay, G)
+
+    values, slopes = ((f(ground + step) - f(ground - step)) / (2 * step) for f in (rate, slope))
+    assert slope(ground) == pytest.approx(values, rel=1e-8)
+    assert eq.relative_acceleration_curvature(ground, friction(ground), TAN_THETA, decay, G) == pytest.approx(
+        slopes, rel=1e-8
+    )
 
 
 @numba.njit(error_model="numpy")

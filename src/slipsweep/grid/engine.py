@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.errors import RunError
 from slipsweep.grid import threads
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
@@ -171,9 +172,10 @@ def _solve_into(
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
     grid = layout(shape, scaled, [*inputs, frequency])
-    targets = Results(
-        *(results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS)
+    displacement, velocity, mode, validity = (
+        results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS
     )
+    targets = Results(displacement, velocity, mode, validity, unsolved=np.full(1, -1))
     periods = flat(1.0 / (2.0 * math.pi * frequency))
     rows = tuple(flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in results)
@@ -199,6 +201,8 @@ def _solve_into(
 
     if math.prod(shape):
         threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
+    if targets.unsolved[0] >= 0:
+        raise RunError(_unsolved(int(targets.unsolved[0]), grid, scaled, shape, arrays))
     if "structure_frequency" in arrays and "validity" in results:
         mark_flexible_blocks(results["validity"], frequency, arrays["structure_frequency"])
 
@@ -218,6 +222,17 @@ def amplitudes(
     if progress is not None:
         progress(math.prod(shape))
     return results
+
+
+def _unsolved(cell: int, grid: Grid, scaled: int | None, shape: tuple[int, ...], arrays: Mapping[str, Array]) -> str:
+    """What is said of a cell that a kernel could not solve."""
+    at = [int(i) for i in np.unravel_index(cell, tuple(grid.shape))]
+    place = [at.pop(0) if axis != scaled else 0 for axis in range(len(shape))]
+    parameters = ", ".join(
+        f"{name} = {float(values[tuple(i if n > 1 else 0 for i, n in zip(place, values.shape, strict=True))])}"
+        for name, values in arrays.items()
+    )
+    return f"{parameters}: an event of the motion was not found; please report this cell, with the options of the run"
 
 
 def friction_parameters(

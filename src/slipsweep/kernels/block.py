@@ -7,18 +7,15 @@ counted from its peak: ψ = φ − π/2, where the plane's acceleration is A (1 
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.jit.elementary import rising_phase
+from slipsweep.kernels.events import STRIP, root_of
 from slipsweep.model import equations as eq
 from slipsweep.model.variables import VALUELESS, Validity
-
-#: Relative accuracy of an event's phase ; an error there enters the result squared.
-EVENT_TOLERANCE = 1e-9
 
 #: Cells solved together; their inputs, states and results stay in the second-level cache.
 #: Rows of a tile's arrays lie this far apart, a constant: LLVM then sees that no two rows
@@ -39,7 +36,10 @@ FRICTION_NOT_DECAYING = int(Validity.FRICTION_NOT_DECAYING)
 EQ4_BELOW_YIELD = int(Validity.EQ4_BELOW_YIELD)
 KD_NOT_POSITIVE = int(Validity.KD_NOT_POSITIVE)
 NOT_RECOUPLED = int(Validity.NOT_RECOUPLED)
-NO_VALUE = int(VALUELESS)
+
+#: Not a flag of results: an event was not found (`events`), and the engine raises an error.
+UNSOLVED = 1 << 14
+NO_VALUE = int(VALUELESS) | UNSOLVED
 
 
 class Cell(NamedTuple):
@@ -165,6 +165,17 @@ def block_at(cells: np.ndarray, j: int, options: Options) -> Block:
 
 
 @scalar
+def store_motion(found: Motion, j: int, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Store the motion of cell j of a tile; an iteration that has not ended has made it NaN."""
+    motion[0, j], motion[1, j] = found.displacement, found.peak_velocity
+    codes[1, j] |= found.validity
+    if math.isnan(found.displacement) and codes[1, j] & NO_VALUE == 0:
+        codes[1, j] |= UNSOLVED
+    if codes[1, j] & NO_VALUE:
+        codes[0, j] = -1
+
+
+@scalar
 def friction(block: Block, x: float) -> float:
     """μ at plane acceleration x (Eq. 6)."""
     return eq.friction_coefficient(x, block.mu_s, block.delta_mu, block.decay_rate, block.g)
@@ -179,20 +190,17 @@ def response(block: Block, x: float) -> float:
 @scalar
 def response_and_slope(block: Block, x: float) -> tuple[float, float]:
     """E and dE/dx (x ≠ 0)."""
-    tan_theta, mu = block.tan_theta, friction(block, x)
-    n = eq.normal_acceleration(x, tan_theta, block.g)
-    side_tan = math.copysign(tan_theta, x)
-    slope = 1.0 - side_tan * (block.mu_s - tan_theta - mu) - n * mu * block.decay_rate / block.g
-    return eq.block_acceleration(x, mu, block.mu_s, tan_theta, block.g), slope
+    mu = friction(block, x)
+    slope = eq.relative_acceleration_slope(x, mu, block.mu_s, block.tan_theta, block.decay_rate / block.g, block.g)
+    return eq.block_acceleration(x, mu, block.mu_s, block.tan_theta, block.g), 1.0 - slope
 
 
 @scalar
 def slope_and_curvature(block: Block, x: float) -> tuple[float, float]:
     """dE/dx and d²E/dx² (x ≠ 0)."""
-    decay = math.copysign(block.decay_rate / block.g, x)
-    n = eq.normal_acceleration(x, block.tan_theta, block.g)
-    curvature = friction(block, x) * decay * (n * abs(decay) - math.copysign(2.0 * block.tan_theta, x))
-    return response_and_slope(block, x)[1], curvature
+    mu, decay = friction(block, x), block.decay_rate / block.g
+    slope = eq.relative_acceleration_slope(x, mu, block.mu_s, block.tan_theta, decay, block.g)
+    return 1.0 - slope, -eq.relative_acceleration_curvature(x, mu, block.tan_theta, decay, block.g)
 
 
 @scalar
@@ -202,7 +210,7 @@ def inflection(block: Block) -> float:
 
 
 @scalar
-def slip(block: Block, x: float) -> float:
+def relative_acceleration(block: Block, x: float) -> float:
     """D(x) = x − E(x): rate of the relative velocity where the block obeys Eq. 4."""
     return eq.relative_acceleration(x, friction(block, x), block.mu_s, block.tan_theta, block.g)
 
@@ -211,13 +219,6 @@ def slip(block: Block, x: float) -> float:
 def opposite(a: float, b: float) -> bool:
     """Whether one is positive and the other negative; their product might underflow."""
     return a < 0.0 < b or b < 0.0 < a
-
-
-@scalar
-def slip_and_slope(block: Block, x: float) -> tuple[float, float]:
-    """D and dD/dx (x ≠ 0)."""
-    value, slope = response_and_slope(block, x)
-    return x - value, 1.0 - slope
 
 
 @scalar
@@ -236,41 +237,51 @@ def starting_acceleration(block: Block, x: float) -> float:
     return max(block.yield_acceleration, response(block, x))
 
 
-def _root_of(value_and_slope: Callable[[Block, float], tuple[float, float]]) -> Callable[..., float]:
-    """A jitted root finder for one function of (block, x).
-
-    Bound here rather than passed as an argument: numba cannot keep a kernel on disk in
-    which a function is a value.
-    """
-
-    @scalar
-    def root(block: Block, level: float, start: float, end: float) -> float:
-        """Where, from start to end, the function passes `level`: Newton, bisection where that leaves the bracket."""
-        low, high = start, end
-        above = value_and_slope(block, end)[0] >= level
-        x = end
-        for _ in range(200):
-            value, slope = value_and_slope(block, x)
-            if (value >= level) == above:
-                high = x
-            else:
-                low = x
-            new = x - (value - level) / slope
-            if not min(low, high) <= new <= max(low, high):
-                new = 0.5 * (low + high)
-            step = abs(new - x)
-            x = new
-            if step <= EVENT_TOLERANCE * abs(x):
-                break
-        return x
-
-    return root
+@scalar
+def _response_above(where: tuple[Block, float], x: float) -> tuple[float, float]:
+    block, level = where
+    value, slope = response_and_slope(block, x)
+    return value - level, slope
 
 
-#: Roots of E = level, dE/dx = level and D = level.
-response_root = _root_of(response_and_slope)
-slope_root = _root_of(slope_and_curvature)
-slip_root = _root_of(slip_and_slope)
+@scalar
+def _slope_above(where: tuple[Block, float], x: float) -> tuple[float, float]:
+    block, level = where
+    value, slope = slope_and_curvature(block, x)
+    return value - level, slope
+
+
+@scalar
+def _relative_acceleration_and_slope(block: Block, x: float) -> tuple[float, float]:
+    value, slope = response_and_slope(block, x)
+    return x - value, 1.0 - slope
+
+
+_response_root = root_of(_response_above)
+_slope_root = root_of(_slope_above)
+_relative_acceleration_root = root_of(_relative_acceleration_and_slope)
+
+
+@scalar
+def response_root(block: Block, level: float, below: float, above: float) -> float:
+    """x between `below`, where E < level, and `above`, at which E = level."""
+    return _response_root((block, level), below, above, above, 0.0)
+
+
+@scalar
+def slope_root(block: Block, level: float, start: float, end: float) -> float:
+    """x between start and end at which dE/dx = level, which it passes."""
+    if slope_and_curvature(block, end)[0] >= level:
+        return _slope_root((block, level), start, end, end, 0.0)
+    return _slope_root((block, level), end, start, end, 0.0)
+
+
+@scalar
+def relative_acceleration_root(block: Block, start: float, end: float) -> float:
+    """x between start and end at which D = 0, whose sign changes."""
+    if relative_acceleration(block, end) >= 0.0:
+        return _relative_acceleration_root(block, start, end, end, 0.0)
+    return _relative_acceleration_root(block, end, start, end, 0.0)
 
 
 @scalar
@@ -289,11 +300,6 @@ def stays_below_yield(block: Block, start: float, end: float) -> bool:
 #: follow from `LANE_ROWS` on.
 AMPLITUDE, YIELD, MU_S, TAN_THETA, DELTA_MU, DECAY, BEGAN = range(0, 7 * TILE, TILE)
 LANE_ROWS = 7
-
-#: Lanes that are solved together, until the last of their iterations has settled: neighbours take as many.
-#: Lanes are filled up to a multiple, so that no loop over them has a scalar remainder:
-#: its roundings would differ, and a cell's last digits depend on how many stand beside it.
-STRIP = 32
 
 
 @scalar
@@ -323,6 +329,21 @@ def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
 
 
 @in_lanes
-def lane_slip(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """D(x) of a lane, x ≥ 0."""
-    return eq.lag(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j], g)
+def lane_relative_acceleration(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """D(x) of a lane."""
+    return eq.relative_acceleration(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j], g)
+
+
+@in_lanes
+def lane_drift(lanes: np.ndarray, j: int, x: float) -> float:
+    """The part of D(x) of a lane that is the same at x and −x."""
+    return eq.drift(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j])
+
+
+@in_lanes
+def lane_rate_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
+    """D and dD/dx of a lane (x ≠ 0, or a zero with the sign of its side)."""
+    tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]
+    mu = lane_friction(lanes, j, x)
+    slope = eq.relative_acceleration_slope(x, mu, mu_s, tan_theta, lanes[DECAY + j], g)
+    return eq.relative_acceleration(x, mu, mu_s, tan_theta, g), slope

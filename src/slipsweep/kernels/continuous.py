@@ -17,20 +17,20 @@ from slipsweep.kernels.block import (
     DECAY,
     DELTA_MU,
     MU_S,
-    STRIP,
     TAN_THETA,
     Block,
     Motion,
     Options,
     friction,
-    lane_friction,
-    lane_slip,
+    lane_rate_and_slope,
+    lane_relative_acceleration,
     opposite,
     phase,
-    slip,
-    slip_root,
+    relative_acceleration,
+    relative_acceleration_root,
 )
 from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break
+from slipsweep.kernels.events import STRIP, settling
 from slipsweep.kernels.lanes import (
     CARRIED,
     CODE,
@@ -47,8 +47,8 @@ from slipsweep.kernels.lanes import (
     V,
     W,
     X,
-    settling,
 )
+from slipsweep.model import equations as eq
 
 #: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes reach 1e-14.
 SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
@@ -69,7 +69,7 @@ _MISSED, _DIP = CARRIED, MOVED
 
 
 @summed
-def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple[float, float]:
+def eq4_integrals(block: Block, start: float, end: float, side: float) -> tuple[float, float]:
     """∫ D dψ and ∫ (end − ψ) D dψ over a part of a rising quarter: gains of V and W from rest.
 
     `side` is 1 for the positive half cycle and −1 for the negative one.
@@ -85,7 +85,7 @@ def slip_integrals(block: Block, start: float, end: float, side: float) -> tuple
         width = right - left
         rate, moment = 0.0, 0.0
         for node in range(NODES.size):
-            weighted = WEIGHTS[node] * slip(block, amplitude * sine_after(left, width * NODES[node]))
+            weighted = WEIGHTS[node] * relative_acceleration(block, amplitude * sine_after(left, width * NODES[node]))
             rate += weighted
             moment += (1.0 - NODES[node]) * weighted
         second += (first + moment * width) * width
@@ -108,12 +108,12 @@ def continuous_peaks(block: Block, side: float, half_gain: float, after: float) 
     for _ in range(MOST_LEGS):
         target = next_break(block, x, end)
         inner = x + SLIVER * (target - x)
-        if opposite(slip(block, inner), slip(block, target)):
-            zero = abs(slip_root(block, 0.0, inner, target))
-            gained = slip_integrals(block, -HALF_PI, phase(block, zero), side)[0]
-            late, whole = max(late, half_gain - gained), max(whole, max(gained, half_gain - gained))
+        if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):
+            zero = abs(relative_acceleration_root(block, inner, target))
+            gained = eq4_integrals(block, -HALF_PI, phase(block, zero), side)[0]
+            late, whole = max(half_gain - gained, late), max(max(gained, half_gain - gained), whole)
             if zero > after:
-                late = max(late, gained)
+                late = max(gained, late)
         x = target
         if x == end:
             break
@@ -127,7 +127,7 @@ def continuous_displacement(
     """W of all cycles, from integrals over the rising quarter of the positive half cycle.
 
     `up` is ∫ D over the quarter, `missed` and `missed_moment` the integrals of D (as
-    `slip_integrals`) up to ψ = `began`, where sliding starts, and `drift` the gain of V
+    `eq4_integrals`) up to ψ = `began`, where sliding starts, and `drift` the gain of V
     over a cycle.
     """
     down = 0.5 * drift - up  # ∫ D over a quarter of the negative half cycle
@@ -157,8 +157,8 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     quarter give a cycle, and the cycles an arithmetic series.
     """
     began = phase(block, block.yield_acceleration)
-    missed, missed_moment = slip_integrals(block, -HALF_PI, began, 1.0)
-    up = missed + slip_integrals(block, began, 0.0, 1.0)[0]
+    missed, missed_moment = eq4_integrals(block, -HALF_PI, began, 1.0)
+    up = missed + eq4_integrals(block, began, 0.0, 1.0)[0]
     drift = drift_integral(block)
     displacement = continuous_displacement(up, missed, missed_moment, drift, began, cycles)
     peak = math.nan
@@ -169,15 +169,9 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     return Motion(displacement, peak, 0)
 
 
-@scalar
-def drift_rate(block: Block, x: float) -> float:
-    """tan θ x (μs − tan θ − μ), half of what V gains at x and at −x together; where μ is huge, tan θ x is not."""
-    return block.tan_theta * x * (block.mu_s - block.tan_theta - friction(block, x))
-
-
 @summed
 def drift_integral(block: Block) -> float:
-    """Gain of V over a whole cycle, 4 ∫ tan θ x (μs − tan θ − μ) dψ over a quarter.
+    """Gain of V over a whole cycle, four times that of Eq. 4's `drift` over a quarter.
 
     The sum of the two half cycles with g cancelled by hand: over 10⁶ cycles the rounding
     of that cancellation would show.
@@ -192,7 +186,7 @@ def drift_integral(block: Block) -> float:
         part = 0.0
         for node in range(NODES.size):
             x = block.amplitude * sine_after(left, width * NODES[node])
-            part += WEIGHTS[node] * drift_rate(block, x)
+            part += WEIGHTS[node] * eq.drift(x, friction(block, x), block.mu_s, block.tan_theta)
         total += part * width
         left = right
         if e_foldings <= bound:
@@ -216,21 +210,10 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 
 @in_lanes
-def lane_rate_and_slope(lanes: np.ndarray, j: int, side: float, x: float, g: float) -> tuple[float, float]:
-    """D and dD/d|Üg| of a lane in continuous sliding, |Üg| = x, on the positive (`side` 1) or negative (−1) half."""
-    tan_theta, mu_s, decay = lanes[TAN_THETA + j], lanes[MU_S + j], lanes[DECAY + j]
-    mu = lane_friction(lanes, j, x)
-    kept = mu_s - tan_theta - mu
-    rate = side * (g * (mu_s - mu)) + x * tan_theta * kept
-    slope = side * (g * (mu * decay)) + tan_theta * (kept + x * (mu * decay))
-    return rate, slope
-
-
-@in_lanes
 def _turn_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
     """To D = 0, from Üg = 0 on."""
-    rate, slope = lane_rate_and_slope(lanes, j, side, x, g)
-    step = rate / slope
+    rate, slope = lane_rate_and_slope(lanes, j, side * x, g)
+    step = side * (rate / slope)
     return x - step, step, min(x, lanes[AMPLITUDE + j] - x)
 
 
@@ -246,10 +229,10 @@ def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
     without passing it.
     """
     for j in range(STRIP):
-        at_peak, slope = lane_rate_and_slope(lanes, j, side, lanes[AMPLITUDE + j], g)
+        at_peak, slope = lane_rate_and_slope(lanes, j, side * lanes[AMPLITUDE + j], g)
         turns = side * at_peak > 0.0
         # one that has its first sign at the peak may have changed twice, unless it still goes away from it
-        monotone = side * slope >= 0.0
+        monotone = slope >= 0.0
         lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
         lanes[PSI + j] = 0.0 if turns else 1.0
         lanes[X + j] = 0.0
@@ -263,7 +246,7 @@ def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
         for j in range(STRIP):
             phi = lanes[PSI + j] * at
             x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-            lanes[RATE + j] += weight * lane_rate_and_slope(lanes, j, side, x, g)[0]
+            lanes[RATE + j] += weight * lane_relative_acceleration(lanes, j, side * x, g)
     for j in range(STRIP):
         lanes[RATE + j] *= lanes[PSI + j]
 
@@ -286,7 +269,7 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
             # sin φ on the way from Üg = 0 to Üg = Üy
             phi = (HALF_PI + lanes[BEGAN + j]) * at
             x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-            weighted = weight * lane_slip(lanes, j, x, g)
+            weighted = weight * lane_relative_acceleration(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):

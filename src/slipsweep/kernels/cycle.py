@@ -21,12 +21,10 @@ import numpy as np
 from slipsweep.jit.decorators import scalar, summed
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.block import (
-    EVENT_TOLERANCE,
     INTEGRATE,
     KD_NOT_POSITIVE,
     LITERAL,
     NEWMARK,
-    NO_VALUE,
     Block,
     Motion,
     Options,
@@ -34,15 +32,17 @@ from slipsweep.kernels.block import (
     friction,
     inflection,
     opposite,
+    relative_acceleration,
+    relative_acceleration_root,
     response,
     response_and_slope,
     response_root,
-    slip,
-    slip_root,
     slope_and_curvature,
     slope_root,
     starting_acceleration,
+    store_motion,
 )
+from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import held_gain, held_integrals, offset_at, phase_at, plane
 from slipsweep.kernels.linear import exponential_moments
 from slipsweep.kernels.train import Pulse, attenuate, beginning, first_pulse, train_of
@@ -164,7 +164,7 @@ def lag_integrals(block: Block, wave: Wave, p: int, start: float, end: float) ->
 
 
 @scalar
-def slip_integrals(block: Block, wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
+def eq4_integrals(block: Block, wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest."""
     first, second, first_x, second_x = lag_integrals(block, wave, p, start, end)
     side_g = math.copysign(block.g, wave.pieces[p, TOP])
@@ -196,12 +196,12 @@ def onset(block: Block, x: float, top: float) -> float:
             break
         end = next_break(block, x, top)
         inner = x + SLIVER * (end - x)
-        if slip(block, inner) > 0.0:
+        if relative_acceleration(block, inner) > 0.0:
             return x
-        if slip(block, end) > 0.0:
-            return slip_root(block, 0.0, inner, end)
+        if relative_acceleration(block, end) > 0.0:
+            return relative_acceleration_root(block, inner, end)
         x = end
-    return top
+    return top if x >= top else math.nan
 
 
 @scalar
@@ -220,8 +220,8 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
         if not follows and slope > 0.0 and response(block, end) > b:
             end = response_root(block, b, inner, end)
             crosses = True
-        if follows and opposite(slip(block, inner), slip(block, end)):
-            end = slip_root(block, 0.0, inner, end)
+        if follows and opposite(relative_acceleration(block, inner), relative_acceleration(block, end)):
+            end = relative_acceleration_root(block, inner, end)
     if not follows and x < b < end:
         end = b
         crosses = False
@@ -229,30 +229,23 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
 
 
 @scalar
-def stop(
-    block: Block, wave: Wave, p: int, held: float, follows: bool, velocity: float, start: float, low: float, high: float
-) -> float:
-    """Where on piece p, between low and high, V is zero that was `velocity` at `start` and falls."""
-    amplitude = block.amplitude
-    tau = 0.5 * (low + high)
-    for _ in range(200):
-        x = plane(wave, p, amplitude, tau)
-        if follows:
-            left, rate = velocity + slip_integrals(block, wave, p, start, tau)[0], slip(block, x)
-        else:
-            left, rate = velocity + held_gain(wave, p, amplitude, held, start, tau), x - held
-        if left > 0.0:
-            low = tau
-        else:
-            high = tau
-        new = tau - left / rate
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        step = abs(new - tau)
-        tau = new
-        if step <= EVENT_TOLERANCE * (tau - start):
-            break
-    return tau
+def _held_lost(where: tuple[Block, Wave, int, float, float, float], tau: float) -> tuple[float, float]:
+    """−V at τ of a hold that V entered at `start`, and its rate."""
+    block, wave, p, held, velocity, start = where
+    left = velocity + held_gain(wave, p, block.amplitude, held, start, tau)
+    return -left, held - plane(wave, p, block.amplitude, tau)
+
+
+@scalar
+def _followed_lost(where: tuple[Block, Wave, int, float, float], tau: float) -> tuple[float, float]:
+    """−V at τ where b follows Eq. 4, and its rate."""
+    block, wave, p, velocity, start = where
+    left = velocity + eq4_integrals(block, wave, p, start, tau)[0]
+    return -left, -relative_acceleration(block, plane(wave, p, block.amplitude, tau))
+
+
+_held_stop = root_of(_held_lost)
+_followed_stop = root_of(_followed_lost)
 
 
 @scalar
@@ -289,15 +282,15 @@ def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.n
         turn = offset_at(wave, p, amplitude, held)
         extreme = velocity + held_gain(wave, p, amplitude, held, start, turn)
         if rate > 0.0:
-            state[PEAK] = max(state[PEAK], extreme)
+            state[PEAK] = max(extreme, state[PEAK])  # in this order a NaN is kept
             low = turn
         else:
-            state[LEAST] = min(state[LEAST], extreme)
+            state[LEAST] = min(extreme, state[LEAST])
             stops, high = extreme <= 0.0, turn
     if stops:
         end = start
         if velocity > 0.0 or rate > 0.0:
-            end = stop(block, wave, p, held, False, velocity, start, low, high)
+            end = _held_stop((block, wave, p, held, velocity, start), low, high, 0.5 * (low + high), start)
         gained, moved = held_integrals(wave, p, amplitude, held, start, end)
     record(legs, HOLD, p, start, phase_at(wave, p, start), phase_at(wave, p, end), state)
     advance(wave, p, end, stops, gained, moved, end - start, state)
@@ -307,11 +300,12 @@ def hold(block: Block, wave: Wave, p: int, start: float, end: float, state: np.n
 @scalar
 def follow(block: Block, wave: Wave, p: int, start: float, end: float, state: np.ndarray, legs: np.ndarray) -> float:
     """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop: where that is."""
-    gained, moved = slip_integrals(block, wave, p, start, end)
+    gained, moved = eq4_integrals(block, wave, p, start, end)
     stops = state[VELOCITY] + gained <= 0.0
     if stops:
-        end = stop(block, wave, p, 0.0, True, state[VELOCITY], start, start, end)
-        gained, moved = slip_integrals(block, wave, p, start, end)
+        velocity = state[VELOCITY]
+        end = _followed_stop((block, wave, p, velocity, start), start, end, 0.5 * (start + end), start)
+        gained, moved = eq4_integrals(block, wave, p, start, end)
     record(legs, FOLLOW, p, start, phase_at(wave, p, start), phase_at(wave, p, end), state)
     advance(wave, p, end, stops, gained, moved, end - start, state)
     return end
@@ -371,6 +365,8 @@ def rise(block: Block, wave: Wave, p: int, tau: float, x: float, state: np.ndarr
             state[HELD] = response(block, x)
         if x >= top:
             break
+    else:
+        state[VELOCITY] = math.nan
 
 
 @scalar
@@ -455,15 +451,17 @@ train = train_of(follow_pulse)
 
 
 @scalar
-def zeros_of_slip(block: Block, side: float, zeros: np.ndarray) -> int:
-    """Where on the way from Üg = 0 to the peak of one side D changes its sign; their number."""
+def zeros_of_relative_acceleration(block: Block, side: float, zeros: np.ndarray) -> int:
+    """Where on the way from Üg = 0 to the peak of one side D changes its sign; their number, or −1 if not found."""
     count = 0
     x, end = math.copysign(0.0, side), side * block.amplitude
     for _ in range(zeros.size):
         target = next_break(block, x, end)
         inner = x + SLIVER * (target - x)
-        if opposite(slip(block, inner), slip(block, target)):
-            zeros[count] = slip_root(block, 0.0, inner, target)
+        if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):
+            zeros[count] = relative_acceleration_root(block, inner, target)
+            if math.isnan(zeros[count]):
+                return -1
             count += 1
         x = target
         if x == end:
@@ -479,7 +477,10 @@ def continuous_cycle(
     zeros = np.empty((2, MOST_LEGS)) if wants_peak else np.empty((2, 0))
     up, down = 0, 0
     if wants_peak:
-        up, down = zeros_of_slip(block, 1.0, zeros[0]), zeros_of_slip(block, -1.0, zeros[1])
+        up = zeros_of_relative_acceleration(block, 1.0, zeros[0])
+        down = zeros_of_relative_acceleration(block, -1.0, zeros[1])
+        if min(up, down) < 0:
+            return math.nan, math.nan, math.nan
     velocity, displacement, peak = 0.0, 0.0, 0.0
     above, below, both = 0.0, 0.0, 0.0
     for q in range(p, wave.cycle[c + 1]):
@@ -492,7 +493,7 @@ def continuous_cycle(
                 if least < zero < most:
                     at = offset_at(wave, q, block.amplitude, zero)
                     if at > start:
-                        peak = max(peak, velocity + slip_integrals(block, wave, q, start, at)[0])
+                        peak = max(peak, velocity + eq4_integrals(block, wave, q, start, at)[0])
         first, second, first_x, second_x = lag_integrals(block, wave, q, start, end)
         side_g = block.g if side == 1 else -block.g
         displacement += velocity * (end - start) + side_g * second + block.tan_theta * second_x
@@ -546,15 +547,6 @@ def continuous(block: Block, options: Options, wave: Wave) -> Motion:
 
 
 @scalar
-def answer(found: Motion, j: int, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Enter the motion of cell j of a tile."""
-    motion[0, j], motion[1, j] = found.displacement, found.peak_velocity
-    codes[1, j] |= found.validity
-    if found.validity & NO_VALUE:
-        codes[0, j] = -1
-
-
-@scalar
 def solve_cells(
     cells: np.ndarray, count: int, options: Options, wave: Wave, motion: np.ndarray, codes: np.ndarray
 ) -> None:
@@ -565,6 +557,6 @@ def solve_cells(
         codes[0, j], codes[1, j] = block.sliding_mode, block.validity
         motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
         if block.sliding_mode == CONTINUOUS:
-            answer(continuous(block, options, wave), j, motion, codes)
+            store_motion(continuous(block, options, wave), j, motion, codes)
         elif block.sliding_mode == STICK_SLIP:
-            answer(train(block, options, wave, no_legs), j, motion, codes)
+            store_motion(train(block, options, wave, no_legs), j, motion, codes)

@@ -13,10 +13,8 @@ import math
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
+from slipsweep.kernels.events import root_of
 from slipsweep.motion.pieces import ARC, BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, LAST, ONCE, START, TOP, TWICE, Wave
-
-#: Relative size of the last Newton step of `offset_at`: its square is below rounding.
-_TOLERANCE = 1e-8
 
 
 @scalar
@@ -90,6 +88,16 @@ def held_integrals(wave: Wave, p: int, amplitude: float, held: float, start: flo
 
 
 @scalar
+def _beyond(where: tuple[Wave, int, float], tau: float) -> tuple[float, float]:
+    wave, p, wanted = where
+    return from_top(wave, p, tau) - wanted, slope(wave, p, tau)
+
+
+#: τ on a piece between two places, from a third on, at which w − top is `wanted`.
+offset_root = root_of(_beyond)
+
+
+@scalar
 def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
     """τ at which the plane's acceleration is x on piece p (the nearer end, if x lies beyond)."""
     far = wave.pieces[p, BEGIN] + wave.pieces[p, FINISH]  # one of them is 0
@@ -105,21 +113,9 @@ def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
     if wave.pieces[p, ARC] > 0.0:
         return math.copysign(inverse_versine(abs(wanted)), far)
     tau = far * (math.sqrt(share) if wave.pieces[p, COEFFICIENTS + 0] == 0.0 else share)
-    low, high = 0.0, far  # from the anchor on
-    for _ in range(100):
-        over = from_top(wave, p, tau) - wanted
-        if (over < 0.0) == (wanted < 0.0):
-            high = tau
-        else:
-            low = tau
-        new = tau - over / slope(wave, p, tau)
-        if not min(low, high) <= new <= max(low, high):
-            new = 0.5 * (low + high)
-        step = abs(new - tau)
-        tau = new
-        if step <= _TOLERANCE * abs(tau):
-            break
-    return tau
+    if wanted < 0.0:
+        return offset_root((wave, p, wanted), far, 0.0, tau, 0.0)
+    return offset_root((wave, p, wanted), 0.0, far, tau, 0.0)
 
 
 @scalar

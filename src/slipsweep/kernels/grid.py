@@ -13,7 +13,7 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle, sine, step
-from slipsweep.kernels.block import TILE, Options, block_of, cell_of
+from slipsweep.kernels.block import TILE, UNSOLVED, Options, block_of, cell_of
 from slipsweep.kernels.lanes import LANES_SIZE
 from slipsweep.motion.pieces import Wave
 
@@ -33,12 +33,13 @@ class Grid(NamedTuple):
 
 
 class Results(NamedTuple):
-    """Flat result arrays; one of size 0 is not wanted."""
+    """Flat result arrays; one of size 0 is not wanted.  `unsolved` has one number, of a cell that was not solved."""
 
     displacement: np.ndarray
     velocity: np.ndarray
     mode: np.ndarray
     validity: np.ndarray
+    unsolved: np.ndarray
 
 
 class Runs(NamedTuple):
@@ -154,6 +155,14 @@ def scatter(
                     results.validity[result + j * cell_stride + k * stride] = codes[1, begin + j]
 
 
+@scalar
+def note_unsolved(begin: int, count: int, codes: np.ndarray, results: Results) -> None:
+    """Note a cell in which an event was not found (`events`), if there is one."""
+    for j in range(count):
+        if codes[1, j] & UNSOLVED:
+            results.unsolved[0] = begin + j
+
+
 def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     results: Results, rest: np.ndarray,
@@ -191,6 +200,7 @@ def _wave_grid(
             count = min(TILE, last - begin)
             found = gather(grid, begin, count, inputs, cells, runs)
             cycle.solve_cells(cells, count, options, wave, motion, codes)
+            note_unsolved(begin, count, codes, results)
             scatter(grid, runs, found, periods, motion, codes, results)
 
 
@@ -206,6 +216,7 @@ def _step_grid_of(rule: int) -> Kernel:
             count = min(TILE, last - begin)
             found = gather(grid, begin, count, inputs, cells, runs)
             step.solve_cells(cells, count, rule, options, steps, motion, codes)
+            note_unsolved(begin, count, codes, results)
             scatter(grid, runs, found, periods, motion, codes, results)
 
     return Kernel(step_grid)

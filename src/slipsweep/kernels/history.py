@@ -62,7 +62,7 @@ def sample_leg(
         gained, gained_way = -b * since, -0.5 * b * since * since
     elif kind == FOLLOW:
         sample[BLOCK] = response(block, sample[GROUND])
-        gained, gained_way = cycle.slip_integrals(block, wave, p, tau, tau + since)
+        gained, gained_way = cycle.eq4_integrals(block, wave, p, tau, tau + since)
     else:
         sample[BLOCK] = b
         gained, gained_way = held_integrals(wave, p, block.amplitude, b, tau, tau + since)
@@ -132,12 +132,12 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
             start_phase = phase_at(wave, p, start) + offset
             while at < phases.size and phases[at] < wave.pieces[p, END] + offset:
                 since = max(phases[at] - start_phase, 0.0)
-                gained, moved = cycle.slip_integrals(block, wave, p, start, min(start + since, wave.pieces[p, FINISH]))
+                gained, moved = cycle.eq4_integrals(block, wave, p, start, min(start + since, wave.pieces[p, FINISH]))
                 history[at, BLOCK] = response(block, history[at, GROUND])
                 history[at, VELOCITY] = velocity + gained
                 history[at, DISPLACEMENT] = displacement + velocity * since + moved
                 at += 1
-            gained, moved = cycle.slip_integrals(block, wave, p, start, wave.pieces[p, FINISH])
+            gained, moved = cycle.eq4_integrals(block, wave, p, start, wave.pieces[p, FINISH])
             displacement += velocity * (wave.pieces[p, FINISH] - start) + moved
             velocity += gained
         if c == wave.lead:

@@ -14,18 +14,14 @@ from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
-    DECAY,
-    EVENT_TOLERANCE,
-    MU_S,
     NOT_RECOUPLED,
-    STRIP,
-    TAN_THETA,
     YIELD,
     Options,
-    lane_friction,
+    lane_rate_and_slope,
+    lane_relative_acceleration,
     lane_response,
-    lane_slip,
 )
+from slipsweep.kernels.events import STRIP, root_of, settling
 from slipsweep.kernels.lanes import (
     AT_PEAK,
     CARRIED,
@@ -43,7 +39,6 @@ from slipsweep.kernels.lanes import (
     LEVEL,
     MOMENT,
     MOST,
-    MOST_ITERATIONS,
     MOVED,
     ONSET,
     PEAK,
@@ -58,7 +53,6 @@ from slipsweep.kernels.lanes import (
     V,
     W,
     X,
-    settling,
 )
 from slipsweep.model import equations as eq
 
@@ -89,18 +83,15 @@ def stopping_step(amplitude: float, held: float, velocity: float, start: float, 
 @in_lanes
 def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
     """E and dE/dx of a lane (x > 0)."""
-    tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]
-    mu = lane_friction(lanes, j, x)
-    n = eq.normal_acceleration(x, tan_theta, g)
-    slope = 1.0 - tan_theta * (mu_s - tan_theta - mu) - n * mu * lanes[DECAY + j]
-    return x - eq.lag(x, mu, mu_s, tan_theta, g), slope
+    rate, slope = lane_rate_and_slope(lanes, j, x, g)
+    return x - rate, 1.0 - slope
 
 
 @in_lanes
 def _onset_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
     """To D = 0, from the left, where a concave D converges, slowly where it starts flat."""
-    asked, slope = lane_response_and_slope(lanes, j, x, g)
-    step = (asked - x) / (1.0 - slope)
+    rate, slope = lane_rate_and_slope(lanes, j, x, g)
+    step = -rate / slope
     return x + step, step, min(x, lanes[AMPLITUDE + j] - x)
 
 
@@ -197,7 +188,7 @@ def lane_rise(way: int, g: float, lanes: np.ndarray) -> None:
         left, weight = 1.0 - LANE_NODES[node], LANE_WEIGHTS[node]
         for j in range(STRIP):
             x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[PSI + j] * left))
-            weighted = weight * lane_slip(lanes, j, x, g)
+            weighted = weight * lane_relative_acceleration(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
@@ -242,19 +233,17 @@ def pause_of(began: float) -> float:
 
 
 @in_lanes
-def slid(velocity: float, after: float, held: float) -> float:
-    """W while Eq. 12 brings V down: (V² − V'²) / 2b, the squares of which need be no doubles."""
-    return 0.5 * (velocity - after) * ((velocity + after) / held)
-
-
-@in_lanes
 def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: float) -> float:
     """W of the pulse that a lane has followed and of `later` more, each entered with V greater by `gain`.
 
     All but the last slide `braked` and π · gain · (2n − 1) more between two pulses, the last to its stop.
     """
     moved, left = lanes[W + j], lanes[LEFT + j] + later * gain
-    last = moved + later * gain * (HALF_PI - lanes[BEGAN + j]) + slid(left, 0.0, lanes[HELD + j])
+    last = (
+        moved
+        + later * gain * (HALF_PI - lanes[BEGAN + j])
+        + eq.attenuated_displacement(left, lanes[HELD + j], math.inf)
+    )
     return later * (moved + braked + math.pi * gain * (later - 1.0)) + last
 
 
@@ -268,11 +257,12 @@ def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
     """
     for j in range(STRIP):
         held, left, moved = lanes[HELD + j], lanes[LEFT + j], lanes[W + j]
-        carried = max(left - held * pause_of(lanes[BEGAN + j]), 0.0)
-        braked = slid(left, carried, held)
+        pause = pause_of(lanes[BEGAN + j])
+        carried = eq.attenuated_velocity(left, held, pause)
+        braked = eq.attenuated_displacement(left, held, pause)
         later = cycles - 1.0
         lanes[CARRIED + j], lanes[MOVED + j] = carried, moved + braked
-        lanes[LAST + j] = moved + slid(left, 0.0, held)
+        lanes[LAST + j] = moved + eq.attenuated_displacement(left, held, math.inf)
         lanes[HIGHEST + j], lanes[ONSET + j] = lanes[PEAK + j], lanes[START + j]
         lanes[W + j] = lane_series(lanes, j, braked, carried, later)
         lanes[PEAK + j] += later * carried
@@ -354,7 +344,7 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         held_on = held_motion(lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
         again = lanes[V + j] * (psi - began) + held_on if psi > began else 0.0
         stops = psi > began
-        braked = slid(left, lanes[CARRIED + j] + gain, lanes[HELD + j])
+        braked = eq.attenuated_displacement(left, lanes[HELD + j], pause_of(began))
         periods = np.floor(later / (most + 1.0))
         rest = later - periods * (most + 1.0)
         sliding_on = most * (lanes[W + j] + braked + math.pi * gain * (most - 1.0))
@@ -378,16 +368,22 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
 
 
 @scalar
+def _lost_and_rate(where: tuple[float, float, float, float], psi: float) -> tuple[float, float]:
+    """−V at ψ of a hold that was entered with `velocity` at `start`, and its rate."""
+    amplitude, held, velocity, start = where
+    left = velocity + held_motion(amplitude, held, start, psi)[0]
+    return -left, held - amplitude * (1.0 - versine(psi))
+
+
+_stop_root = root_of(_lost_and_rate)
+
+
+@scalar
 def held_stop(lanes: np.ndarray, j: int, velocity: float) -> float:
     """ψ at which the hold from Üy on, entered with `velocity`, stops before its slowest; NaN if not found."""
     amplitude, held, began = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j]
-    psi = began
-    for _ in range(MOST_ITERATIONS):
-        step = stopping_step(amplitude, held, velocity, began, psi)
-        psi -= step
-        if abs(step) <= EVENT_TOLERANCE * (psi - began):
-            return psi
-    return math.nan
+    slowest = rising_phase(min(held, amplitude), amplitude)
+    return _stop_root((amplitude, held, velocity, began), began, slowest, began, began)
 
 
 @summed
@@ -397,31 +393,37 @@ def followed_to_peak(lanes: np.ndarray, j: int, start: float, g: float) -> tuple
     for node in range(LANE_NODES.size):
         left = 1.0 - LANE_NODES[node]
         x = lanes[AMPLITUDE + j] * (1.0 - versine(start * left))
-        weighted = LANE_WEIGHTS[node] * lane_slip(lanes, j, x, g)
+        weighted = LANE_WEIGHTS[node] * lane_relative_acceleration(lanes, j, x, g)
         rate += weighted
         moment += left * weighted
     return -start * rate, start * start * moment
 
 
 @scalar
+def _lane_response_above(where: tuple[np.ndarray, int, float, float], x: float) -> tuple[float, float]:
+    lanes, j, level, g = where
+    value, slope = lane_response_and_slope(lanes, j, x, g)
+    return value - level, slope
+
+
+_switch_root = root_of(_lane_response_above)
+
+
+@scalar
 def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float, float]:
     """b at the peak, and V and W gained there, of a lane that starts to slide at ψ = `start`, beyond t1; or NaN."""
     amplitude = lanes[AMPLITUDE + j]
-    asked, slope = lane_response_and_slope(lanes, j, amplitude * (1.0 - versine(start)), g)
+    x_start = amplitude * (1.0 - versine(start))
+    asked, slope = lane_response_and_slope(lanes, j, x_start, g)
     level = max(lanes[YIELD + j], asked)
     at_peak, slope_at_peak = lane_response_and_slope(lanes, j, amplitude, g)
     if at_peak <= level:
         return level, *held_motion(amplitude, level, start, 0.0)
     psi = start
     if slope <= 0.0 or asked < level:  # as in `lane_switch`
-        x, step = amplitude - (at_peak - level) / slope_at_peak, math.inf
-        for _ in range(MOST_ITERATIONS):
-            if abs(step) <= EVENT_TOLERANCE * min(x, amplitude - x):
-                break
-            asked, slope = lane_response_and_slope(lanes, j, x, g)
-            step = (asked - level) / slope
-            x -= step
-        else:
+        x = amplitude - (at_peak - level) / slope_at_peak
+        x = _switch_root((lanes, j, level, g), x_start, amplitude, x, amplitude)
+        if math.isnan(x):
             return math.nan, math.nan, math.nan
         psi = max(rising_phase(x, amplitude), start)
     held_on = held_motion(amplitude, level, start, psi)
@@ -432,14 +434,8 @@ def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, f
 @scalar
 def fall_stop(amplitude: float, held: float, at_peak: float, highest: float, top: float) -> float:
     """ψ after the peak at which V = `at_peak` there, largest at ψ = `top`, is used up by the hold; NaN if not found."""
-    psi = top + math.sqrt(2.0 * highest / (amplitude * (top - angle_minus_sine(top))))  # beyond it
-    for _ in range(MOST_ITERATIONS):
-        psi = min(psi, HALF_PI)
-        step = stopping_step(amplitude, held, at_peak, 0.0, psi)
-        psi -= step
-        if abs(step) <= EVENT_TOLERANCE * psi:
-            return psi
-    return math.nan
+    beyond = top + math.sqrt(2.0 * highest / (amplitude * (top - angle_minus_sine(top))))
+    return _stop_root((amplitude, held, at_peak, 0.0), top, min(beyond, HALF_PI), min(beyond, HALF_PI), 0.0)
 
 
 @scalar
@@ -472,9 +468,9 @@ def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
         left = at_peak + held_motion(amplitude, held, 0.0, HALF_PI)[0]
         end = HALF_PI if left > 0.0 else fall_stop(amplitude, held, at_peak, peak, top)
         moved += at_peak * end + held_motion(amplitude, held, 0.0, end)[1]
-        left = max(left, 0.0)
-        velocity = max(left - held * pause_of(began), 0.0) if later > 0 else 0.0
-        moved += slid(left, velocity, held)
+        left, pause = max(left, 0.0), pause_of(began) if later > 0 else math.inf
+        velocity = eq.attenuated_velocity(left, held, pause)
+        moved += eq.attenuated_displacement(left, held, pause)
         highest = max(highest, peak)
     # NaN where an iteration has not converged
     if moved >= 0.0:

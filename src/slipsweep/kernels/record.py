@@ -19,7 +19,6 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
-    EVENT_TOLERANCE,
     FRICTION_NOT_DECAYING,
     INTEGRATE,
     KD_NOT_POSITIVE,
@@ -37,13 +36,14 @@ from slipsweep.kernels.block import (
     block_of,
     cell_of,
     opposite,
+    relative_acceleration,
+    relative_acceleration_root,
     response,
-    slip,
-    slip_root,
     starting_acceleration,
     stays_below_yield,
 )
 from slipsweep.kernels.cycle import next_break, onset, rising_leg, straight_lag
+from slipsweep.kernels.events import root_of
 from slipsweep.kernels.grid import Grid, empty_runs, gather, place_of
 from slipsweep.kernels.linear import held_integrals, held_stop
 from slipsweep.model import equations as eq
@@ -98,24 +98,19 @@ def follow_integrals(block: Block, x: float, slope: float, duration: float, side
 
 
 @scalar
+def _followed_lost(where: tuple[Block, float, float, float], t: float) -> tuple[float, float]:
+    block, x, slope, velocity = where
+    left = velocity + follow_integrals(block, x, slope, t, 1.0)[0]
+    return -left, -relative_acceleration(block, x + slope * t)
+
+
+_followed_stop = root_of(_followed_lost)
+
+
+@scalar
 def follow_stop(block: Block, x: float, slope: float, duration: float, velocity: float) -> float:
-    """When, within `duration`, a velocity that falls under Eq. 4 (x > 0) is zero: Newton kept in its bracket."""
-    low, high = 0.0, duration
-    t = 0.5 * duration
-    for _ in range(200):
-        left = velocity + follow_integrals(block, x, slope, t, 1.0)[0]
-        if left > 0.0:
-            low = t
-        else:
-            high = t
-        new = t - left / slip(block, x + slope * t)
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        step = abs(new - t)
-        t = new
-        if step <= EVENT_TOLERANCE * t:
-            break
-    return t
+    """When, within `duration`, a velocity that falls under Eq. 4 (x > 0) is zero."""
+    return _followed_stop((block, x, slope, velocity), 0.0, duration, 0.5 * duration, 0.0)
 
 
 @scalar
@@ -287,8 +282,8 @@ def follow_leg(
         for _ in range(_MOST_LEGS):
             target = next_break(block, low, high)
             inner = low + _SLIVER * (target - low)
-            if opposite(slip(block, inner), slip(block, target)):
-                zero = slip_root(block, 0.0, inner, target)
+            if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):
+                zero = relative_acceleration_root(block, inner, target)
                 gained = follow_integrals(block, x, slope, (zero - x) / slope, side)[0]
                 state[PEAK] = max(state[PEAK], state[VELOCITY] + gained)
             low = target

@@ -35,10 +35,10 @@ from slipsweep.kernels.block import (
     decay_rate_of,
     interface_of,
     lane_response,
+    store_motion,
     whole_lanes,
 )
 from slipsweep.kernels.continuous import SHORT_SINE, continuous, lane_continuous
-from slipsweep.kernels.cycle import answer
 from slipsweep.kernels.lanes import (
     CODE,
     CONVERGED,
@@ -279,9 +279,9 @@ def solve_cells(
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[_MODE + j]), int(blocks[_VALIDITY + j])
         motion[0, j] = motion[1, j] = 0.0 if blocks[_MODE + j] == STUCK else math.nan
-    found = runs_of(blocks, count, room.runs)
+    number = runs_of(blocks, count, room.runs)
     for way in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
-        solve_way(way, found, options, room, motion, codes)
+        solve_way(way, number, options, room, motion, codes)
     others = 0
     for j in range(count):
         others += 1 if blocks[_WAY + j] == OTHER else 0
@@ -290,7 +290,9 @@ def solve_cells(
         if left[j]:
             block = block_at(cells, j, options)
             if block.sliding_mode == CONTINUOUS:
-                answer(continuous(block, options.cycles, options.wants_peak), j, motion, codes)
-                left[j] = False
-                others -= 1
+                found = continuous(block, options.cycles, options.wants_peak)
+                if not (options.wants_peak and math.isnan(found.peak_velocity)):
+                    store_motion(found, j, motion, codes)
+                    left[j] = False
+                    others -= 1
     return others

@@ -29,16 +29,12 @@ from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
     AMPLITUDE,
     EQ4_BELOW_YIELD,
-    EVENT_TOLERANCE,
     INTEGRATE,
     KD_NOT_POSITIVE,
     LANE_ROWS,
     LITERAL,
     MONOTONE,
-    MU_S,
     NEWMARK,
-    NO_VALUE,
-    TAN_THETA,
     TILE,
     YIELD,
     Block,
@@ -46,20 +42,22 @@ from slipsweep.kernels.block import (
     Options,
     block_at,
     inflection,
-    lane_friction,
+    lane_drift,
     lane_of,
+    lane_relative_acceleration,
     lane_response,
+    relative_acceleration,
+    relative_acceleration_root,
     response,
     response_and_slope,
     response_root,
-    slip,
-    slip_root,
     slope_root,
     starting_acceleration,
+    store_motion,
     whole_lanes,
 )
-from slipsweep.kernels.excitation import from_top, offset_at, phase_at, plane
-from slipsweep.kernels.excitation import slope as w_slope
+from slipsweep.kernels.events import root_of
+from slipsweep.kernels.excitation import offset_at, offset_root, phase_at, plane
 from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
@@ -203,24 +201,20 @@ def displacement_gain(c0: float, c1: float, c2: float, h: float, s: float) -> fl
 
 
 @scalar
+def _lost(where: tuple[float, float, float, float, float], s: float) -> tuple[float, float]:
+    """−V at the fraction s of a step, and its rate."""
+    velocity, c0, c1, c2, h = where
+    return -(velocity + velocity_gain(c0, c1, c2, h, s)), -h * (c0 + s * (c1 + s * c2))
+
+
+_stop_root = root_of(_lost)
+
+
+@scalar
 def stop(velocity: float, c0: float, c1: float, c2: float, h: float) -> float:
     """Fraction of the step at which V, zero or less at its end, reaches zero."""
-    low, high = 0.0, 1.0
     s = velocity / (velocity - velocity_gain(c0, c1, c2, h, 1.0)) if velocity > 0.0 else 1.0
-    for _ in range(100):
-        left = velocity + velocity_gain(c0, c1, c2, h, s)
-        if left > 0.0:
-            low = s
-        else:
-            high = s
-        new = s - left / (h * (c0 + s * (c1 + s * c2)))
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        change = abs(new - s)
-        s = new
-        if change <= 1e-12:
-            break
-    return s
+    return _stop_root((velocity, c0, c1, c2, h), 0.0, 1.0, s, 0.0)
 
 
 @scalar
@@ -310,22 +304,10 @@ def tau_within(steps: Steps, p: int, k: int, amplitude: float, x: float) -> floa
     if w_low == w_high:
         return low
     wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
-    rises = w_high > w_low
     tau = low + (high - low) * min(max((x / amplitude - w_low) / (w_high - w_low), 0.0), 1.0)
-    for _ in range(60):
-        over = from_top(wave, p, tau) - wanted
-        if (over > 0.0) == rises:
-            high = tau
-        else:
-            low = tau
-        new = tau - over / w_slope(wave, p, tau)
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        step = abs(new - tau)
-        tau = new
-        if step <= EVENT_TOLERANCE * abs(tau):
-            break
-    return tau
+    if w_high > w_low:
+        return offset_root((wave, p, wanted), low, high, tau, 0.0)
+    return offset_root((wave, p, wanted), high, low, tau, 0.0)
 
 
 @scalar
@@ -395,15 +377,15 @@ def rise_step(
                 if x_end <= block.yield_acceleration:
                     break
                 x, located = block.yield_acceleration, False
-            if block.rise == NEWMARK or slip(block, x) > 0.0:
+            if block.rise == NEWMARK or relative_acceleration(block, x) > 0.0:
                 held = starting_acceleration(block, x)
             else:
                 top, touch = x_end, state[TOUCH]
-                if slip(block, x_end) <= 0.0:
-                    if not (x < touch < x_end and slip(block, touch) > 0.0):
+                if relative_acceleration(block, x_end) <= 0.0:
+                    if not (x < touch < x_end and relative_acceleration(block, touch) > 0.0):
                         break
                     top = touch
-                x = held = slip_root(block, 0.0, x, top)  # where Eq. 4 meets Üg
+                x = held = relative_acceleration_root(block, x, top)  # where Eq. 4 meets Üg
                 located = False
             if not located:
                 tau, located = tau_within(steps, p, k, amplitude, x), True
@@ -444,7 +426,7 @@ def rise_step(
             x_middle = amplitude * steps.nodes[at + 1]
             if tau != begin or cut != end:
                 x_middle = plane(wave, p, amplitude, tau + 0.5 * h)
-            middle = slip(block, x_middle) if follows else x_middle - held
+            middle = relative_acceleration(block, x_middle) if follows else x_middle - held
         c0, c1, c2 = coefficients(
             rule,
             rate if state[VELOCITY] > 0.0 else max(rate, 0.0),  # rounding may not stop what starts here
@@ -462,6 +444,8 @@ def rise_step(
         tau, x = cut, x_cut
         if tau >= end:
             break
+    else:
+        state[VELOCITY] = math.nan
 
 
 @scalar
@@ -485,7 +469,7 @@ def rise_steps(
             follows, held, velocity, middle = state[FOLLOWS] > 0.0, state[HELD], state[VELOCITY], 0.0
             if rule == SIMPSON:
                 x_middle = block.amplitude * nodes[at + 2 * i + 1]
-                middle = slip(block, x_middle) if follows else x_middle - held
+                middle = relative_acceleration(block, x_middle) if follows else x_middle - held
             c0, c1, c2 = coefficients(rule, x - held, middle, x_end - (asked_end if follows else held))
             after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
             switches = block.rise == MONOTONE and (asked_end < asked if follows else asked_end > held)
@@ -629,17 +613,17 @@ def continuous_step(
             x_end = plane(wave, p, block.amplitude, tau + h)
             c0, c1, c2 = coefficients(
                 rule,
-                sided_slip(block, wave, p, x),
-                sided_slip(block, wave, p, x_middle),
-                sided_slip(block, wave, p, x_end),
+                sided_relative_acceleration(block, wave, p, x),
+                sided_relative_acceleration(block, wave, p, x_middle),
+                sided_relative_acceleration(block, wave, p, x_end),
             )
             take(c0, c1, c2, h, False, state)
 
 
 @scalar
-def sided_slip(block: Block, wave: Wave, p: int, x: float) -> float:
+def sided_relative_acceleration(block: Block, wave: Wave, p: int, x: float) -> float:
     """D at Üg = x on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
-    return slip(block, math.copysign(x, wave.pieces[p, TOP]))
+    return relative_acceleration(block, math.copysign(x, wave.pieces[p, TOP]))
 
 
 #: The first rows of the lanes' states, and the rows of the lanes beside the block's: D (or E) at the last node,
@@ -858,18 +842,15 @@ def stick_slip_lanes(
     for j in range(count):
         block = block_at(cells, where[j], options)
         if lanes[_ALONE + j] > 0.0:
-            answer = train(block, options, wave, steps)
+            found = train(block, options, wave, steps)
         else:
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
                 moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
             slides = block.amplitude * highest > block.yield_acceleration
             validity = EQ4_BELOW_YIELD if slides and yield_governs(block, wave) else 0
-            answer = Motion(moved, states[_PEAK + j], validity)
-        motion[0, where[j]], motion[1, where[j]] = answer.displacement, answer.peak_velocity
-        codes[1, where[j]] |= answer.validity
-        if answer.validity & NO_VALUE:
-            codes[0, where[j]] = -1
+            found = Motion(moved, states[_PEAK + j], validity)
+        store_motion(found, where[j], motion, codes)
 
 
 @scalar
@@ -888,10 +869,9 @@ def continuous_cycle(
         starting = False
         for j in range(count):
             starting = starting | (states[_SLIDES + j] == 0.0)
-        at, side = steps.offset[p], math.copysign(1.0, wave.pieces[p, TOP])
-        h = steps.length[p]
+        at, h = steps.offset[p], steps.length[p]
         for j in range(count):
-            lanes[_ASKED + j] = lane_slip(lanes, j, lanes[AMPLITUDE + j] * nodes[at], side, g)
+            lanes[_ASKED + j] = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * nodes[at], g)
         for i in range(steps.counts[p]):
             w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
             near = min(abs(w_start), abs(w_end))
@@ -899,11 +879,11 @@ def continuous_cycle(
             events = 0
             for j in range(count):
                 x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
-                rate, rate_end = lanes[_ASKED + j], lane_slip(lanes, j, x_end, side, g)
+                rate, rate_end = lanes[_ASKED + j], lane_relative_acceleration(lanes, j, x_end, g)
                 lanes[_ASKED + j] = rate_end
                 middle = 0.0
                 if rule == SIMPSON:
-                    middle = lane_slip(lanes, j, lanes[AMPLITUDE + j] * w_middle, side, g)
+                    middle = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * w_middle, g)
                 c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
                 velocity, began = states[_VELOCITY + j], (not starting) | (states[_SLIDES + j] > 0.0)
                 after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
@@ -928,20 +908,6 @@ def continuous_cycle(
                         continuous_step(block, rule, options, wave, p, start, node(steps, p, i + 1), state)
 
 
-@in_lanes
-def lane_slip(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> float:
-    """D of a lane at Üg = x on one side of Üg = 0."""
-    excess = lanes[MU_S + j] - lane_friction(lanes, j, x)
-    return side * (g * excess + x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j]))
-
-
-@in_lanes
-def lane_shared(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """The part of D that is the same on both sides of Üg = 0, x > 0; the other, ±g (μs − μ), changes its sign."""
-    excess = lanes[MU_S + j] - lane_friction(lanes, j, x)
-    return x * lanes[TAN_THETA + j] * (excess - lanes[TAN_THETA + j])
-
-
 @scalar
 def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int, lanes: np.ndarray) -> None:
     """Gain of V of continuous lanes over cycle c, whose halves mirror each other: what both sides share, twice.
@@ -949,7 +915,7 @@ def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int,
     The rest cancels.  In V it would leave its rounding, and on a plane nearly level that is more than the gain.
     """
     literally(rule)
-    g, wave, nodes = options.g, steps.wave, steps.nodes
+    wave, nodes = steps.wave, steps.nodes
     for j in range(count):
         lanes[_GAIN + j] = 0.0
     stride = 1 if rule == SIMPSON else 2
@@ -964,13 +930,13 @@ def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int,
                 share += velocity_gain(c0, c1, c2, steps.length[p], 1.0)
                 w = nodes[at + k]
                 for j in range(count):
-                    lanes[_GAIN + j] += 2.0 * share * lane_shared(lanes, j, lanes[AMPLITUDE + j] * w, g)
+                    lanes[_GAIN + j] += 2.0 * share * lane_drift(lanes, j, lanes[AMPLITUDE + j] * w)
 
 
 @scalar
 def continuous_lanes(
     count: int, rule: int, options: Options, steps: Steps, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
-    states: np.ndarray, motion: np.ndarray,
+    states: np.ndarray, motion: np.ndarray, codes: np.ndarray,
 ) -> None:  # fmt: skip
     """Continuous sliding, cycle by cycle; repeated ones are stepped twice, the later ones follow from the second."""
     literally(rule)
@@ -1002,7 +968,7 @@ def continuous_lanes(
         if wave.alike:
             break
     for j in range(count):
-        motion[0, where[j]], motion[1, where[j]] = states[_DISPLACEMENT + j], states[_PEAK + j]
+        store_motion(Motion(states[_DISPLACEMENT + j], states[_PEAK + j], 0), where[j], motion, codes)
 
 
 @scalar
@@ -1035,4 +1001,4 @@ def solve_cells(
         if lane > 0 and wanted == STICK_SLIP:
             stick_slip_lanes(lane, rule, options, steps, cells, where, lanes, states, motion, codes)
         elif lane > 0:
-            continuous_lanes(lane, rule, options, steps, cells, where, lanes, states, motion)
+            continuous_lanes(lane, rule, options, steps, cells, where, lanes, states, motion, codes)

@@ -15,12 +15,14 @@ from slipsweep.kernels.block import (
     EQ4_BELOW_YIELD,
     NO_VALUE,
     NOT_RECOUPLED,
+    UNSOLVED,
     Block,
     Motion,
     Options,
     stays_below_yield,
 )
 from slipsweep.kernels.excitation import offset_at
+from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import BEGIN, END, FIRST, LAST, Wave
 
 
@@ -41,13 +43,8 @@ class Pulse(NamedTuple):
 
 @scalar
 def attenuate(b: float, velocity: float, duration: float) -> tuple[float, float]:
-    """Eq. 12 from t5 on, for `duration` of phase at most: V left and W.
-
-    The rate −b is constant: one step, however long, is exact.
-    """
-    if velocity <= b * duration:
-        return 0.0, 0.5 * velocity * (velocity / b)  # the square might overflow
-    return velocity - b * duration, (velocity - 0.5 * b * duration) * duration
+    """Eq. 12 from t5 on, for `duration` of phase at most: V left and W."""
+    return eq.attenuated_velocity(velocity, b, duration), eq.attenuated_displacement(velocity, b, duration)
 
 
 @scalar
@@ -105,6 +102,8 @@ def train_of(
             validity |= now.validity
             if velocity > 0.0:
                 validity |= NOT_RECOUPLED
+            if math.isnan(now.displacement + now.peak) and validity & NO_VALUE == 0:
+                validity |= UNSOLVED
             if validity & NO_VALUE:
                 break
         return Pulse(velocity, displacement, peak, least, rested, validity), k

@@ -2,8 +2,8 @@
 
 Scalars in, a scalar out, SI units, angles already as tangents; the equation number of
 the paper stands in each docstring.  The kernels call these functions as they are, so
-that what is written here is what is computed; but Eq. 5, which Eq. 6 replaces, and Eq. 12, which
-they take over a whole interval at once (`kernels.train.attenuate`).  The operators of the printed equations
+that what is written here is what is computed; but Eq. 5, which Eq. 6 replaces, and `attenuation_coefficient`:
+in Eq. 12 only g Kd = Ümax counts.  The operators of the printed equations
 were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 """
 
@@ -49,15 +49,44 @@ def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: flo
     n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
     failure Üg is small against g tan θ, which would take its digits.
     """
-    return g * (mu_s - friction) + ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
+    return g * (mu_s - friction) + drift(ground_acceleration, friction, mu_s, tan_theta)
+
+
+@in_lanes
+def drift(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float) -> float:
+    """The part of `lag` that turns its sign with Üg, Üg tan θ (μs − tan θ − μ), m/s².
+
+    It is the mean of the relative accelerations at Üg and at −Üg: all that drives a block in continuous
+    sliding down the plane, as the other part cancels over a cycle.
+    """
+    return ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
 
 
 @in_lanes
 def relative_acceleration(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
-    """Eq. 4 as the rate of the relative velocity while the block slides, Üg − Ü, m/s²."""
+    """Eq. 4 as the rate of the relative velocity while the block slides, D = Üg − Ü, m/s²."""
     return math.copysign(1.0, ground_acceleration) * lag(ground_acceleration, friction, mu_s, tan_theta, g)
+
+
+@in_lanes
+def relative_acceleration_slope(
+    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, decay: float, g: float
+) -> float:
+    """dD/dÜg of Eq. 4 with the friction of Eq. 6, `decay` = λ/g; the slope of Ü is 1 − dD/dÜg."""
+    n = normal_acceleration(ground_acceleration, tan_theta, g)
+    return math.copysign(tan_theta, ground_acceleration) * (mu_s - tan_theta - friction) + n * friction * decay
+
+
+@in_lanes
+def relative_acceleration_curvature(
+    ground_acceleration: float, friction: float, tan_theta: float, decay: float, g: float
+) -> float:
+    """d²D/dÜg² of Eq. 4 with Eq. 6, as `relative_acceleration_slope`."""
+    n = normal_acceleration(ground_acceleration, tan_theta, g)
+    turned = math.copysign(decay, ground_acceleration)
+    return friction * turned * (math.copysign(2.0 * tan_theta, ground_acceleration) - n * decay)
 
 
 @in_lanes
@@ -124,9 +153,17 @@ def attenuation_coefficient(peak_block_acceleration: float, g: float) -> float:
 
 
 @in_lanes
-def attenuated_velocity(velocity: float, attenuation_coefficient: float, duration: float, g: float) -> float:
-    """Eq. 12: relative velocity after `duration` of attenuation, not below zero, m/s."""
-    return max(velocity - g * attenuation_coefficient * duration, 0.0)
+def attenuated_velocity(velocity: float, peak_block_acceleration: float, duration: float) -> float:
+    """Eq. 12: relative velocity after `duration`, g Kd = Ümax, not below zero; as the rate is constant, in one step."""
+    return max(velocity - peak_block_acceleration * duration, 0.0)
+
+
+@in_lanes
+def attenuated_displacement(velocity: float, peak_block_acceleration: float, duration: float) -> float:
+    """Eq. 12: relative displacement in `duration`, which may be infinite, or up to the stop."""
+    stops = velocity <= peak_block_acceleration * duration
+    to_the_stop = 0.5 * velocity * (velocity / peak_block_acceleration)  # the square might overflow
+    return to_the_stop if stops else (velocity - 0.5 * peak_block_acceleration * duration) * duration
 
 
 @in_lanes

@@ -1,0 +1,98 @@
+"""Events: where something of the motion passes zero.  The one root finder of the kernels, and its form in lanes.
+
+Both are Newton's.  `root_of` keeps it in a bracket, and halves that where Newton's steps would leave it
+or come to no end.  A root that it does not find is NaN, and so is then the displacement: the run ends
+with an error that names the cell (`block.UNSOLVED`).  `settling` takes the lanes of a strip to their roots
+together, each from the side from which Newton's iteration comes there without a bracket, and marks those
+that are not there in the end: they are left to the former.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from slipsweep.jit.decorators import scalar
+
+#: Relative size of the last step to an event: the error left is its square, and at most events enters the
+#: result squared again.
+EVENT_TOLERANCE = 1e-9
+
+#: Steps of `root_of`: as many halvings reach 1e-60 of the bracket.
+_MOST_STEPS = 200
+
+#: A root so close to the origin, as a part of the bracket, lies there.  Newton's iteration comes to a
+#: double one by halves.
+_AT_ORIGIN = 1e-30
+
+#: Lanes that are solved together, until the last of their iterations has settled: neighbours take as many.
+#: Lanes are filled up to a multiple, so that no loop over them has a scalar remainder:
+#: its roundings would differ, and a cell's last digits depend on how many stand beside it.
+STRIP = 32
+
+#: Relative size of a lane's last step.  A lane that has taken it stays where it is, whatever its neighbours do.
+_LANE_TOLERANCE = 1e-7
+_MOST_LANE_STEPS = 16
+
+
+def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Callable[..., float]:
+    """The jitted root finder of a function: ``value_and_slope(where, x)`` gives f(x) and df/dx.
+
+    Bound here rather than passed as an argument: numba cannot keep a kernel on disk in which a
+    function is a value.
+    """
+
+    @scalar
+    def root(where: Any, below: float, above: float, x: float, origin: float) -> float:
+        """Where f passes 0 between `below`, where it is negative, and `above`, from x on; NaN if not found.
+
+        `where` is what f is a function of besides x, and `origin` what x is counted from: the
+        root is within 1e-9 of its distance from there.
+        """
+        width = abs(above - below)
+        last = before_last = width
+        for _ in range(_MOST_STEPS):
+            value, slope = value_and_slope(where, x)
+            if math.isnan(value):
+                break
+            if value >= 0.0:
+                above = x
+            else:
+                below = x
+            new = x - value / slope
+            # halved, too, where two steps are not half as long as the two before: Newton's may go to and fro
+            if not (min(below, above) <= new <= max(below, above) and 2.0 * abs(new - x) <= before_last):
+                new = 0.5 * (below + above)
+            last, before_last = abs(new - x), last
+            x = new
+            if last <= EVENT_TOLERANCE * abs(x - origin):
+                return x
+        return x if abs(x - origin) <= _AT_ORIGIN * width else math.nan
+
+    return root
+
+
+def settling(row: int, settled: int, step_of: Callable[..., tuple[float, float, float]]) -> Callable[..., None]:
+    """A jitted iteration of the lanes of a strip to a root, in row `row`; row `settled` says which are there.
+
+    ``step_of(lanes, j, at, side, g)`` gives the next place, the length of the step to it, and against what that
+    has to be small.  Rows and function are bound here: LLVM has to know the rows.
+    """
+
+    @scalar
+    def settle(lanes: np.ndarray, side: float, g: float) -> None:
+        for _ in range(_MOST_LANE_STEPS):
+            unsettled = 0
+            for j in range(STRIP):
+                at = lanes[row + j]
+                onward, step, scale = step_of(lanes, j, at, side, g)
+                there = lanes[settled + j] > 0.0
+                lanes[row + j] = at if there else onward
+                there |= abs(step) <= _LANE_TOLERANCE * scale
+                lanes[settled + j] = 1.0 if there else 0.0
+                unsettled += 0 if there else 1
+            if unsettled == 0:
+                break
+
+    return settle

@@ -1,0 +1,65 @@
+"""The root finder of the kernels: what it finds, what it does not, and what becomes of that."""
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+import slipsweep
+from slipsweep import RunError
+from slipsweep.grid import engine
+from slipsweep.kernels import events
+
+
+@numba.njit(error_model="numpy")
+def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
+    root, power = where
+    return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)
+
+
+_root = events.root_of(_power)
+
+
+def found(root: float, power: float, below: float, above: float) -> float:
+    return float(_root((root, power), below, above, above, 0.0))
+
+
+@pytest.mark.parametrize("root", [1e-300, 0.3, 0.9999999])
+def test_roots_are_found_from_either_side(root: float) -> None:
+    assert found(root, 1.0, 0.0, 1.0) == pytest.approx(root, rel=1e-15)
+    assert found(root, 3.0, 0.0, 1.0) == pytest.approx(root, rel=1e-8), "a triple one, by thirds"
+    assert found(root, 0.5, 0.0, 1.0) == pytest.approx(root, rel=1e-8), "Newton's steps go to and fro"
+    assert found(root, 0.3, 0.0, 1.0) == pytest.approx(root, rel=1e-8), "Newton's steps leave the bracket"
+    assert found(root, 21.0, 0.0, 1.0) == pytest.approx(root, rel=1e-8), "Newton's steps are short"
+
+
+def test_a_root_at_the_origin_is_the_origin() -> None:
+    assert abs(found(0.0, 2.0, -1.0, 1.0)) < 1e-30
+
+
+def test_a_root_that_is_not_found_is_nan() -> None:
+    """Not the place reached: here 200 steps are not enough."""
+    assert math.isnan(found(1e-28, 5.0, 0.0, 1.0))
+    assert math.isnan(found(math.nan, 1.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("options", [{"waveform": "triangle"}, {"solver": "step"}])
+def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
+    options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(grid: Any, *arguments: Any) -> None:
+        arguments[-1].unsolved[0] = 4  # the results
+
+    monkeypatch.setattr(engine, "WAVE_KERNEL", failing)
+    monkeypatch.setattr(engine, "STEP_KERNELS", dict.fromkeys(engine.STEP_KERNELS, failing))
+    axes: dict[str, Any] = {
+        "theta": [0.0, 5.0],
+        "mu_s": 0.3,
+        "amplitude": np.array([2.0, 3.0, 4.5]),
+        "frequency": [1.0, 2.0],
+    }
+    with pytest.raises(RunError, match=r"theta = 5.0, mu_s = 0.3, amplitude = 3.0, frequency = 1.0: an event") as error:
+        slipsweep.sweep(**axes, **options)
+    assert "\n" not in str(error.value)
