@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.charts.slices import amplitude_of
 from slipsweep.charts.style import BLUE, VERMILION, axis_label, caption, unit, value_text
 from slipsweep.errors import InputError
 from slipsweep.files import netcdf, outputs
@@ -159,6 +160,8 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             for name in PARAMETERS
             if name in names
         }
+        if "displacement_amplitude" in coords and "amplitude" not in coords:
+            coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
         results = {name: np.empty([*left.values()], kind) for name, kind in _SHOWN.items() if name in file.variables}
         for block in grid_blocks(lengths, BLOCK_CELLS):
             inside = {
