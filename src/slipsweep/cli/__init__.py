@@ -18,7 +18,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import chart, explore, export, info, limit, record, run, simulate
+from slipsweep.cli import chart, explore, export, info, limit, record, run, simulate, streams
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -67,7 +67,16 @@ def _signals() -> Iterator[None]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    with streams.guarded() as output:
+        status = _run(sys.argv[1:] if arguments is None else list(arguments))
+        output.flush()
+        if output.failure is not None and status == 0:
+            status = _fail(f"what is printed could not be written: {output.failure.strerror}", 1)
+    return status
+
+
+def _run(arguments: list[str]) -> int:
+    """Run a command; what it raises becomes a message and an exit status."""
     _spare_time()
     try:
         with _signals():
@@ -122,5 +131,7 @@ def _words(error: Any) -> str:
 
 
 def _fail(message: str, status: int) -> int:
-    print(f"slipsweep: error: {' '.join(message.split())}", file=sys.stderr)
+    # one line, whatever a name or a library has in it
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+    print(f"slipsweep: error: {line}", file=sys.stderr)
     return status
