@@ -105,7 +105,8 @@ def stopped(path: Path, after: int = 30, **options: Any) -> Path:
         notes = caught.__notes__
     else:
         raise AssertionError("not stopped")
-    assert notes == [f"{after} of 60 blocks are kept; go on with --resume"]
+    number = 3 if "text" in options else 60
+    assert notes == [f"{after} of {number} blocks are kept; go on with --resume"]
     return path.with_name(f"{path.name}.parts")
 
 

@@ -19,6 +19,7 @@ def slipsweep(
     *arguments: object,
     environment: Mapping[str, str] | None = None,
     preexec_fn: Callable[[], object] | None = None,
+    stdin: int | None = None,
 ) -> "subprocess.CompletedProcess[str]":
     """Run a command in `folder`, with `environment` on top of this process's own but for colours, and wait for it."""
     clean = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
@@ -32,6 +33,7 @@ def slipsweep(
         timeout=TIMEOUT,
         check=False,
         preexec_fn=preexec_fn,
+        stdin=stdin,
     )
 
 

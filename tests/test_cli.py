@@ -127,7 +127,9 @@ def test_an_existing_output_is_replaced_only_when_told(small: Path) -> None:
 
 
 def test_the_sweep_file_is_never_overwritten(small: Path) -> None:
-    assert_fails(slipsweep(small, "run", "small.toml", "-o", "small.toml", "--overwrite"), 2, "the sweep file itself")
+    assert_fails(
+        slipsweep(small, "run", "small.toml", "-o", "small.toml", "--overwrite"), 2, "which this command reads"
+    )
     assert (small / "small.toml").read_text() == SMALL
 
 

@@ -5,7 +5,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -257,7 +257,7 @@ def test_a_second_run_is_refused(tmp_path: Path, undisturbed: dict[str, bytes]) 
 def test_killed_after_the_output_has_its_name(tmp_path: Path, split: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a"
     with monkeypatch.context() as killed:
-        killed.setattr(shutil, "rmtree", lambda *arguments, **options: None)
+        killed.setattr(parts.Folder, "remove", lambda folder: None)
         first = run(path, split=split)
     assert (tmp_path / "a.parts").exists()
     again = run(path, split=split, resume=True)
@@ -334,3 +334,108 @@ def test_a_disk_that_fills_up_keeps_the_finished_blocks(
     assert caught.value.__notes__ == ["20 of 60 blocks are kept; go on with --resume"]
     assert solved_on_resume(tmp_path / "a.nc") == list(range(20, 60))
     assert values(tmp_path / "a.nc") == undisturbed
+
+
+# ---------------------------------------------------------- what is taken away in the middle
+
+
+def interrupted(path: Path, monkeypatch: pytest.MonkeyPatch, number: int, fault: Callable[[], object]) -> RunError:
+    """The error of a run in which something happens when a block is on record."""
+    add = parts.Folder.add
+    happened: list[int] = []
+
+    def add_and_fail(self: parts.Folder, at: int, digest: str) -> None:
+        add(self, at, digest)
+        if at == number and not happened:
+            happened.append(at)
+            fault()
+
+    with monkeypatch.context() as patched:
+        patched.setattr(parts.Folder, "add", add_and_fail)
+        with pytest.raises(RunError) as caught:
+            run(path, split="." not in path.name)
+    return caught.value
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere what is open cannot be removed")
+@pytest.mark.parametrize("name", ["a.nc", "a"])
+@pytest.mark.parametrize("at", [10, 59])
+def test_a_work_folder_that_is_removed_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, at: int
+) -> None:
+    """Nothing is kept, and that is said; the disk is not suspected."""
+    path = tmp_path / name
+    folder = tmp_path / f"{name}.parts"
+    error = interrupted(path, monkeypatch, at, lambda: shutil.rmtree(folder))
+    assert str(error) == f"{folder}: was removed during the run, and the finished blocks with it; start again"
+    assert not hasattr(error, "__notes__")
+    assert os.listdir(tmp_path) == []
+    run(path, split="." not in name)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere what is open cannot be removed")
+@pytest.mark.parametrize("name", ["a.nc", "a"])
+def test_another_run_in_the_place_of_one_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """The folder is removed and made again: the first run neither writes into the second's nor takes its data."""
+    path = tmp_path / name
+    folder = tmp_path / f"{name}.parts"
+    kept: dict[str, bytes] = {}
+
+    def begin_again() -> None:
+        shutil.rmtree(folder)
+        stopped(path, split="." not in name)
+        kept.update({str(file): file.read_bytes() for file in folder.rglob("*") if file.is_file()})
+
+    error = interrupted(path, monkeypatch, 40, begin_again)
+    assert "was removed during the run" in str(error)
+    assert not path.exists()
+    assert kept == {str(file): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    run(path, resume=True, split="." not in name)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere what is open cannot be removed")
+@pytest.mark.parametrize(("name", "victim"), [("a.nc", "data.nc"), ("a", "data/block-000003.nc"), ("a", "data")])
+def test_data_that_are_removed_do_not_become_a_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, victim: str
+) -> None:
+    path = tmp_path / name
+    target = tmp_path / f"{name}.parts" / victim
+    error = interrupted(path, monkeypatch, 40, lambda: shutil.rmtree(target) if target.is_dir() else target.unlink())
+    assert not path.exists()
+    assert "is the disk full" not in str(error) or victim == "data"  # all that the netCDF library tells
+    if victim != "data/block-000003.nc":
+        assert not hasattr(error, "__notes__")
+    run(path, resume=True, split="." not in name)
+
+
+#: A block that stays where it is, one that slides, and one so far that 32 bits do not hold it.
+FAR = """
+[axes.theta]
+values = [0, 10, 20]
+[axes.mu_s]
+values = [0.5]
+[axes.amplitude]
+values = [3]
+[axes.frequency]
+values = [1e-20, 1]
+[output]
+dtype = "float32"
+"""
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_a_number_too_large_for_its_type_keeps_no_blocks(tmp_path: Path, split: bool) -> None:
+    """No --resume could finish them."""
+    path = tmp_path / "a"
+    kept = FAR.replace("1e-20", "0.5")
+    stopped(path, after=1, text=kept, block_cells=2, split=split)
+    run(path, kept, block_cells=2, resume=True, split=split)
+    with pytest.raises(InputError, match=r"""a\.toml: output\.dtype = "float32": .* must be "float64\"""") as caught:
+        run(tmp_path / "b", FAR, block_cells=2, split=split)
+    assert not hasattr(caught.value, "__notes__")
+    stopped(tmp_path / "b", after=1, text=FAR, block_cells=2, split=split)
+    with pytest.raises(InputError, match=r"output\.dtype"):
+        run(tmp_path / "b", FAR, block_cells=2, resume=True, split=split)
+    assert os.listdir(tmp_path) == ["a"]

@@ -63,10 +63,24 @@ def test_a_result_has_the_name_that_was_given(tmp_path: Path, stem: bytes, monke
 
 def test_a_backslash_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(CELL)
-    message = "the netCDF library takes no backslash in a name"
+    message = "a backslash separates no folders here"
     assert message in failed(slipsweep(tmp_path, "run", "a.toml", "-o", "b\\c.nc"))
     assert os.listdir(tmp_path) == ["a.toml"]
     slipsweep(tmp_path, "run", "a.toml")
     (tmp_path / "a.nc").rename(tmp_path / "b\\c.nc")
     for command in (["info"], ["export", "-o", "a.csv"], ["chart"], ["run", "-o", "b.nc"]):
         assert message in failed(slipsweep(tmp_path, *command, "b\\c.nc"))
+
+
+def test_the_very_longest_name(tmp_path: Path) -> None:
+    """The longest that the system takes is served, or refused before anything is computed."""
+    (tmp_path / "a.toml").write_text(CELL)
+    case = ("simulate", "--theta", "5", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1")
+    for ending in (".csv", ".nc", ".svg"):
+        longest = "x" * (255 - len(ending)) + ending
+        assert slipsweep(tmp_path, *case, "-o", longest).returncode == 0
+        assert (tmp_path / longest).is_file()
+        assert "File name too long" in failed(slipsweep(tmp_path, *case, "-o", f"x{longest}"))
+    for length in (300, 255):
+        assert "File name too long" in failed(slipsweep(tmp_path, "run", "a.toml", "-o", "y" * length))
+    assert len(os.listdir(tmp_path)) == 4

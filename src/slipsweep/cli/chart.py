@@ -92,9 +92,7 @@ def chart(
         left_out: dict[str, str] = {}
         fitting = _STATISTIC_CHARTS if "exceedance_probability" in result.variables else _SWEEP_CHARTS
         wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in kinds or fitting}
-        for paths in wanted.values():
-            for path in paths:
-                outputs.check_output(path, overwrite)
+        outputs.check_outputs([path for paths in wanted.values() for path in paths], overwrite, reads=[file])
         if not any(values.size > 1 for dim, values in result.axes.items() if dim != "case"):
             raise InputError(
                 f"{file}: no chart can be drawn: it has no axis of two values or more (its dimensions: "

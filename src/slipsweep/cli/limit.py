@@ -59,10 +59,7 @@ def limit(
             f"{sweep}: excitation.record: limit looks for the amplitude of a harmonic motion; "
             "of a record sweep the scale"
         )
-    for path in paths:
-        if path.exists() and path.samefile(sweep):
-            raise InputError(f"{path}: is the sweep itself; give another name with -o")
-        outputs.check_output(path, overwrite)
+    outputs.check_outputs(paths, overwrite, reads=checked.files)
     given = _arguments(checked, displacement, maximum_amplitude)
 
     from slipsweep.studies.limits import limit_table

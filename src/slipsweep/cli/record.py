@@ -76,7 +76,7 @@ def record(
 
     motion = read_record(file, units=units, baseline=baseline, file_format=file_format, channel=channel)
     if output is not None:
-        outputs.check_output(output, overwrite)
+        outputs.check_outputs([output], overwrite, reads=[file])
 
     import numpy as np
 

@@ -22,7 +22,9 @@ EXAMPLE = examples(
 def run(
     sweep: Annotated[
         Path,
-        typer.Argument(metavar="SWEEP.toml|OUT.nc", help="A sweep file, or an earlier result to make again."),
+        typer.Argument(
+            metavar="SWEEP.toml|OUT.nc", help="A sweep file (- for standard input), or an earlier result to make again."
+        ),
     ],
     output: Annotated[
         Path | None,
@@ -70,11 +72,11 @@ def run(
         raise InputError(f"--solver {solver}: not allowed with excitation.record, to which the response is exact")
     if solver is not None:
         checked = checked.with_solver(solver)
+    if output is None and checked.output.path is None and spec.is_stream(sweep):
+        raise InputError(f"{sweep}: a sweep from a pipe has no name; give the output's with -o or output.path")
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
     if split and output is None:
         path = path.with_suffix("")
-    if path.exists() and sweep.suffix != ".nc" and path.samefile(sweep):
-        raise InputError(f"{path}: is the sweep file itself; give another name with -o")
     if checked.sampling is not None:
         refused = {
             "--resume": resume,
@@ -128,7 +130,7 @@ def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -
     from slipsweep.studies.uncertainty import plan_samples, tally
 
     assert sweep.sampling is not None
-    outputs.check_output(path, overwrite)
+    outputs.check_outputs([path], overwrite, reads=sweep.files)
     started = time.perf_counter()
     try:
         given = {name: value for name, value in sweep.arguments().items() if name != "variables"}

@@ -75,8 +75,7 @@ def simulate(
     from slipsweep.files import outputs
     from slipsweep.studies.history import history_table
 
-    for path in paths:
-        outputs.check_output(path, overwrite)
+    outputs.check_outputs(paths, overwrite, reads=())
     table = history_table(
         theta=theta,
         mu_s=mu_s,

@@ -320,7 +320,7 @@ def write_page(
     RunError
         Writing failed.
     """
-    outputs.check_output(output, overwrite)
+    outputs.check_outputs([output], overwrite, reads=[path])
     script = _bokeh().resources.Resources(mode="inline", components=["bokeh"]).render()
     # the page without its arrays, and its figures and notes
     overhead = len(script.encode()) + 150_000

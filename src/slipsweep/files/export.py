@@ -128,7 +128,7 @@ def export(
         raise InputError(f"{path}: the name must end in one of {', '.join(SUFFIXES)}")
     if path.suffix == ".parquet":
         _check_pyarrow(path)
-    outputs.check_output(path, overwrite)
+    outputs.check_outputs([path], overwrite, reads=[source])
     with netcdf.open_result(source) as file:
         columns, shape = _columns(file, source, variables, words)
         make = _csv if path.suffix == ".csv" else _parquet

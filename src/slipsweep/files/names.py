@@ -26,7 +26,7 @@ def open_netcdf(path: Path, mode: Literal["r", "w"] = "r") -> "netCDF4.Dataset":
     """
     import netCDF4
 
-    check_netcdf_name(path)
+    check_name(path)
     if mode == "r" and not stat.S_ISREG(path.stat().st_mode):
         raise InputError(f"{path}: is not a file: a netCDF file cannot be read from a folder, a pipe or a device")
     name = path.as_posix() if path.is_absolute() or path.drive else f"./{path.as_posix()}"
@@ -34,8 +34,8 @@ def open_netcdf(path: Path, mode: Literal["r", "w"] = "r") -> "netCDF4.Dataset":
     return netCDF4.Dataset(os.fsencode(name).decode("latin-1"), mode, format="NETCDF4", encoding="latin-1")
 
 
-def check_netcdf_name(path: Path) -> None:
-    """Refuse a name that the netCDF library does not take.
+def check_name(path: Path) -> None:
+    """Refuse a name that the netCDF library does not take, and that was most likely meant otherwise.
 
     Raises
     ------
@@ -43,4 +43,4 @@ def check_netcdf_name(path: Path) -> None:
         It has a backslash that does not separate folders.
     """
     if "\\" in path.as_posix():
-        raise InputError(f"{path}: the netCDF library takes no backslash in a name: give another name")
+        raise InputError(f"{path}: a backslash separates no folders here, and no file may have one: write / instead")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.outputs import check_output, complete_or_absent, writing
+from slipsweep.files.outputs import complete_or_absent, writing
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.grid.tables import Table, Variable
@@ -131,15 +131,19 @@ def _embed(file: netCDF4.Dataset, record: Record) -> None:
         variable[:] = values
 
 
+class TooLarge(InputError):
+    """A result is too large for the type that the sweep file asks for: no run of that sweep can be finished."""
+
+
 def rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """A result as the file holds it; what is too large for that is an error, and not infinite."""
+    """A result as the file holds it; what is too large for that is an error (`TooLarge`), and not infinite."""
     if values.dtype == dtype:
         return values
     with np.errstate(over="ignore"):
         stored = values.astype(dtype)
     beyond = np.isinf(stored)
     if beyond.any() and np.isfinite(worst := np.abs(values[beyond]).max()):
-        raise InputError(
+        raise TooLarge(
             f'output.dtype = "{dtype}": {name} reaches {worst:.4g}, more than the {np.finfo(dtype).max:.4g} that it '
             'holds; must be "float64"'
         )
@@ -153,7 +157,6 @@ def write_table(
 
     The `record` that it is the response to is written with it.
     """
-    check_output(path, overwrite)
     with (
         complete_or_absent(path, overwrite) as temporary,
         new_file(temporary, path) as file,
@@ -170,7 +173,6 @@ def write_table(
 
 def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str, overwrite: bool = False) -> None:
     """Write the statistics of a sweep with uncertain inputs: with its text, so that it can be repeated from them."""
-    check_output(path, overwrite)
     with (
         complete_or_absent(path, overwrite) as temporary,
         new_file(temporary, path) as file,

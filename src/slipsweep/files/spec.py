@@ -21,6 +21,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from slipsweep.errors import InputError
 from slipsweep.files.names import open_netcdf
+from slipsweep.files.outputs import Read
 from slipsweep.grid.tables import Variable
 from slipsweep.model.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
 from slipsweep.model.suggest import did_you_mean
@@ -53,6 +54,12 @@ _INPUTS = PARAMETERS | {name: attrs for name, attrs in RECORD_PARAMETERS.items()
 
 #: Keys of [excitation] that go with a record, and no other.
 _RECORD_KEYS = ("record", "units", "baseline", "format", "channel", "polarity")
+
+#: What stands for standard input on a command line.
+_STANDARD_INPUT = Path("-")
+
+#: A million cases; what is larger is no sweep file (a device, an archive).
+_MOST_BYTES = 200_000_000
 
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
@@ -272,6 +279,8 @@ class SweepSpec:
         What [uncertainty] says; such a sweep gives statistics of the displacement.
     record : Record, optional
         The motion of [excitation] record.
+    files : tuple of Path or int
+        The files that were read for it, by name or descriptor.
     """
 
     source: str
@@ -284,6 +293,7 @@ class SweepSpec:
     output: Output
     sampling: "Sampling | None" = None
     record: Record | None = None
+    files: tuple[Read, ...] = ()
 
     @property
     def shape(self) -> dict[str, int]:
@@ -350,7 +360,8 @@ def load(path: str | Path) -> SweepSpec:
     ----------
     path : str or Path
         A sweep file (TOML), or a netCDF file that `slipsweep run` wrote: then the sweep
-        it was made from.
+        it was made from.  A sweep file may be a pipe, or ``-`` for standard input; the record
+        that it names is then looked for in the folder that the command runs in.
 
     Returns
     -------
@@ -364,17 +375,33 @@ def load(path: str | Path) -> SweepSpec:
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
-            is_netcdf = path.suffix == ".nc" or file.read(4) == b"\x89HDF"
+        stream = is_stream(path)
+        read: Read = 0 if path == _STANDARD_INPUT else path
+        with open(read, "rb", closefd=read != 0) as file:
+            content = file.read(4)
+            is_netcdf = content == b"\x89HDF" or (path.suffix == ".nc" and not stream)
+            if is_netcdf and stream:
+                raise InputError(f"{path}: is a netCDF file, which cannot be read from a pipe; give it by name")
             if not is_netcdf:
-                file.seek(0)
+                content += file.read(_MOST_BYTES - 3)
+                if len(content) > _MOST_BYTES:
+                    raise InputError(f"{path}: not a sweep file: it has more than {_MOST_BYTES} bytes")
                 # utf-8-sig: some editors put a byte-order mark in front
-                return parse(file.read().decode("utf-8-sig"), str(path), path.parent)
+                sweep = parse(content.decode("utf-8-sig"), str(path), Path() if stream else path.parent)
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a sweep file: it is not UTF-8 text") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    return _load_result(path)
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if is_netcdf:
+        sweep = _load_result(path)
+    return replace(sweep, files=(read, *sweep.files))
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a sweep is read from a pipe, a device or a shell's redirection: it has no folder and no name then."""
+    if path == _STANDARD_INPUT or path.absolute().parts[1:2] in (("dev",), ("proc",)):
+        return True
+    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def _load_result(path: Path) -> SweepSpec:
@@ -425,15 +452,19 @@ def parse(text: str, source: str, folder: Path | None = None, record: Record | N
         _check_model(file)
         _check_excitation(file.excitation)
         _check_variables(file, parameters)
+        files: tuple[Read, ...] = ()
         if file.excitation.record is not None and record is None:
-            record = _read(file.excitation, folder or Path())
+            path = (folder or Path()) / file.excitation.record
+            record, files = _read(file.excitation, path), (path,)
     except InputError as error:
         raise InputError(f"{source}: {_one_line(str(error))}") from None
     labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
     excitation, output = file.excitation, file.output
     if excitation.record is not None and "variables" not in output.model_fields_set:
         output = output.model_copy(update={"variables": list(RECORD_RESULTS)})
-    return SweepSpec(source, text, parameters, labels, file.model, excitation, file.solver, output, sampling, record)
+    return SweepSpec(
+        source, text, parameters, labels, file.model, excitation, file.solver, output, sampling, record, files
+    )
 
 
 # ------------------------------------------------------------- from tables to parameters
@@ -512,12 +543,11 @@ def _place(file: SweepFile, name: str) -> str | None:
     return next((f"{key}.{name}" for key, table in tables.items() if getattr(table, name, None) is not None), None)
 
 
-def _read(excitation: Excitation, folder: Path) -> Record:
-    """Read the record that a sweep file names relative to itself."""
-    assert excitation.record is not None
+def _read(excitation: Excitation, path: Path) -> Record:
+    """Read the record of a sweep file."""
     try:
         return read_record(
-            folder / excitation.record,
+            path,
             units=excitation.units,
             baseline=excitation.baseline,
             file_format=excitation.format,

@@ -164,13 +164,14 @@ def read_record(
     if channel is not None:
         channel = check_whole("channel", channel, 1)
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{path}: {path.stat().st_size} bytes: a record must have {MOST_BYTES} at most")
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a name that no system has
         raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a record must have that many at most")
     # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     kind = _format_of(lines) if file_format == "auto" else file_format

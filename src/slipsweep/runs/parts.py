@@ -20,8 +20,8 @@ The data are renamed to the output when all blocks are there; then the folder is
 
 import hashlib
 import json
+import os
 import re
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -42,6 +42,9 @@ from slipsweep.jit import sources
 from slipsweep.runs.placed import Layout
 
 _COMPLETE = "complete"
+
+#: The file of a block with --split, and what it is called until it is whole.
+_BLOCK = re.compile(r"block-\d{6,}\.(nc|tmp)")
 
 #: A line of the journal, which a run that was killed may have left without its end.
 _LINE = re.compile(r"(\d+) ([0-9a-f]+)\n")
@@ -135,12 +138,13 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self.output = path
-        self.path = path.with_name(f"{path.name}.parts")
+        self.path = path.parent / f"{path.name}.parts"
         self.manifest: Manifest | None = None
         self.finished: dict[int, str] = {}  # number of a block: checksum
         self.complete = False
         self.known = False  # whether `finished` and `complete` are what the folder holds
         self.done = False
+        self._descriptor: int | None = None  # of the folder, while it is locked
 
     def data(self, split: bool) -> Path:
         """Where the blocks are."""
@@ -174,14 +178,54 @@ class Folder:
                     "blocks belong to cannot be told; start anew with --overwrite"
                 ) from None
 
+    def hold(self) -> None:
+        """Remember which folder is locked: another may get its name."""
+        if os.name == "posix":  # elsewhere a folder cannot be opened, nor removed while a file in it is open
+            self._descriptor = os.open(self.path, os.O_RDONLY)
+
+    def let_go(self) -> None:
+        """Forget it."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def is_there(self) -> bool:
+        """Whether the folder that was locked still has its name."""
+        try:
+            found = self.path.stat()
+        except OSError:
+            return False
+        return self._descriptor is None or os.path.samestat(found, os.fstat(self._descriptor))
+
+    def check(self) -> None:
+        """Refuse to go on where the folder has been removed.
+
+        Raises
+        ------
+        RunError
+        """
+        if not self.is_there():
+            raise RunError(f"{self.path}: was removed during the run, and the finished blocks with it; start again")
+
     def clear(self) -> None:
-        """Remove all that an earlier run left."""
-        for entry in self.path.iterdir():
-            if entry.is_dir():
-                shutil.rmtree(entry)
-            elif entry.name != "lock":
-                entry.unlink()
+        """Remove all that an earlier run left, and nothing else that may lie there."""
+        # the journal first: without it nothing is promised of the others
+        for name in ("journal", "journal.tmp", "manifest.json", "manifest.json.tmp", "data.nc"):
+            (self.path / name).unlink(missing_ok=True)
+        data = self.path / "data"
+        if data.is_dir():
+            for entry in data.iterdir():
+                if _BLOCK.fullmatch(entry.name):
+                    entry.unlink()
+            data.rmdir()
         self.manifest, self.finished, self.complete, self.known = None, {}, False, True
+
+    def remove(self) -> None:
+        """Remove the folder, unless something else lies in it."""
+        with suppress(OSError):
+            self.clear()
+            (self.path / "lock").unlink()
+            self.path.rmdir()
 
     def begin(self, manifest: Manifest) -> None:
         """Write the manifest, after which blocks may be added."""
@@ -197,6 +241,7 @@ class Folder:
 
     def add(self, number: int, digest: str) -> None:
         """Put a block that is written on record."""
+        self.check()
         self._append(f"{number} {digest}")
         self.finished[number] = digest
 
@@ -207,6 +252,7 @@ class Folder:
 
     def close(self) -> None:
         """Put on record that all blocks are there, hence that data which are missing have become the output."""
+        self.check()
         self._append(_COMPLETE)
         self.sync()
 
@@ -232,16 +278,25 @@ def opened(path: Path) -> Iterator[Folder]:
 
     Raises
     ------
+    InputError
+        Something else has its name.
     RunError
         Another run holds it, or it cannot be locked.
     """
     folder = Folder(path)
+    if folder.path.is_symlink() or (folder.path.exists() and not folder.path.is_dir()):
+        raise InputError(
+            f"{path}: {folder.path.name} is no folder, and would have to be one while the run lasts; "
+            "move it away, or give another name with -o"
+        )
     lock = _lock(folder)
     try:
+        folder.hold()
         yield folder
     finally:
-        if folder.done or (folder.known and not (folder.finished or folder.complete)):
-            shutil.rmtree(folder.path, ignore_errors=True)
+        if folder.is_there() and (folder.done or (folder.known and not (folder.finished or folder.complete))):
+            folder.remove()
+        folder.let_go()
         lock.release()
 
 

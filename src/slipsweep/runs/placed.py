@@ -159,6 +159,13 @@ class PlacedFile:
             os.close(self.direct)
             self.direct = None
 
+    def has_name(self, path: Path) -> bool:
+        """Whether `path` is still this file."""
+        try:
+            return os.path.samestat(os.fstat(self.file.fileno()), path.stat())
+        except OSError:
+            return False
+
     def restore_size(self) -> None:
         """Give the file its size again: zeros where its end was cut off."""
         self.file.truncate(self.layout.nbytes)

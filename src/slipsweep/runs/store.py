@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import Tally, history_of, rounded, stored_tally
-from slipsweep.files.outputs import appear, check_output, sync, writing
+from slipsweep.files.netcdf import Tally, TooLarge, history_of, rounded, stored_tally
+from slipsweep.files.outputs import appear, check_outputs, sync, writing
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.blocks import (
     Block,
@@ -116,7 +116,8 @@ def run(
         Writing failed, memory ran out, or another run is writing `path`.  A note tells how many
         blocks are kept.
     """
-    check_output(path, overwrite or resume, folder=split)
+    parts_path = parts.Folder(path).path
+    check_outputs([path], overwrite or resume, reads=spec.files, folder=split, work=parts_path)
     identity = parts.identity(spec, split)
     with parts.opened(path) as work:
         if not overwrite:
@@ -138,7 +139,7 @@ def run(
             work.clear()
             block_cells = min(filter(None, (block_cells, shared_cells)), default=default_cells(spec))
         # once more: a run that was writing it may have ended before this one got hold of the lock
-        check_output(path, overwrite, folder=split)
+        check_outputs([path], overwrite, reads=spec.files, folder=split)
         data = work.data(split)
         _check_size(spec, path, block_cells, _nbytes(data))
 
@@ -151,14 +152,20 @@ def run(
                 _ready(work, target, cut, tally, progress)
                 missing = {number: block for number, block in cut.items() if number not in work.finished}
                 _write_blocks(work, target, cut, solved(spec, missing, progress), tally)
+                target.check(len(cut))
             with writing(path):
                 work.close()
                 appear(data, path, overwrite)
+        except TooLarge as large:
+            work.clear()  # no --resume could finish it
+            raise InputError(f"{spec.source}: {large}") from None
         except MemoryError:
             error = RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}")
-            raise _noted(error, work, len(cut)) from None
+            raise _noted(error, work, data, len(cut)) from None
         except BaseException as error:
-            _noted(error, work, len(cut))
+            if isinstance(error, RunError):
+                work.check()  # what came of that is not worth telling
+            _noted(error, work, data, len(cut))
             raise
         work.done = True
     return Report(path, spec.shape, time.perf_counter() - started, _nbytes(path), tally)
@@ -176,9 +183,9 @@ def _check_same(work: parts.Folder, identity: Mapping[str, Any], block_cells: in
         )
 
 
-def _noted(error: BaseException, work: parts.Folder, blocks: int) -> BaseException:
+def _noted(error: BaseException, work: parts.Folder, data: Path, blocks: int) -> BaseException:
     """Tell with an error how much of the run is kept."""
-    if work.finished:
+    if work.finished and work.is_there() and data.exists():
         error.add_note(f"{len(work.finished)} of {blocks} blocks are kept; go on with --resume")
     return error
 
@@ -232,6 +239,7 @@ def _write_blocks(
                 name: rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
             }
             counted = counter.submit(tally.add, arrays)
+            work.check()
             work.add(number, target.write(number, cut[number], table, arrays))
             if time.monotonic() - synced >= _SYNC_SECONDS:
                 if syncing is not None:
@@ -313,6 +321,12 @@ class _OneFile:
             self.file.write(name, run_of(block, result.sizes)[0], arrays[name])
         return parts.checksum(arrays)
 
+    def check(self, blocks: int) -> None:
+        """Refuse to take another file for the one that was written (RunError)."""
+        assert self.file is not None
+        if not self.file.has_name(self.data):
+            raise _removed(self.data)
+
     def sync(self) -> None:
         """Have all that is written on the disk itself."""
         sync(self.data)
@@ -372,6 +386,12 @@ class _Files:
         self.unsynced.append(path)
         return file_checksum(path, layout, arrays)
 
+    def check(self, blocks: int) -> None:
+        """Refuse to take the folder for whole where a file is missing (RunError)."""
+        for number in range(blocks):
+            if not self._name(number).exists():
+                raise _removed(self._name(number))
+
     def sync(self) -> None:
         """Have all that is written on the disk itself."""
         while self.unsynced:
@@ -380,6 +400,10 @@ class _Files:
 
     def _name(self, number: int) -> Path:
         return self.data / f"block-{number:06}.nc"
+
+
+def _removed(path: Path) -> RunError:
+    return RunError(f"{path}: was removed during the run; start again")
 
 
 def _nbytes(path: Path) -> int:
