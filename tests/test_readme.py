@@ -37,6 +37,10 @@ DOCUMENTS = (
 )
 
 
+#: All pages, also those without blocks that could run.
+PAGES = sorted(page.relative_to(ROOT).as_posix() for page in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")))
+
+
 class Block(NamedTuple):
     """A fenced block: its language, the line it begins in, its text, and the file that the reader saves it as."""
 
@@ -63,6 +67,12 @@ def rows(text: str) -> list[list[str]]:
     lines = (line.strip("|").split("|") for line in text.splitlines() if line.startswith("|"))
     cells = [[cell.strip() for cell in line] for line in lines]
     return [row for row in cells if not set("".join(row)) <= set("-: ")]
+
+
+def anchors(document: str | Path) -> list[str]:
+    """The anchors that GitHub makes of headings."""
+    headings = re.findall(r"^#+ (.*)$", (ROOT / document).read_text(encoding="utf-8"), re.MULTILINE)
+    return [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
 
 
 def section(document: str, heading: str) -> str:
@@ -119,6 +129,22 @@ def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
 
 
+def test_every_page_is_listed() -> None:
+    linked = set(re.findall(r"\]\(([^)#]+)\)", read("docs/README.md")))
+    assert {Path(page).name for page in PAGES if page.startswith("docs/")} - {"README.md"} <= linked
+
+
+def test_docstrings_point_to_sections_that_exist() -> None:
+    """docs/numerics.md#section in a docstring or comment of the kernels."""
+    pointed = {
+        anchor
+        for source in (ROOT / "src").rglob("*.py")
+        for anchor in re.findall(r"numerics\.md#([\w-]+)", source.read_text(encoding="utf-8"))
+    }
+    assert pointed
+    assert pointed <= set(anchors("docs/numerics.md"))
+
+
 def test_the_two_commands_of_the_readme() -> None:
     """.ci/run takes them from the blocks after these markers and runs them."""
     text = read("README.md")
@@ -136,7 +162,7 @@ def test_figures_are_those_of_the_report() -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("document", [*DOCUMENTS, "CHANGELOG.md"])
+@pytest.mark.parametrize("document", PAGES)
 def test_links_lead_somewhere(document: str) -> None:
     text = read(document)
     for target in re.findall(r'\]\(([^)]+)\)|src="([^"]+)"', text):
@@ -146,10 +172,7 @@ def test_links_lead_somewhere(document: str) -> None:
         other = (ROOT / document).parent / path if path else ROOT / document
         assert other.exists(), f"{document}: {path}"
         if anchor:
-            headings = re.findall(r"^#+ (.*)$", other.read_text(encoding="utf-8"), re.MULTILINE)
-            # the anchors that GitHub makes of headings
-            anchors = [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
-            assert anchor in anchors, f"{document}: #{anchor}"
+            assert anchor in anchors(other), f"{document}: #{anchor}"
 
 
 # ------------------------------------------------------------------------ against the paper

@@ -205,7 +205,10 @@ def slope_and_curvature(block: Block, x: float) -> tuple[float, float]:
 
 @scalar
 def inflection(block: Block) -> float:
-    """x > 0 up to which E is concave; it is convex beyond (and everywhere where λ ≥ 2 tan θ)."""
+    """x > 0 up to which E is concave; it is convex beyond (and everywhere where λ ≥ 2 tan θ).
+
+    docs/numerics.md#slope-and-inflection
+    """
     return (2.0 * block.tan_theta / block.decay_rate - 1.0) * block.g / block.tan_theta
 
 

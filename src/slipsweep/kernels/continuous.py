@@ -2,7 +2,8 @@
 
 |Üg| and the friction repeat every quarter, mirrored, so that a quarter gives a cycle, and the cycles an
 arithmetic series.  Most cells are solved in SIMD lanes (`lane_continuous`), those whose friction decays
-sharply, or whose velocity turns more than once on a rise, one by one (`continuous`).
+sharply, or whose velocity turns more than once on a rise, one by one (`continuous`).  Derivations:
+docs/numerics.md#continuous-sliding.
 """
 
 import math
@@ -50,7 +51,7 @@ from slipsweep.kernels.lanes import (
 )
 from slipsweep.model import equations as eq
 
-#: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes reach 1e-14.
+#: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes are wrong by 4e-14 of that part at most.
 SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
 SHORT_SINE = math.sin(0.6)
 

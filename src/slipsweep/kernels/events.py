@@ -4,7 +4,8 @@ Both are Newton's.  `root_of` keeps it in a bracket, and halves that where Newto
 or come to no end.  A root that it does not find is NaN, and so is then the displacement: the run ends
 with an error that names the cell (`block.UNSOLVED`).  `settling` takes the lanes of a strip to their roots
 together, each from the side from which Newton's iteration comes there without a bracket, and marks those
-that are not there in the end: they are left to the former.
+that are not there in the end: they are left to the former.  Why an event's error hardly matters:
+docs/numerics.md#finding-events.
 """
 
 import math

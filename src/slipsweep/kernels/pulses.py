@@ -62,7 +62,10 @@ _MOST_PULSES = 64
 
 @in_lanes
 def held_motion(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
-    """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest."""
+    """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest.
+
+    docs/numerics.md#held-block-acceleration
+    """
     width = end - start
     excess = amplitude - held
     sine_part = angle_minus_sine(start)
@@ -236,7 +239,8 @@ def pause_of(began: float) -> float:
 def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: float) -> float:
     """W of the pulse that a lane has followed and of `later` more, each entered with V greater by `gain`.
 
-    All but the last slide `braked` and π · gain · (2n − 1) more between two pulses, the last to its stop.
+    Pulse n, counted from 0, adds 2π · gain · n more than the first does with `braked`, the last slides to its
+    stop (docs/numerics.md#lanes-of-the-sine).
     """
     moved, left = lanes[W + j], lanes[LEFT + j] + later * gain
     last = (
@@ -299,7 +303,8 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
 
     Then they hold E(Üy) ≥ Üg from Üy on and slide through, and each pulse is entered with V greater by
     the same gain.  Where that is a loss, one of two things ends it, and the motion repeats: a pulse that
-    recouples, or one that stops before t1 of the first pulse and goes on like it.
+    recouples, or one that stops before t1 of the first pulse and goes on like it
+    (docs/numerics.md#pulses-entered-in-motion).
     """
     later = options.cycles - 1.0
     for j in range(STRIP):

@@ -79,13 +79,14 @@ class Room(NamedTuple):
 
 @in_lanes
 def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
-    """Which way a cell goes."""
+    """Which way a cell goes (docs/numerics.md#lanes-of-the-sine)."""
     at_start, at_end, mode = blocks[_AT_START + j], blocks[_AT_END + j], blocks[_MODE + j]
     decay = blocks[DECAY + j]
     start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
     gentle = decay * end <= LANE_E_FOLDINGS
-    # either E is convex, hence D concave, and as D > 0 at the peak it stays positive once it is;
-    # or 0 < dE/dx < 1, by bounds with the largest friction and normal acceleration
+    # as D > 0 at the peak, it stays positive once it is: either E is convex, hence D concave; or dD/dx ≥ 0 at
+    # Üg = 0, so that D rises first and turns once at most, and dE/dx > 0, by a bound with the largest friction
+    # and normal acceleration
     tan_theta, mu_s = blocks[TAN_THETA + j], blocks[MU_S + j]
     most = mu_s + blocks[DELTA_MU + j]
     convex = decay * options.g >= 2.0 * tan_theta

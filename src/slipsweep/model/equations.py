@@ -47,7 +47,7 @@ def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: flo
     """Eq. 4 as what the block falls short of the plane's acceleration, |Üg| − |Ü|, m/s².
 
     n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
-    failure Üg is small against g tan θ, which would take its digits.
+    failure Üg is small against g tan θ, which would take its digits (docs/numerics.md#eq-4-as-a-lag).
     """
     return g * (mu_s - friction) + drift(ground_acceleration, friction, mu_s, tan_theta)
 
