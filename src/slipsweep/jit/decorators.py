@@ -1,139 +1,20 @@
-"""How the functions that kernels are made of are compiled.
+"""How the functions that kernels are made of are compiled."""
 
-A kernel has a copy of every function it calls, optimised for it (`compiled`).  What numba makes of a function
-besides, so that it can be called by itself, is much of what the first run ever takes: a `_Part`
-is compiled for its callers only.  Called from Python it is compiled once more, as any jitted function is.
-What that saves is said at each step, in seconds of processor for the first `slipsweep run sweeps/paper.toml`
-(of some 14; measured one after the other on a machine at work, ±0.3).
-"""
-
-import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba import njit, types
-from numba.core import typed_passes, untyped_passes
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager
-from numba.core.registry import CPUDispatcher
+
+from slipsweep.jit import form
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-
-#: Passes of numba's compiler that find nothing to do here: no closures, `with`, overloads to inline,
-#: array expressions or arguments that are None.
-_IDLE_PASSES = (
-    untyped_passes.WithLifting,
-    untyped_passes.InlineClosureLikes,
-    untyped_passes.DeadBranchPrune,
-    untyped_passes.RewriteDynamicRaises,
-    untyped_passes.MakeFunctionToJitFunction,
-    untyped_passes.InlineInlinables,
-    untyped_passes.LiteralUnroll,
-    untyped_passes.LiteralPropagationSubPipelinePass,
-    typed_passes.InlineOverloads,
-    typed_passes.NopythonRewrites,
-    typed_passes.NoPythonSupportedFeatureValidation,
-    typed_passes.DumpParforDiagnostics,
-)
-
-
-class _Library(JITCodeLibrary):
-    """Intermediate code of a part: no machine code, and of the optimisations numba's cheap passes only.
-
-    The kernel has the rest; without any passes the kernels come out slower.  Machine code for the
-    functions of `equations` and `elementary` alone took 0.7 s.
-    """
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
-        self._finalized = True
-
-    def _optimize_final_module(self) -> None:
-        passes, builder = self._codegen._module_pass_manager(
-            loop_vectorize=False, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
-        )
-        passes.run(self._final_module, builder)
-
-    def get_pointer_to_function(self, name: str) -> int:
-        return 0
-
-    @property
-    def codegen(self) -> Any:
-        return _Nowhere
-
-
-class _Nowhere:
-    """Where the environment of a function that has no machine code is put."""
-
-    @staticmethod
-    def set_env(name: str, environment: Any) -> None:
-        pass
-
-
-class _Compiler(Compiler):
-    """numba's compiler, for functions that only jitted ones call."""
-
-    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
-        super().__init__(typingctx, targetctx, _Library(targetctx.codegen(), "part"), *arguments)
-
-    def define_pipelines(self) -> list[Any]:
-        """The passes of numba's own pipeline but for the idle ones, which took 1.0 s."""
-        pipeline = PassManager("part")
-        every = DefaultPassBuilder.define_nopython_pipeline(self.state).passes
-        pipeline.passes.extend(one for one in every if one[0] not in _IDLE_PASSES)
-        pipeline.finalize()
-        return [pipeline]
-
-
-class _Part(CPUDispatcher):
-    """A jitted function that is compiled for the kernels that call it, and once more for Python."""
-
-    def __init__(
-        self,
-        py_func: Callable[..., Any],
-        locals: dict[str, Any] | None = None,  # numba's name, which unpickling hands over
-        targetoptions: dict[str, Any] | None = None,
-    ) -> None:
-        inner = {
-            "nopython": True,
-            "boundscheck": None,
-            # an array belongs to whoever makes it: to count references to it in what it is handed on to took
-            # 1.0 s, and half the time of every walk over a wave (triangle, 1550 instead of 830 ns a cell).
-            # numba refuses a function that makes an array in another way than these two
-            "_nrt": not {"empty", "zeros"}.isdisjoint(py_func.__code__.co_names),
-            "no_cpython_wrapper": True,
-            "no_cfunc_wrapper": True,
-        }
-        super().__init__(py_func, locals or {}, (targetoptions or {}) | inner, pipeline_class=_Compiler)
-
-    @functools.cached_property
-    def _for_python(self) -> Callable[..., Any]:
-        options = {name: self.targetoptions[name] for name in ("error_model", "fastmath")}
-        jitted: Callable[..., Any] = njit(**options)(self.py_func)
-        return jitted
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Call from Python."""
-        return self._for_python(*args, **kwargs)
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """As numba's, but compiled once for all integers, not once for each constant that is handed in (0.8 s)."""
-        if "literally" not in self.py_func.__code__.co_names:
-            args = [types.unliteral(value) for value in args]
-            kws = {name: types.unliteral(value) for name, value in kws.items()}
-        return super().get_call_template(args, kws)
 
 
 def _part(**options: Any) -> Callable[[_Function], _Function]:
     """Decorator of functions that kernels are made of, with options of `numba.njit`."""
 
     def decorate(function: Any) -> Any:
-        if numba.config.DISABLE_JIT:
-            return function
-        return _Part(function, targetoptions={"error_model": "numpy", **options})
+        return function if numba.config.DISABLE_JIT else form.part(function, **options)
 
     return decorate
 

@@ -1,13 +1,18 @@
-"""Where compiled kernels are kept on disk."""
+"""Where compiled kernels are kept on disk, and who writes there."""
 
 import contextlib
 import functools
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
+import filelock  # here: imported in the middle of a fork, its own fork handlers would fail
 import platformdirs
+
+#: Seconds to wait for another process that compiles: four times what a slow machine takes.
+_PATIENCE = 120.0
 
 
 @functools.cache
@@ -59,3 +64,14 @@ def keep_latest(count: int, pattern: str, latest: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
             else:
                 other.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """Hold a file's lock against other processes, where locks can be had."""
+    lock = filelock.FileLock(f"{path}.lock")
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError, NotImplementedError, filelock.Timeout):
+            lock.acquire(timeout=_PATIENCE)
+            stack.callback(lock.release)
+        yield

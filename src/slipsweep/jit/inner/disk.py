@@ -1,0 +1,82 @@
+"""Machine code of kernels on disk: a file for one kernel and one signature.
+
+numba's own cache on disk will not do here.  Several processes that compile and save at the
+same moment can crash each other (numba issues 4807 and 10128); a damaged file ends the
+program; a file's time, which every installation changes, is taken for a change of its
+content; and it looks only at the file of the outermost function, so that a changed equation
+would not be noticed.
+"""
+
+import hashlib
+import pickle
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.registry import CPUDispatcher
+from numba.core.runtime.nrt import rtsys
+from numba.core.serialize import dumps
+
+from slipsweep.jit import folders
+from slipsweep.jit.inner.need import need
+from slipsweep.jit.interrupts import heard_later
+
+need(NullCache, load_overload="self sig target_context", save_overload="self sig cres")
+need(CompileResult, _reduce="self", library=None)
+need(
+    CompileResult,
+    _rebuild="target_context libdata fndesc env signature objectmode lifted typeann reload_init referenced_envs",
+)
+need(CPUDispatcher, _cache=None, targetctx=None)
+need(type(rtsys), initialize="self ctx")
+
+
+class Disk(NullCache):
+    """Where a dispatcher looks for machine code before it compiles: one file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kernel as numba wants it, or None."""
+        # all that machine code needs of numba is its memory functions; `refresh`, which compiling calls, would
+        # bring whatever may be compiled, scipy's BLAS among it: 0.2 of the 0.85 s that a small run takes
+        rtsys.initialize(target_context)
+        try:
+            content = self.path.read_bytes()
+            checksum, data = content[:32], content[32:]
+            if hashlib.sha256(data).digest() != checksum:
+                return None
+            with heard_later():
+                return CompileResult._rebuild(target_context, *pickle.loads(data))
+        except Exception:  # not there, or of another make: whatever is wrong with it, it can be made anew
+            return None
+
+    def save_overload(self, sig: Any, cres: Any) -> None:
+        """Keep a kernel that has been compiled."""
+        # a full disk, or something in the kernel that holds in this process only: it runs all the same
+        with suppress(Exception):
+            if not cres.library.has_dynamic_globals:
+                data = dumps(cres._reduce())
+                folders.write(self.path, hashlib.sha256(data).digest() + data)
+
+
+def digest_of(function: Callable[..., Any], jitted: Any, signature: tuple[Any, ...]) -> str:
+    """Digest of all that the machine code of a kernel depends on, but for the sources (the folder's name)."""
+    cells = function.__closure__ or ()
+    parts = (
+        function.__module__,
+        function.__qualname__,
+        dumps(tuple(cell.cell_contents for cell in cells)),  # the kernels of a factory differ in nothing else
+        str(signature),
+        jitted.targetctx.codegen().magic_tuple(),  # processor
+        (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__),
+        (int(numba.config.OPT), bool(numba.config.BOUNDSCHECK), bool(numba.config.DEBUGINFO_DEFAULT)),
+    )
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]

@@ -1,0 +1,55 @@
+"""Kernels in which no function can be replaced by one of the same name.
+
+numba gives a kernel a copy of every function it calls, optimised for it (loops in SIMD, say), as a
+weak symbol.  Where the process already has such a function, from compiling it by itself or from
+another kernel, the linker would take that one instead.  It may differ in its roundings: last digits
+would depend on whether a kernel was just compiled or loaded, and on what was loaded before.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite.binding
+from numba import njit
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+
+from slipsweep.jit.inner.need import need
+from slipsweep.jit.interrupts import heard_later
+
+need(
+    JITCodeLibrary,
+    _finalize_final_module="self",
+    _finalize_specific="self",
+    enable_object_caching="self",
+    _final_module=None,
+)
+need(Compiler, __init__="self typingctx targetctx library args return_type flags locals")
+
+
+class _Library(JITCodeLibrary):
+    """Machine code of a kernel with functions of its own."""
+
+    def _finalize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._finalize_final_module()
+
+    def _finalize_specific(self) -> None:
+        with heard_later():
+            super()._finalize_specific()
+
+
+class _Compiler(Compiler):
+    """numba's compiler, writing into such a library."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
+        library = _Library(targetctx.codegen(), "kernel")
+        library.enable_object_caching()
+        super().__init__(typingctx, targetctx, library, *arguments)
+
+
+def sealed(function: Callable[..., Any]) -> Any:
+    """A function as a kernel, to be compiled; runs without the GIL."""
+    return njit(nogil=True, error_model="numpy", pipeline_class=_Compiler)(function)

@@ -1,0 +1,46 @@
+"""Kernels and their parts by what numba documents alone.
+
+Slower to compile and, with waves, to run, and last digits may differ between the process that compiled a kernel and
+those that load it; but it takes nothing of numba that a new version may lack (`slipsweep.jit.form`).
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import njit
+
+from slipsweep.jit.folders import alone
+
+
+def part(function: Callable[..., Any], **options: Any) -> Any:
+    """A function that kernels are made of, with options of `numba.njit`."""
+    return njit(error_model="numpy", **options)(function)
+
+
+def compiled(function: Callable[..., Any], signature: tuple[Any, ...], folder: Path | None) -> Any:
+    """A kernel compiled for a signature, or loaded from numba's own cache in a folder."""
+    options = {"nogil": True, "error_model": "numpy"}
+    jitted = None
+    if folder is not None:
+        # no source file, a damaged cache, a full disk: whatever is wrong with the cache, a kernel can do without.
+        # Only one process at a time, for numba's own cache stands no more
+        with suppress(Exception), alone(folder / function.__name__), _cache_in(folder):
+            jitted = njit(cache=True, **options)(function)
+            jitted.compile(signature)
+    if jitted is None or not jitted.signatures:
+        jitted = njit(**options)(function)
+        jitted.compile(signature)
+    return jitted
+
+
+@contextmanager
+def _cache_in(folder: Path) -> Iterator[None]:
+    """Have numba keep what it compiles in a folder: that of our sources, of which it looks at one only."""
+    given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder / "plain")
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = given

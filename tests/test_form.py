@@ -1,0 +1,172 @@
+"""Kernels compiled by numba's inner parts, or the plain way where one is missing."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+from slipsweep.jit.inner.need import need
+
+#: Takes each name that is relied on away from numba in turn, in a process of its own; says what came of it.
+#: Names of classes are hidden from us only: numba itself, which uses most of them, would have renamed them.
+TAKEN_AWAY = """
+import ast, inspect, os, sys, types, warnings
+from pathlib import Path
+import numba
+import numpy as np
+import slipsweep.jit.inner
+from slipsweep.jit.inner import kernels, parts
+from slipsweep.jit.inner.need import NEEDED
+
+def numba_alone():
+    @numba.njit
+    def inner(x):
+        return x + 1.0
+    @numba.njit
+    def outer(values):
+        return inner(values[0])
+    return outer(np.array([1.0])) == 2.0
+
+def imported():
+    for path in Path(slipsweep.jit.inner.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module.startswith("numba."):
+                for alias in node.names:
+                    yield sys.modules[node.module], alias.name
+
+def without(owner, name):
+    def renamed(one):
+        make = vars(one).get("__init__")
+        if not inspect.isfunction(make):
+            return one
+        code = make.__code__.replace(co_names=tuple("gone" if n == name else n for n in make.__code__.co_names))
+        return type("Other", (), {"__init__": types.FunctionType(code, {}, closure=make.__closure__)})
+    class Hiding(type(owner)):
+        def __getattribute__(cls, asked):
+            if asked == name:
+                raise AttributeError(asked)
+            if asked == "__mro__" and not hasattr(owner, name):  # one that a constructor sets
+                return tuple(map(renamed, inspect.getmro(owner)))
+            return super().__getattribute__(asked)
+    return Hiding(owner.__name__, (owner,), {})
+
+def take_away(owner, name):
+    for module, alias in imported():
+        if getattr(module, alias) is owner and inspect.isclass(owner):
+            setattr(module, alias, without(owner, name))
+            return
+    for one in inspect.getmro(owner) if inspect.isclass(owner) else [owner]:
+        if name in vars(one):
+            delattr(one, name)
+
+def ours():
+    for name in [name for name in sys.modules if name.partition(".")[0] == "slipsweep"]:
+        del sys.modules[name]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        from slipsweep.jit.cache import Kernel
+        from slipsweep.jit.decorators import in_lanes, scalar
+        @scalar
+        def once(x):
+            return x + 1.0
+        @in_lanes
+        def twice(x):
+            return once(once(x))
+        def kernel(values):
+            return twice(values[0]) + once(values[1])
+        found = Kernel(kernel)(np.array([1.0, 2.0]))
+    return found == 6.0, [str(one.message) for one in caught]
+
+assert numba_alone()  # what it imports when first used is imported
+for owner, name in dict.fromkeys([*NEEDED, *imported()]):
+    if inspect.ismodule(getattr(owner, name, None)):
+        continue
+    if child := os.fork():
+        os.waitpid(child, 0)
+        continue
+    take_away(owner, name)
+    try:
+        alone = numba_alone()
+    except Exception:  # nobody can do without what numba itself cannot do without
+        alone = False
+    print(f"{owner.__name__}.{name}", *(ours() if alone else ("numba needs it", "")), sep="|", flush=True)
+    os._exit(0)
+"""
+
+
+def run(program: str, cache: Path, **environment: str) -> str:
+    """What a program prints."""
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), **environment},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        timeout=600,
+    ).stdout
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="takes names away in forks of one process")
+def test_any_private_name_may_go(tmp_path: Path) -> None:
+    """One warning, and kernels compiled the plain way that are right."""
+    outcomes = [line.split("|") for line in run(TAKEN_AWAY, tmp_path, SLIPSWEEP_PLAIN_NUMBA="").splitlines()]
+    tried = [outcome for outcome in outcomes if outcome[1] != "numba needs it"]
+    assert len(tried) > 30
+    for taken, right, messages in tried:
+        name = taken.rpartition(".")[2]
+        assert right == "True", taken
+        assert messages[2:].startswith(f"numba {numba.__version__}: "), taken
+        assert messages.count("compiled the plain way") == 1, taken
+        assert name in messages, taken
+
+
+class Owner:
+    shared = 1
+
+    def __init__(self) -> None:
+        self.own = 2
+
+    def method(self, first: int, second: int = 0) -> int:
+        return first + second + self.own
+
+
+def test_what_is_there_is_found() -> None:
+    need(Owner, shared=None, own=None, method="self first second")
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        ({"other": None}, "Owner has no other"),
+        ({"other": "self"}, "Owner has no other"),
+        ({"own": "self"}, "Owner has no own"),
+        ({"method": "self first"}, r"Owner.method takes \(self first second\), not \(self first\)"),
+    ],
+)
+def test_what_is_not_there_is_said(wanted: dict[str, str | None], message: str) -> None:
+    with pytest.raises(ImportError, match=message):
+        need(Owner, **wanted)
+
+
+#: The smallest of the package's kernels; says a result and how it was compiled.
+PARAMETERS = """
+import warnings
+warnings.simplefilter("error")
+import slipsweep
+from slipsweep.jit import form
+print(slipsweep.friction_parameters(5.0, 0.4, 6.0).delta_mu.item(), form.part.__module__)
+"""
+
+
+def test_the_plain_way_when_asked_for(tmp_path: Path) -> None:
+    """Without a word; and what is kept of one way is not taken for the other's."""
+    inner, way = run(PARAMETERS, tmp_path, SLIPSWEEP_PLAIN_NUMBA="0").split()
+    assert way == "slipsweep.jit.inner.parts"
+    for _ in range(2):  # compiled, and loaded
+        plain, way = run(PARAMETERS, tmp_path, SLIPSWEEP_PLAIN_NUMBA="1").split()
+        assert way == "slipsweep.jit.plain"
+        assert float(plain) == pytest.approx(float(inner), rel=1e-14)
+    assert list(tmp_path.glob("*/plain/**/*.nbi"))
