@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import RunError
 from slipsweep.grid import threads
+from slipsweep.grid.served import check_served, is_ordinary
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
@@ -141,6 +142,11 @@ def solve(
     -------
     dict of str to ndarray
         Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
+
+    Raises
+    ------
+    InputError
+        A result that has a value is beyond double precision.
     """
     results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     if _amplitudes(arrays) <= _AMPLITUDES:
@@ -171,11 +177,14 @@ def _solve_into(
     """Solve a grid, or a slab of one; `results` lie without gaps."""
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
+    # what is out of the ordinary is looked at, for which flags are wanted in any case
+    ordinary = all(map(is_ordinary, (np.array(problem.g), *inputs[1:], frequency)))
+    flags = results.get("validity", np.empty(0 if ordinary else shape, RESULT_DTYPES["validity"]))
     grid = layout(shape, scaled, [*inputs, frequency])
-    displacement, velocity, mode, validity = (
-        results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS
+    displacement, velocity, mode = (
+        results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS[:3]
     )
-    targets = Results(displacement, velocity, mode, validity, unsolved=np.full(1, -1))
+    targets = Results(displacement, velocity, mode, flags.reshape(-1), unsolved=np.full(1, -1))
     periods = flat(1.0 / (2.0 * math.pi * frequency))
     rows = tuple(flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in results)
@@ -201,6 +210,8 @@ def _solve_into(
 
     if math.prod(shape):
         threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
+    if not ordinary:
+        check_served(problem.g, arrays, results, flags)
     if targets.unsolved[0] >= 0:
         raise RunError(_unsolved(int(targets.unsolved[0]), grid, scaled, shape, arrays))
     if "structure_frequency" in arrays and "validity" in results:
@@ -245,14 +256,28 @@ def friction_parameters(
 ) -> dict[str, NDArray[Any]]:
     """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion.
 
-    Parameters and results as in `solve`; there is no frequency.
+    Parameters, results and errors as in `solve`; there is no frequency.
     """
+    return estimates(problem, shape, arrays, wanted, progress, empty, checked=True)
+
+
+def estimates(
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
+    checked: bool = False,
+) -> dict[str, NDArray[Any]]:
+    """As `friction_parameters`; unless `checked`, an estimate that is no finite number is given as it is."""
     results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     options = problem.options(False)
     parts = list(slabs(shape, _FRICTION_CELLS))
 
     def solve_slab(slab: tuple[slice, ...]) -> None:
-        inputs = cell_inputs(cut(arrays, slab), len(shape))
+        own = cut(arrays, slab)
+        inputs = cell_inputs(own, len(shape))
         sizes = tuple(part.stop - part.start for part in slab)
         grid = layout(sizes, None, [*inputs, np.ones((1,) * len(shape))])
         cells = math.prod(sizes)
@@ -261,8 +286,13 @@ def friction_parameters(
         rows = tuple(flat(values) for values in inputs)
         parameter_grid(grid, 0, cells, rows, options, parameters, codes["sliding_mode"], codes["validity"])
         found = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
-        for name in wanted:
-            results[name][slab] = found[name].reshape(sizes)
+        shaped = {name: found[name].reshape(sizes) for name in wanted}
+        if checked:
+            check_served(problem.g, own, shaped, found["validity"].reshape(sizes))
+        for name, values in shaped.items():
+            if checked and values.dtype.kind == "f":
+                values[np.isinf(values)] = math.nan  # of a cell without a value
+            results[name][slab] = values
         if progress is not None:
             progress(cells)
 

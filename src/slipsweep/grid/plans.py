@@ -327,6 +327,10 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
     """Eqs. 7-11 on the dimensions they depend on."""
     made = ("displacement_amplitude", "frequency") if "displacement_amplitude" in variables else ()
     own = {name: variable for name, variable in variables.items() if name in (*_FRICTION_INPUTS, *made)}
+    drive = made[0] if made else "amplitude"
+    for name in ("delta_mu", "decay_rate"):
+        if name in names and (own[drive].values == 0.0).any():
+            raise InputError(f"{drive} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
     sizes = grid_sizes(own)
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
 

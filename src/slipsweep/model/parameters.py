@@ -19,41 +19,54 @@ from slipsweep.errors import InputError
 
 @dataclass(frozen=True)
 class Bound:
-    """An interval, and how to say it."""
+    """An interval, its upper end included unless said otherwise, and how to say it."""
 
     low: float
     includes_low: bool
     high: float
     text: str
+    includes_high: bool = True
 
     def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which values lie in the interval (NaN and infinity never do)."""
         above = values >= self.low if self.includes_low else values > self.low
-        return np.asarray(above & (values < self.high))
+        return np.asarray(above & (values <= self.high if self.includes_high else values < self.high))
 
 
-_POSITIVE = Bound(0.0, False, math.inf, "a finite number > 0")
-_NOT_NEGATIVE = Bound(0.0, True, math.inf, "a finite number >= 0")
+#: The largest acceleration and length, and the largest of all other numbers, whose inverse is the least: more than
+#: physics ever needs, and so much less than the largest double that the solvers can work with each of them.  What is
+#: too much of several together is refused when it is solved (`grid.served`).
+LARGEST, LARGEST_FACTOR = 1e300, 1e100
+
+_AMOUNT = Bound(0.0, True, LARGEST, f"a finite number >= 0 and at most {LARGEST:g}")
+_POSITIVE_AMOUNT = Bound(0.0, False, LARGEST, f"a finite number > 0 and at most {LARGEST:g}")
+_FACTOR = Bound(0.0, True, LARGEST_FACTOR, f"a finite number >= 0 and at most {LARGEST_FACTOR:g}")
+_POSITIVE_FACTOR = Bound(
+    1.0 / LARGEST_FACTOR,
+    True,
+    LARGEST_FACTOR,
+    f"a finite number > 0, from {1.0 / LARGEST_FACTOR:g} to {LARGEST_FACTOR:g}",
+)
 
 #: What each parameter may be (MODEL: what no physics allows is an error, not a NaN).
 BOUNDS: dict[str, Bound] = {
-    "theta": Bound(0.0, True, 90.0, "0 <= theta < 90 degrees"),
-    "mu_s": _POSITIVE,
-    "amplitude": _NOT_NEGATIVE,
-    "displacement_amplitude": _NOT_NEGATIVE,
-    "frequency": _POSITIVE,
-    "displacement": _POSITIVE,
-    "maximum_amplitude": _POSITIVE,
-    "yield_acceleration": Bound(-math.inf, False, math.inf, "a finite number"),
-    "decay_rate": _NOT_NEGATIVE,
-    "delta_mu": _NOT_NEGATIVE,
-    "minimum_friction": _POSITIVE,
-    "structure_frequency": _POSITIVE,
-    "scale": _POSITIVE,
-    "time_scale": _POSITIVE,
-    "g": _POSITIVE,
-    "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1"),
-    "threshold": _NOT_NEGATIVE,
+    "theta": Bound(0.0, True, 90.0, "0 <= theta < 90 degrees", includes_high=False),
+    "mu_s": _POSITIVE_FACTOR,
+    "amplitude": _AMOUNT,
+    "displacement_amplitude": _AMOUNT,
+    "frequency": _POSITIVE_FACTOR,
+    "displacement": _POSITIVE_AMOUNT,
+    "maximum_amplitude": _POSITIVE_AMOUNT,
+    "yield_acceleration": Bound(-LARGEST, True, LARGEST, f"a finite number from {-LARGEST:g} to {LARGEST:g}"),
+    "decay_rate": _FACTOR,
+    "delta_mu": _FACTOR,
+    "minimum_friction": _POSITIVE_FACTOR,
+    "structure_frequency": _POSITIVE_FACTOR,
+    "scale": _POSITIVE_FACTOR,
+    "time_scale": _POSITIVE_FACTOR,
+    "g": Bound(1.0 / LARGEST, True, LARGEST, f"a finite number > 0, from {1.0 / LARGEST:g} to {LARGEST:g}"),
+    "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1", includes_high=False),
+    "threshold": _AMOUNT,
 }
 
 MODELS = ("mendez", "newmark")

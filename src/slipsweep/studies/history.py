@@ -9,10 +9,11 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.plans import check_options, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history
-from slipsweep.model.parameters import check_numbers, check_whole
+from slipsweep.model.parameters import check_numbers, check_whole, number_text
 from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
 from slipsweep.motion.waveforms import wave_of
 
@@ -53,10 +54,17 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
         grid = np.atleast_1d(check_numbers("times", times))
         if grid.ndim != 1 or not np.isfinite(grid).all() or (grid < 0.0).any() or (np.diff(grid) <= 0.0).any():
             raise InputError("times: must be one row of finite, increasing numbers >= 0")
-        phases = grid * omega
+        with np.errstate(over="ignore"):
+            phases = grid * omega
+        if not np.isfinite(phases[-1:]).all():
+            raise InputError(f"times = ..., {number_text(float(grid[-1]))}: too many cycles for double precision")
     table = sampled(phases)
-    table[:, 3] /= omega
-    table[:, 4] /= omega * omega
+    with np.errstate(over="ignore"):
+        table[:, 3] /= omega
+        table[:, 4] /= omega * omega
+    if not valueless:
+        moved = {name: table[:, at] for at, name in enumerate(HISTORY)}
+        check_served(problem.g, own, moved, np.zeros(len(table), np.int16))
     columns = {
         name: Variable(("time",), np.ascontiguousarray(column), attributes)
         for (name, attributes), column in zip(HISTORY.items(), table.T, strict=True)

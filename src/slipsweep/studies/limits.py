@@ -228,7 +228,9 @@ def _scan(
     )["yield_acceleration"]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
-    amplitudes = start * (maximum_amplitude / start) ** np.linspace(0.0, 1.0, steps + 1)
+    with np.errstate(over="ignore"):
+        ratio = np.minimum(maximum_amplitude / start, np.finfo(np.float64).max)
+    amplitudes = start * ratio ** np.linspace(0.0, 1.0, steps + 1)
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
 

@@ -16,6 +16,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine, threads
 from slipsweep.grid.engine import Array, Problem
 from slipsweep.grid.plans import Plan, Task, aligned, check_options, checked, grid_sizes, record_attributes
+from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Variable
 from slipsweep.kernels.record import RECORD_KERNEL, History
 from slipsweep.model.parameters import check_choices, check_given, check_numbers, shown
@@ -103,6 +104,10 @@ def _solve(
     # the dimensions that the kernel sees: along time_scale the laws of scaling serve, along polarity another history
     own = tuple(max(values.shape[axis] for values in inputs) for axis in range(len(shape)))
     rows = {str(at): values for at, values in enumerate(inputs)}
+    extremes = {
+        "acceleration of the record": np.abs(record.acceleration).max(),
+        "time of the record": np.abs(record.times).max(),
+    }
     for side in np.ndindex(polarity.shape):
         history = history_of(record, float(polarity[side]))
         sided = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
@@ -115,9 +120,14 @@ def _solve(
             told = None if progress is None else partial(_in_shares, progress, shares)
             found = _solve_slab(problem, cells, part, history, told)
             factors = engine.cut({"time_scale": factor}, where)["time_scale"]
+            found = {name: values.reshape(cells) for name, values in found.items()}
+            with np.errstate(over="ignore"):
+                moved = {name: found[name] * factors**power for name, power in _POWERS.items() if name in results}
+            for name, values in moved.items():
+                flags = np.broadcast_to(found["validity"], values.shape)
+                check_served(problem.g, engine.cut(arrays, where) | extremes, {name: values}, flags)
             for name, target in results.items():
-                values = found[name].reshape(cells)
-                target[where] = values * factors ** _POWERS[name] if name in _POWERS else values
+                target[where] = moved.get(name, found[name])
     return results
 
 

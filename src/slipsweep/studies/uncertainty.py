@@ -621,7 +621,7 @@ class SamplePlan:
         assert name in FRICTION_PARAMETERS
         dims = np.broadcast_shapes(*(values.shape for values in arrays.values()))
         full = tuple(max(a, b) for a, b in zip(dims, (1,) * len(shape), strict=True))
-        estimate = engine.friction_parameters(self.problem, full, arrays, (name,))[name]
+        estimate = engine.estimates(self.problem, full, arrays, (name,))[name]
         values = one.applied(estimate, self._row(name, len(shape) - 1))
         return np.where(BOUNDS[name].holds(values), values, np.nan)
 
@@ -644,23 +644,30 @@ class SamplePlan:
         bits = np.array([[code & int(flag) != 0 for flag in Validity] for code in range(256)], np.float64)
 
         def work(first: int, last: int) -> None:
-            for row in range(first, last):
-                values = displacement[row]
-                values.sort()  # NaN goes last
-                count = int(np.searchsorted(values, np.nan))
-                found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
-                found["flag_share"][row] = np.bincount(flags[row], minlength=256) @ bits / samples
-                found["valueless_share"][row] = (samples - count) / samples
-                if not count:
-                    continue
-                there, square = values[:count], squares[row][:, None]
-                found["displacement_quantile"][row] = _quantiles(there, quantiles) / square
-                found["mean_displacement"][row] = there.mean() / squares[row]
-                above = count - np.searchsorted(there, thresholds * square, side="right")
-                found["exceedance_probability"][row] = above / count
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused below
+                for row in range(first, last):
+                    values = displacement[row]
+                    values.sort()  # NaN goes last
+                    count = int(np.searchsorted(values, np.nan))
+                    found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
+                    found["flag_share"][row] = np.bincount(flags[row], minlength=256) @ bits / samples
+                    found["valueless_share"][row] = (samples - count) / samples
+                    if not count:
+                        continue
+                    there, square = values[:count], squares[row][:, None]
+                    found["displacement_quantile"][row] = _quantiles(there, quantiles) / square
+                    found["mean_displacement"][row] = there.mean() / squares[row]
+                    above = count - np.searchsorted(there, thresholds * square, side="right")
+                    found["exceedance_probability"][row] = above / count
 
         # sorting and counting take about an eighth of what solving takes
         threads.spread(rows, work, max(samples // 8, 1))
+        for name in ("displacement_quantile", "mean_displacement"):
+            there = found["valueless_share"][:, None] < 1.0
+            wrong = (~np.isfinite(found[name].reshape(*squares.shape, -1)).all(axis=-1)) & there
+            if wrong.any():
+                worst = number_text(float(frequency[wrong].flat[0]))
+                raise InputError(f"frequency = {worst}: {name} is then no finite number; must be nearer to 1")
         return found
 
 
