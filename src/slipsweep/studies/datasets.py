@@ -233,7 +233,9 @@ def simulate(
         One case; these and the remaining parameters as in `slipsweep.sweep`.
     times : array, optional
         Times to sample, s, increasing and not negative; by default `points_per_cycle` a
-        cycle, from 0 to the end of the shaking, or until the block has come to rest if later.
+        cycle, from 0 to the end of the shaking, or until the block has come to rest if later.  A
+        slide that lasts for more than 100 cycles after the shaking has as many points as 100
+        cycles have, evenly spaced from there on.
     points_per_cycle : int
         Samples a cycle where `times` is not given.
 

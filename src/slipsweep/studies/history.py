@@ -17,6 +17,9 @@ from slipsweep.model.parameters import check_numbers, check_whole, number_text
 from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
 from slipsweep.motion.waveforms import wave_of
 
+#: Cycles after the shaking that have as many points each as one of the shaking; longer slides have no more points.
+_CYCLES_BEYOND = 100
+
 
 def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: Any) -> Table:
     """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
@@ -42,13 +45,12 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
 
     if times is None:
         points = check_whole("points_per_cycle", points_per_cycle, 4)
-        shaken = points * problem.cycles
-        _check_memory(shaken)
         last = sampled(np.array([2.0 * math.pi * problem.cycles]))[0]
         # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
         braking = last[1] - last[0]
-        after = last[3] / braking if summary["sliding_mode"].item() == 1 and last[3] > 0.0 else 0.0
-        phases = np.arange(shaken + math.ceil(after * points / (2.0 * math.pi)) + 1) * (2.0 * math.pi / points)
+        with np.errstate(divide="ignore", over="ignore"):
+            after = last[3] / braking if summary["sliding_mode"].item() == 1 and last[3] > 0.0 else 0.0
+        phases = _phases(points, problem.cycles, float(after))
         grid = phases / omega
     else:
         grid = np.atleast_1d(check_numbers("times", times))
@@ -75,6 +77,27 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
         columns | summary.data_vars,
         summary.attrs | {"title": "Time history of a rigid block"},
     )
+
+
+def _phases(points: int, cycles: int, after: float) -> np.ndarray:
+    """Phases of so many points a cycle, to the end of the shaking and, `after` it (rad), to the end of the slide.
+
+    A slide that brakes by 1e-7 m/s² lasts for months.  Under a constant deceleration few points tell
+    all: they are spaced further apart then.
+    """
+    if not math.isfinite(after):
+        raise InputError(
+            "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
+            "larger yield_acceleration"
+        )
+    step, shaken = 2.0 * math.pi / points, points * cycles
+    beyond = math.ceil(min(after, 2.0 * math.pi * _CYCLES_BEYOND) / step)
+    _check_memory(shaken + beyond)
+    if after <= 2.0 * math.pi * _CYCLES_BEYOND:
+        return np.arange(shaken + beyond + 1) * step
+    # a hair further than the end, which is rounded
+    rest = np.linspace(0.0, after * (1.0 + 1e-12), beyond + 1)[1:]
+    return np.concatenate([np.arange(shaken + 1) * step, shaken * step + rest])
 
 
 def _check_memory(samples: int) -> None:

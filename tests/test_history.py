@@ -1,0 +1,80 @@
+"""Time histories of slides that last long after the shaking: few points, and all of the slide."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import slipsweep as command
+
+import slipsweep
+from slipsweep.errors import InputError
+
+#: Newmark blocks that are left with a velocity when the shaking ends.
+SHAKEN: list[dict[str, Any]] = [
+    {"waveform": "cosine"},
+    {"ramp_out": 0.7, "cycles": 3},
+    {"waveform": "harmonics", "harmonics": {"amplitudes": [1, 0.5], "multiples": [1, 2], "phases": [0, 90]}},
+]
+
+
+def history(yield_acceleration: float, points: int = 16, frequency: float = 1.5, **options: Any) -> Any:
+    return slipsweep.simulate(
+        0, 0.4, 3, frequency, model="newmark", yield_acceleration=yield_acceleration, points_per_cycle=points, **options
+    )
+
+
+@pytest.mark.parametrize("options", SHAKEN, ids=lambda options: options.get("waveform", "ramp"))
+@pytest.mark.parametrize("yield_acceleration", [0.3, 1e-2, 1e-4, 1e-7, 1e-12, 1e-30])
+def test_a_long_slide_has_a_bounded_number_of_points(options: dict[str, Any], yield_acceleration: float) -> None:
+    whole = history(yield_acceleration, **options)
+    cycles = options.get("cycles", 10)
+    time = whole.time.values
+    assert time.size <= 16 * (cycles + 100) + 2
+    assert (np.diff(time) > 0).all()
+    shaking = time[: 16 * cycles + 1]
+    np.testing.assert_allclose(shaking, np.arange(16 * cycles + 1) / 16 / 1.5, rtol=1e-14)
+    # at rest, where the sweep says, and at no time before
+    assert whole.relative_velocity.values[-1] == 0.0
+    assert whole.relative_displacement.values[-1] == pytest.approx(whole.permanent_displacement.item(), rel=1e-12)
+    speed = whole.relative_velocity.values[16 * cycles]
+    if speed > 0.0:
+        assert whole.relative_velocity.values[-2] > 0.0
+        braked = whole.relative_velocity.values[16 * cycles :]
+        expected = speed - yield_acceleration * (time[16 * cycles :] - time[16 * cycles])
+        np.testing.assert_allclose(braked[:-1], expected[:-1], rtol=1e-6, atol=1e-9 * speed)
+        # the last interval ends with the slide
+        if time.size == 16 * (cycles + 100) + 1:
+            assert time[-1] - time[16 * cycles] == pytest.approx(speed / yield_acceleration, rel=1e-9)
+
+
+def test_all_points_within_a_hundred_cycles_are_those_of_the_shaking() -> None:
+    whole = history(0.02, waveform="cosine")
+    assert 10 * 16 < whole.time.size < 110 * 16
+    np.testing.assert_allclose(np.diff(whole.time.values), 1 / 16 / 1.5, rtol=1e-9)
+
+
+def test_slides_beyond_double_precision_are_refused() -> None:
+    for least in (1e-308, 1e-320):
+        try:
+            whole = history(least, waveform="cosine")
+        except InputError:
+            continue
+        assert math.isfinite(whole.time.values[-1])
+        assert whole.relative_velocity.values[-1] == 0.0
+    with pytest.raises(InputError):
+        history(5e-324, waveform="cosine")
+
+
+def test_on_the_command_line(tmp_path: Any) -> None:
+    case = ("simulate", "--theta", "0", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1", "--waveform", "cosine")
+    for model in ("newmark", "mendez"):
+        for given in ("1e-7", "1e-20", "1e-300", "5e-324"):
+            done = command(
+                tmp_path, *case, "--model", model, "--yield-acceleration", given, "-o", f"{model}{given}.csv"
+            )
+            assert done.returncode in (0, 2), done
+            assert done.stderr.count("\n") == (done.returncode == 2)
+            assert "Traceback" not in done.stderr
+            assert "Warning" not in done.stderr
+    assert (tmp_path / "newmark1e-7.csv").read_text().count("\n") < 512 * 111
