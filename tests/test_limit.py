@@ -11,9 +11,12 @@ from processes import slipsweep as command
 from scipy.optimize import brentq
 
 import slipsweep
+from slipsweep.charts.limit_figures import limit_chart
 from slipsweep.errors import InputError
 from slipsweep.files.spec import quantity
+from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
+from slipsweep.studies.limits import limit_table
 
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -259,3 +262,49 @@ def test_command_names_what_is_wrong(tmp_path: Path) -> None:
         assert done.returncode == 2, done.stderr
         assert message in done.stderr
         assert done.stderr.count("\n") == 1
+
+
+CASES = """
+[[cases]]
+label = "dry ± joint"
+theta = 5
+mu_s = 0.38
+amplitude = 1
+[[cases]]
+label = "_wet $^joint^$"
+theta = 8
+mu_s = 0.3
+amplitude = 2
+[axes.frequency]
+values = [1, 2, 3]
+"""
+
+
+def test_cases_keep_their_names(tmp_path: Path) -> None:
+    """In the file, in a table of it, and in figures, whatever they mean to a plotting library."""
+    names = ["dry ± joint", "_wet $^joint^$"]
+    (tmp_path / "a.toml").write_text(CASES, encoding="utf-8")
+    done = command(tmp_path, "limit", "a.toml", "-d", "5mm", "-o", "l.nc", "-o", "l.svg")
+    assert (done.returncode, done.stderr) == (0, "")
+    with xr.open_dataset(tmp_path / "l.nc") as limits:
+        assert list(limits.limit_amplitude.coords["label"].values) == names
+    assert ", ".join(names) in command(tmp_path, "info", "l.nc").stdout
+    # rows that give amplitudes alone are no dimension of the limits
+    (tmp_path / "b.toml").write_text(
+        "[axes.theta]\nvalues = [5]\n[axes.mu_s]\nvalues = [0.4]\n[axes.frequency]\nvalues = [1]\n"
+        '[[cases]]\nlabel = "weak"\namplitude = 1\n[[cases]]\namplitude = 2\n'
+    )
+    assert command(tmp_path, "limit", "b.toml", "-d", "5mm", "-o", "m.nc").returncode == 0
+
+    zipped: dict[str, Any] = {
+        "theta": Variable(("case",), np.array([5.0, 8.0])),
+        "mu_s": Variable(("case",), np.array([0.38, 0.3])),
+    }
+    drawn = ["dry ± joint", r"_wet \$^joint^\$"]
+    for frequency in ([1.0, 2.0, 3.0], 1.0):
+        figure = limit_chart(limit_table(displacement=0.005, **zipped, frequency=frequency), names)
+        figure.savefig(tmp_path / "l.png")
+        if frequency == 1.0:
+            assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == drawn
+        else:
+            assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"case {name}" for name in drawn]

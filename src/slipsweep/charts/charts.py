@@ -20,7 +20,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from slipsweep.charts.style import ORANGE, PURPLE, SKY_BLUE, VERMILION, axis_label, caption, unit, value_text
+from slipsweep.charts.style import ORANGE, PURPLE, SKY_BLUE, VERMILION, axis_label, caption, plain, unit, value_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import RESULTS, SlidingMode, Validity
 
@@ -610,5 +610,5 @@ def add_legend(axes: Axes, figure: Figure, handles: Any = None, labels: Any = No
 
 def add_caption(figure: Figure, table: Table) -> None:
     """Parameters, model and origin, under the figure."""
-    case = f"case {table.attrs['case']}: " if "case" in table.attrs else ""
+    case = f"case {plain(table.attrs['case'])}: " if "case" in table.attrs else ""
     figure.supxlabel(f"{case}{caption(table)}; {table.attrs['source']}", fontsize="small")

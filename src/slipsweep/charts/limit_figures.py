@@ -1,6 +1,7 @@
 """The chart of limit amplitudes: a family of curves over one parameter, panels over two more."""
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from slipsweep.charts.charts import set_scale
-from slipsweep.charts.style import SYMBOLS, axis_label, value_text
+from slipsweep.charts.style import SYMBOLS, axis_label, plain, value_text
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
 from slipsweep.motion.waveforms import text_of
@@ -21,7 +22,7 @@ _ABSCISSAE = ("frequency", "mu_s", "theta", "displacement")
 _CURVES = ("theta", "displacement", "mu_s")
 
 
-def limit_chart(table: Table) -> Figure:
+def limit_chart(table: Table, labels: Sequence[str] = ()) -> Figure:
     """Draw limit amplitudes, in g, over one dimension.
 
     The abscissa is frequency, else mu_s, theta or displacement; theta (else displacement or
@@ -33,6 +34,8 @@ def limit_chart(table: Table) -> Figure:
     ----------
     table : Table
         What `slipsweep.studies.limits.limit_table` returns.
+    labels : sequence of str
+        Names of its cases; by default they are numbered.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def limit_chart(table: Table) -> Figure:
             chosen = {**fixed, **{d: k for d, k in ((rows, at_row), (columns, at_column), (curves, at_curve)) if d}}
             where: Any = tuple(chosen.get(dim, slice(None)) for dim in limits.dims)
             y = np.atleast_1d(limits.values[where]) / g
-            label = _label(table, curves, at_curve) if curves else None
+            label = _label(table, curves, at_curve, labels) if curves else None
             panel.plot(x, y, color=colour, label=label, marker="." if x.size <= 12 else None)
             states = np.atleast_1d(status[where])
             abrupt = (states >= LimitStatus.AT_MODE_JUMP) & (states <= LimitStatus.AFTER_GAP)
@@ -76,18 +79,19 @@ def limit_chart(table: Table) -> Figure:
                 x[abrupt], y[abrupt], linestyle="none", marker="o", markersize=4, markerfacecolor="none",
                 markeredgecolor=colour,
             )  # fmt: skip
-        title = ", ".join(_label(table, d, k) for d, k in ((columns, at_column), (rows, at_row)) if d)
+        title = ", ".join(_label(table, d, k, labels) for d, k in ((columns, at_column), (rows, at_row)) if d)
         panel.set_title(title, fontsize="medium")
         panel.grid(color="0.9", which="both")
-        if x.size > 1:
+        if abscissa == "case":
+            panel.set_xticks(x, list(map(plain, labels)) or None)
+        elif x.size > 1:
             set_scale(panel, "x", x)
         panel.set_xlabel(_axis_label(abscissa) if i == len(down) - 1 else "")
     axes[0, 0].set_ylim(bottom=0.0)  # one scale for all, from zero; only now, for it ends the autoscaling
     figure.supylabel("limit amplitude A / g")
     if curves:
-        handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside right upper", frameon=False)
-    figure.supxlabel(_caption(table, shown, fixed), fontsize="small")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
+    figure.supxlabel(_caption(table, shown, fixed, labels), fontsize="small")
     return figure
 
 
@@ -108,7 +112,9 @@ def _text(name: str, value: float) -> str:
     return value_text(name, value) if name in SYMBOLS else f"{name} {value:.4g}"
 
 
-def _label(table: Table, name: str, index: int) -> str:
+def _label(table: Table, name: str, index: int, labels: Sequence[str]) -> str:
+    if name == "case" and labels:
+        return f"case {plain(labels[index])}"
     return _text(name, _values(table, name, table["limit_amplitude"].sizes)[index])
 
 
@@ -120,11 +126,11 @@ def _axis_label(name: str | None) -> str:
     return axis_label(name) if name in SYMBOLS else name
 
 
-def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int]) -> str:
+def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], labels: Sequence[str]) -> str:
     """Parameters, model, and what of the table is not shown."""
     sizes, attributes = table["limit_amplitude"].sizes, table.attrs
     single = [_text(name, value.item()) for name, value in table.coords.items() if not value.dims]
-    single += [_label(table, dim, index) for dim, index in fixed.items()]
+    single += [_label(table, dim, index, labels) for dim, index in fixed.items()]
     thinned = [
         f"{len(chosen)} of {sizes[dim]} {SYMBOLS.get(dim, dim)}"
         for dim, chosen in shown.items()

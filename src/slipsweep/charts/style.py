@@ -47,6 +47,11 @@ def value_text(name: str, value: float) -> str:
     return f"{SYMBOLS[name]} = {value:.4g}{space}{unit(name)}"
 
 
+def plain(text: str) -> str:
+    """A name that users give, as matplotlib draws it as it stands: a ``$`` begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def caption(table: Table) -> str:
     """The parameters that have one value, the model and the shaking, on two lines."""
     single = [name for name in SYMBOLS if name in table.coords and table[name].values.size == 1]

@@ -42,7 +42,7 @@ def limit(
 
     Solved anew, to the last digit, not interpolated from the result.
     """
-    writers: dict[str, Callable[[Table, Path, bool], None]] = {
+    writers: dict[str, Callable[[Table, Path, bool, tuple[str, ...]], None]] = {
         ".nc": _write_netcdf,
         **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
     }
@@ -67,8 +67,9 @@ def limit(
     cells = checked.cells // checked.shape.get("amplitude", checked.shape.get("displacement_amplitude", 1))
     with progress_bar(cells * len(displacement), quiet) as progress:
         table = limit_table(**given, progress=progress)
+    labels = checked.labels if "case" in table.sizes else ()
     for path in paths:
-        writers[path.suffix](table, path, overwrite)
+        writers[path.suffix](table, path, overwrite, labels)
     if not quiet:
         _summarize(table)
         for path in paths:
@@ -110,16 +111,16 @@ def _summarize(table: "Table") -> None:
             typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
 
 
-def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
+def _write_netcdf(table: "Table", path: Path, overwrite: bool, labels: tuple[str, ...]) -> None:
     from slipsweep.files import netcdf
 
-    netcdf.write_table(table, path, title=_TITLE, command=typed_command(), overwrite=overwrite)
+    netcdf.write_table(table, path, title=_TITLE, command=typed_command(), overwrite=overwrite, labels=labels)
 
 
-def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
+def _write_figure(table: "Table", path: Path, overwrite: bool, labels: tuple[str, ...]) -> None:
     from slipsweep.charts import limit_figures
     from slipsweep.files import outputs
 
-    figure = limit_figures.limit_chart(table)
+    figure = limit_figures.limit_chart(table, labels)
     with outputs.complete_or_absent(path, overwrite) as temporary:
         figure.savefig(temporary, format=path.suffix[1:], dpi=150)

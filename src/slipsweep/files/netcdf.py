@@ -151,11 +151,18 @@ def rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[An
 
 
 def write_table(
-    table: Table, path: Path, *, title: str, command: str, overwrite: bool = False, record: Record | None = None
+    table: Table,
+    path: Path,
+    *,
+    title: str,
+    command: str,
+    overwrite: bool = False,
+    record: Record | None = None,
+    labels: tuple[str, ...] = (),
 ) -> None:
     """Write a table that is in memory (a time history) by the rules that sweeps are written by.
 
-    The `record` that it is the response to is written with it.
+    The `record` that it is the response to is written with it, and the `labels` of its cases.
     """
     with (
         complete_or_absent(path, overwrite) as temporary,
@@ -163,6 +170,7 @@ def write_table(
         writing(path),
     ):
         _define(file, table, lambda name: table[name].values.dtype)
+        _label_cases(file, labels)
         _describe(file, {**table.attrs, "title": title, **_provenance(history_of(command))})
         file.set_auto_maskandscale(False)
         for name, array in {**table.coords, **table.data_vars}.items():
