@@ -26,6 +26,46 @@ def test_eq1_gives_back_the_friction_of_eq4(ground: float, friction: float) -> N
         assert friction < MU_S - TAN_THETA - (ground - G * TAN_THETA) / (G + ground * TAN_THETA)
 
 
+@pytest.mark.parametrize("ground", [-5.1, -0.4, 0.0, 0.7, 3.5])
+@pytest.mark.parametrize("theta", [0.0, 5.0, 30.0])
+def test_eqs_2_and_3_are_the_force_normal_to_the_plane(ground: float, theta: float) -> None:
+    """N/m is what weight and the plane's horizontal acceleration have normal to it; over cos θ."""
+    angle = math.radians(theta)
+    normal = G * math.cos(angle) + ground * math.sin(angle)
+    assert eq.normal_acceleration(ground, math.tan(angle), G) == pytest.approx(normal / math.cos(angle), rel=1e-14)
+
+
+#: The paper's experiments: θ, μs, Üy and A; Table 1: Üg,lim and ξ; Table 2: Δμ and μmin ("zero, or very close to it").
+STICK_SLIP = (5.0, 0.38, 0.59, 3.55, "4.43", "0.80", "0.09", "0.12")
+CONTINUOUS = (6.0, 0.38, 0.08, 5.10, "3.92", "1.30", "0.11", "0.01")
+
+
+@pytest.mark.parametrize(
+    ("theta", "mu_s", "yields", "amplitude", "limit", "ratio", "above_static", "least"), [STICK_SLIP, CONTINUOUS]
+)
+def test_eqs_7_to_11_give_the_papers_tables(
+    theta: float, mu_s: float, yields: float, amplitude: float, limit: str, ratio: str, above_static: str, least: str
+) -> None:
+    """Each by itself: from the numbers that the paper prints before it, to the digits that it prints."""
+    found = eq.limiting_acceleration(yields, mu_s, math.tan(math.radians(theta)), G)
+    assert f"{found:.2f}" == limit, "Eq. 7"
+    assert f"{eq.acceleration_ratio(amplitude, float(limit)):.2f}" == ratio, "Eq. 8"
+    assert f"{eq.minimum_friction(mu_s, float(ratio)):.2f}" == least, "Eq. 9"
+    found = eq.delta_mu(mu_s, amplitude / float(limit))
+    assert f"{found:.2f}" == above_static, "Eqs. 10 and 11"
+
+
+def test_eq7_is_eq4_without_friction_at_yield() -> None:
+    limit = eq.limiting_acceleration(0.59, MU_S, TAN_THETA, G)
+    assert eq.block_acceleration(limit, 0.0, MU_S, TAN_THETA, G) == pytest.approx(0.59, rel=1e-14)
+
+
+def test_eqs_10_and_11_meet_where_the_modes_do() -> None:
+    assert eq.delta_mu(MU_S, 1.0) == 0.0
+    assert eq.delta_mu(MU_S, 1.25) == pytest.approx(0.25 * MU_S, rel=1e-15)
+    assert eq.delta_mu(MU_S, 0.8) == pytest.approx(0.25 * MU_S, rel=1e-15)
+
+
 def test_eq6_without_an_excess_is_eq5() -> None:
     law = eq.original_friction_coefficient(2.0, MU_S, 2.7, G)
     assert law == eq.friction_coefficient(2.0, MU_S, 0.0, 2.7, G) == pytest.approx(MU_S * math.exp(-2.7 * 2.0 / G))
