@@ -288,8 +288,10 @@ def boundaries(table: Table) -> dict[str, Variable]:
     from slipsweep.grid.plans import plan_friction_parameters
 
     given = {name: table[name] for name in ("theta", "mu_s", "yield_acceleration") if name in table.coords}
-    # neither depends on the amplitude
-    found = plan_friction_parameters(amplitude=0.0, g=float(table.attrs["g"]), **given).solve()
+    # neither depends on the amplitude, nor on what it is taken for otherwise
+    found = plan_friction_parameters(
+        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, g=float(table.attrs["g"]), **given
+    ).solve()
     slides_at_rest = found["yield_acceleration"].values <= 0
     limit = found["limiting_acceleration"]
     unstable = found["validity"].values != 0
