@@ -79,7 +79,7 @@ def near_yield() -> str:
             reference = exact(cell)
             moved = [exact(cell | {name: np.nextafter(value, np.inf)}) for name, value in cell.items()]
             ulps = sum(abs(value - reference) for value in moved)
-            answer = float(slipsweep.sweep(**cell, frequency=1.0, cycles=1).permanent_displacement)
+            answer = float(slipsweep.sweep(**cell, frequency=1.0, excitation=slipsweep.Sine(1)).permanent_displacement)
             row += [number(abs(answer - reference) / reference, 2), number(ulps / reference, 2)]
         rows.append(row)
     names = [f"θ {theta:g}°, μs {mu_s:g}: {what}" for theta, mu_s in PLANES for what in ("error", "one ulp")]

@@ -6,6 +6,7 @@ import numpy as np
 
 import slipsweep
 from benchmarks.grids import REGIMES, design_grid, regime_cells
+from slipsweep.model.options import Rule
 
 ONLY_DISPLACEMENT: dict[str, Any] = {"variables": ["permanent_displacement"]}
 
@@ -33,12 +34,12 @@ class Step:
     params = (tuple(REGIMES), ("rectangle", "trapezoid", "simpson"), (1_000, 10_000))
     param_names = ("regime", "rule", "cells")
 
-    def setup(self, regime: str, rule: str, cells: int) -> None:
+    def setup(self, regime: str, rule: Rule, cells: int) -> None:
         self.cells: dict[str, Any] = regime_cells(regime, cells)
         self.time_sweep(regime, rule, cells)
 
-    def time_sweep(self, regime: str, rule: str, cells: int) -> None:
-        slipsweep.sweep(**self.cells, solver="step", rule=rule, steps_per_cycle=1024, **ONLY_DISPLACEMENT)
+    def time_sweep(self, regime: str, rule: Rule, cells: int) -> None:
+        slipsweep.sweep(**self.cells, solver=slipsweep.Step(rule, 1024), **ONLY_DISPLACEMENT)
 
 
 class DesignChart:
@@ -56,7 +57,7 @@ class DesignChart:
         slipsweep.sweep(**self.grid, **ONLY_DISPLACEMENT)
 
     def time_4d(self, side: int) -> None:
-        slipsweep.sweep(**(self.grid | {"frequency": self.frequency}), **ONLY_DISPLACEMENT)
+        slipsweep.sweep(**self.grid | {"frequency": self.frequency}, **ONLY_DISPLACEMENT)
 
     def time_all_variables(self, side: int) -> None:
         slipsweep.sweep(**self.grid)

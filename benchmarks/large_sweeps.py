@@ -298,10 +298,16 @@ def scaling(tiny: bool, measured: Mapping[str, Mapping[str, float]]) -> str:
     deep = design_grid(*((4, 4, 8) if tiny else (60, 50, 200))) | {"frequency": np.geomspace(0.1, 20, 100)}
     stepped = regime_cells("continuous", 32 if tiny else 20_000)
     works: dict[str, tuple[Callable[[], Any], int]] = {
-        "cycle solver, no frequency axis": (lambda: slipsweep.sweep(**flat), 4 * 4 * 8 if tiny else 1_200_000),
-        "cycle solver, 100 frequencies": (lambda: slipsweep.sweep(**deep), 4 * 4 * 800 if tiny else 60_000_000),
+        "cycle solver, no frequency axis": (
+            lambda: slipsweep.sweep(**flat),
+            4 * 4 * 8 if tiny else 1_200_000,
+        ),
+        "cycle solver, 100 frequencies": (
+            lambda: slipsweep.sweep(**deep),
+            4 * 4 * 800 if tiny else 60_000_000,
+        ),
         "step solver, Simpson, 1024 steps, continuous": (
-            lambda: slipsweep.sweep(**stepped, **thousand, solver="step", rule="simpson", steps_per_cycle=1024),
+            lambda: slipsweep.sweep(**stepped, **thousand, solver=slipsweep.Step("simpson", 1024)),
             next(values.size for values in stepped.values() if hasattr(values, "size")),
         ),
     }

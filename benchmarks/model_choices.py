@@ -15,9 +15,9 @@ from benchmarks.machine import arguments, number, table
 from slipsweep import SlidingMode, Validity
 
 CHOICES: dict[str, dict[str, Any]] = {
-    "literal rise": {"rise": "literal"},
-    "recoupling by integration": {"recoupling": "integrate"},
-    "literal rise and integration": {"rise": "literal", "recoupling": "integrate"},
+    "literal rise": {"model": slipsweep.Mendez(rise="literal")},
+    "recoupling by integration": {"model": slipsweep.Mendez(recoupling="integrate")},
+    "literal rise and integration": {"model": slipsweep.Mendez(rise="literal", recoupling="integrate")},
     "Newmark's block": {"model": "newmark"},
 }
 COLOURS = {SlidingMode.STICK_SLIP: "#1f77b4", SlidingMode.CONTINUOUS: "#d62728"}

@@ -11,6 +11,7 @@ import numpy as np
 
 import slipsweep
 from benchmarks.machine import arguments, table
+from slipsweep.motion.waveforms import Waveform
 
 
 class Experiment(NamedTuple):
@@ -45,33 +46,28 @@ EXPERIMENTS = (
 CYCLES = 5
 
 #: Waves of the table, and their markers in the figure.
-WAVES: dict[str, tuple[dict[str, Any], str]] = {
-    "sine": ({"waveform": "sine"}, "o"),
-    "triangle": ({"waveform": "triangle"}, "^"),
-    "square": ({"waveform": "square"}, "s"),
-    "sine, ramps of 1 cycle": ({"waveform": "sine", "ramp_in": 1, "ramp_out": 1}, "<"),
-    "sine, ramps of 2 cycles": ({"waveform": "sine", "ramp_in": 2, "ramp_out": 2}, ">"),
+WAVES: dict[str, tuple[Waveform, str]] = {
+    "sine": (slipsweep.Sine(CYCLES), "o"),
+    "triangle": (slipsweep.Triangle(CYCLES), "^"),
+    "square": (slipsweep.Square(CYCLES), "s"),
+    "sine, ramps of 1 cycle": (slipsweep.Sine(CYCLES, ramp_in=1, ramp_out=1), "<"),
+    "sine, ramps of 2 cycles": (slipsweep.Sine(CYCLES, ramp_in=2, ramp_out=2), ">"),
 }
 
 #: Third harmonic over the fundamental: above 0 it flattens the peaks, below it sharpens them.
 SHARES = (-0.3, -0.2, -0.1, 0.1, 0.2, 0.3)
 
 
-def with_third(share: float) -> dict[str, Any]:
+def with_third(share: float) -> Waveform:
     """A fundamental with a third harmonic in phase (`share` > 0) or in opposite phase."""
-    return {
-        "waveform": "harmonics",
-        "harmonics": {
-            "amplitudes": [1.0, abs(share)],
-            "multiples": [1, 3],
-            "phases": [0.0, 0.0 if share > 0 else 180.0],
-        },
-    }
+    if share == 0.0:
+        return slipsweep.Sine(CYCLES)
+    return slipsweep.Harmonics((1.0, abs(share)), (1, 3), (0.0, 0.0 if share > 0 else 180.0), cycles=CYCLES)
 
 
-def response(experiment: Experiment, wave: dict[str, Any]) -> tuple[float, float]:
+def response(experiment: Experiment, wave: Waveform) -> tuple[float, float]:
     """Permanent displacement, mm, and peak relative velocity, m/s."""
-    result = slipsweep.sweep(**experiment.given, cycles=CYCLES, **wave)
+    result = slipsweep.sweep(**experiment.given, excitation=wave)
     return 1000.0 * result.permanent_displacement.item(), result.peak_relative_velocity.item()
 
 
@@ -111,7 +107,7 @@ def main() -> None:
         room = Rectangle((0, 0), experiment.displacement, experiment.velocity, facecolor="0.88")
         room.set_label("within the axes of the paper's figure")
         axes.add_patch(room)
-        curve = np.array([response(experiment, with_third(float(s)) if s else {"waveform": "sine"}) for s in shares])
+        curve = np.array([response(experiment, with_third(float(s))) for s in shares])
         axes.plot(*curve[shares <= 0].T, color="#0072b2", label="third harmonic, opposite phase, to 0.3")
         axes.plot(*curve[shares >= 0].T, color="#d55e00", label="third harmonic, in phase, to 0.3")
         for wave, marker in WAVES.values():

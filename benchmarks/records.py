@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machine import arguments, cores, measured_on, number, table
-from slipsweep import Record, sweep_record
+from slipsweep import Record, sweep
 
 KY = 0.1
 
@@ -70,8 +70,12 @@ def agreement(found: dict[str, Any], g: float) -> str:
     rows = []
     for name, motion in found.items():
         exact = float(
-            sweep_record(
-                Record.sampled(motion.accel * g, motion.dt), 0.0, 0.3, yield_acceleration=KY * g, model="newmark"
+            sweep(
+                0.0,
+                0.3,
+                excitation=Record.sampled(motion.accel * g, motion.dt),
+                yield_acceleration=KY * g,
+                model="newmark",
             ).permanent_displacement
         )
         peers = [pyslammer_displacement(motion, parts) for parts in PARTS]
@@ -95,11 +99,11 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
     def ours() -> int:
         done = 0
         for record in records:
-            result = sweep_record(record, 0.0, 0.3, yield_acceleration=onsets * g, scale=scales, model="newmark")
+            result = sweep(0.0, 0.3, excitation=record, yield_acceleration=onsets * g, scale=scales, model="newmark")
             done += result.permanent_displacement.size
         return done
 
-    sweep_record(records[0], 0.0, 0.3, model="newmark")  # compiled before the clock starts
+    sweep(0.0, 0.3, excitation=records[0], model="newmark")  # compiled before the clock starts
     start = time.perf_counter()
     done = ours()
     taken = time.perf_counter() - start

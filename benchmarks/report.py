@@ -20,9 +20,10 @@ import slipsweep
 from benchmarks import model, sample
 from benchmarks.grids import REGIMES, design_grid, regime_cells
 from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
+from slipsweep.model.options import Rule
 
 STEPS = 1024
-RULES = ("rectangle", "trapezoid", "simpson")
+RULES: tuple[Rule, ...] = ("rectangle", "trapezoid", "simpson")
 _ONLY: dict[str, Any] = {"variables": ["permanent_displacement"]}
 
 
@@ -129,13 +130,13 @@ def step_solver(tiny: bool) -> str:
         cells = regime_cells(regime, 32 if tiny else 20_000)
         exact = displacement(**cells, solver="cycle").values
 
-        def run(rule: str, cells: dict[str, Any] = cells) -> Callable[[], object]:
-            return lambda: displacement(**cells, solver="step", rule=rule, steps_per_cycle=STEPS)
+        def run(rule: Rule, cells: dict[str, Any] = cells) -> Callable[[], object]:
+            return lambda: displacement(**cells, solver=slipsweep.Step(rule, STEPS))
 
         times = alternate({rule: run(rule) for rule in (RULES[:1] if tiny else RULES)}, 2 if tiny else 7)
         steps = steps_taken(cells, regime)
-        for rule, seconds in times.items():
-            found = displacement(**cells, solver="step", rule=rule, steps_per_cycle=STEPS).values
+        for rule, seconds in zip(RULES, times.values(), strict=False):
+            found = displacement(**cells, solver=slipsweep.Step(rule, STEPS)).values
             errors = np.abs(found / exact - 1)
             row = [regime.replace("_", "–"), rule, f"{steps.mean():.0f}"]
             row += [number(seconds * cores() / steps.sum() * 1e9), number(seconds * cores() / steps.size * 1e6)]

@@ -107,7 +107,8 @@ def _rows(regimes: dict[str, int], peak: float, tiny: bool, solver: str) -> list
     grids = {regime: _cells(regime, count) for regime in regimes}
 
     def run(cells: dict[str, Any]) -> Callable[[], object]:
-        return lambda: displacement(**cells, solver=solver, rule="rectangle", steps_per_cycle=1024)
+        method = slipsweep.Step("rectangle", 1024) if solver == "step" else slipsweep.Cycle()
+        return lambda: displacement(**cells, solver=method)
 
     times = alternate({regime: run(cells) for regime, cells in grids.items()}, 2 if tiny else 7)
     rows = []

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import slipsweep
 from benchmarks.grids import G
 from benchmarks.machine import ROOT
 
@@ -69,7 +70,7 @@ class Group:
 
         given = {name: values for name, values in self.inputs.items() if not np.isnan(values).all()}
         cells = {name: xr.DataArray(values, dims="cell") for name, values in given.items()}
-        return {**cells, "model": self.model, "cycles": 1, "variables": ["permanent_displacement"]}
+        return {**cells, "model": self.model, "excitation": slipsweep.Sine(1), "variables": ["permanent_displacement"]}
 
 
 def read() -> dict[str, list[Group]]:
@@ -89,7 +90,6 @@ def read() -> dict[str, list[Group]]:
 
 def _draw(regime: str, random: np.random.Generator) -> dict[str, Any]:
     """One cell of a regime."""
-    import slipsweep
     from slipsweep import SlidingMode
 
     model = "newmark" if regime == "newmark" else "mendez"

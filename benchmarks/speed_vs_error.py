@@ -19,8 +19,9 @@ import slipsweep
 from benchmarks import outside, sample
 from benchmarks.machine import arguments, measured_on, number, table
 from benchmarks.sample import Array, Group
+from slipsweep.model.options import Rule
 
-RULES = ("rectangle", "trapezoid", "simpson")
+RULES: tuple[Rule, ...] = ("rectangle", "trapezoid", "simpson")
 STEPS = tuple(2**k for k in range(5, 15))
 
 #: Cells at a time: enough to fill lanes and hide a call, few enough for small steps.
@@ -110,7 +111,7 @@ def points(tiny: bool) -> Iterator[Point]:
         found = [measure("cycle", "", 0, regime, groups, slipsweep_solver(solver="cycle"), most // smallest, least)]
         for rule in RULES:
             for steps in STEPS[:2] if tiny else STEPS:
-                make = slipsweep_solver(solver="step", rule=rule, steps_per_cycle=steps)
+                make = slipsweep_solver(solver=slipsweep.Step(rule, steps))
                 over = max(1, min(most, STEPS_AT_A_TIME // steps) // smallest)
                 found.append(measure(f"step, {rule}", "", steps, regime, groups, make, over, least))
         for family, solver in outside.FAMILIES.items():

@@ -12,22 +12,17 @@ import numpy as np
 import slipsweep
 from benchmarks.machine import arguments, measured_on, number, table
 from slipsweep.model.variables import DEFAULT_RESULTS
+from slipsweep.motion.waveforms import Waveform
 
-
-def _harmonics(amplitudes: list[float], multiples: list[int], phases: list[float] | None = None) -> dict[str, Any]:
-    terms = {"amplitudes": amplitudes, "multiples": multiples, "phases": phases or [0.0] * len(amplitudes)}
-    return {"waveform": "harmonics", "harmonics": terms}
-
-
-WAVES: dict[str, dict[str, Any]] = {
-    "sine": {},
-    "cosine": {"waveform": "cosine"},
-    "square": {"waveform": "square"},
-    "triangle": {"waveform": "triangle"},
-    "triangle, ramps of 2 cycles at both ends": {"waveform": "triangle", "ramp_in": 2, "ramp_out": 2},
-    "harmonics, one of multiple 1": _harmonics([1.0], [1]),
-    "harmonics, multiples 1, 2 and 5": _harmonics([1.0, 0.6, 0.35], [1, 2, 5], [0.0, 40.0, 100.0]),
-    "harmonics, multiples 1 and 50": _harmonics([1.0, 0.15], [1, 50]),
+WAVES: dict[str, Waveform] = {
+    "sine": slipsweep.Sine(),
+    "cosine": slipsweep.Cosine(),
+    "square": slipsweep.Square(),
+    "triangle": slipsweep.Triangle(),
+    "triangle, ramps of 2 cycles at both ends": slipsweep.Triangle(ramp_in=2, ramp_out=2),
+    "harmonics, one of multiple 1": slipsweep.Harmonics((1.0,), (1,)),
+    "harmonics, multiples 1, 2 and 5": slipsweep.Harmonics((1.0, 0.6, 0.35), (1, 2, 5), (0.0, 40.0, 100.0)),
+    "harmonics, multiples 1 and 50": slipsweep.Harmonics((1.0, 0.15), (1, 50)),
 }
 
 #: What is asked for: the displacement alone, and all that a sweep gives by default.
@@ -46,10 +41,10 @@ def main() -> None:
     }
     least: dict[tuple[str, str], float] = {}
     for repeat in range(repeats + 1):  # the first compiles
-        for wave, options in WAVES.items():
+        for wave, excitation in WAVES.items():
             for asked, variables in ASKED.items():
                 started = time.process_time()
-                slipsweep.sweep(**grid, **options, variables=variables)
+                slipsweep.sweep(**grid, excitation=excitation, variables=variables)
                 taken = time.process_time() - started
                 if repeat:
                     least[wave, asked] = min(taken, least.get((wave, asked), np.inf))

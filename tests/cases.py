@@ -11,6 +11,9 @@ from typing import Any
 import xarray as xr
 
 import slipsweep
+from slipsweep.model.choices import declared
+from slipsweep.model.options import MODELS, SOLVERS
+from slipsweep.motion.waveforms import WAVEFORMS
 
 DATA = Path(__file__).parent / "data"
 OPTIONAL_INPUTS = ("yield_acceleration", "decay_rate", "delta_mu")
@@ -94,6 +97,30 @@ def read_cases() -> list[Case]:
         ]
 
 
+def choices(**given: Any) -> dict[str, Any]:
+    """Arguments of `slipsweep.sweep` from options as tables of cases have them, each in a column of its own.
+
+    A column that does not go with a row's model, waveform or solver is left out; where a row has
+    no option of a model, a waveform or a solver, the function's own default stays.
+    """
+    harmonics = given.pop("harmonics", None)
+    if isinstance(harmonics, str):
+        terms = [(*map(float, term.split(":")), 0.0) for term in harmonics.split(",")]
+        harmonics = {"amplitudes": [t[0] for t in terms], "multiples": [t[1] for t in terms]}
+        harmonics["phases"] = [t[2] for t in terms]
+    given |= harmonics or {}
+    for family in (MODELS, WAVEFORMS, SOLVERS):
+        if not given.keys() & {family.attribute, *family.options}:
+            continue
+        name = given.pop(family.attribute, family.default)
+        options = {option: given.pop(option) for option in family.options if option in given}
+        if name in family.names:
+            known = {one.name for one in declared(family.called(name))}
+            name = family.made(name, {key: value for key, value in options.items() if key in known})
+        given.setdefault(family.keyword, name)  # a name of none is refused where it arrives
+    return given
+
+
 def groups(cases: Iterable[Case]) -> list[list[Case]]:
     """The cases in groups that one call of `sweep` can take: alike in options, cycles and inputs given."""
 
@@ -116,12 +143,14 @@ def solve(cases: Sequence[Case], **options: Any) -> dict[int, tuple[float, float
         first = group[0]
         result = slipsweep.sweep(
             **columns,
-            cycles=first.cycles,
-            model=first.model,
-            rise=first.rise,
-            recoupling=first.recoupling,
-            g=first.g,
-            **options,
+            **choices(
+                cycles=first.cycles,
+                model=first.model,
+                rise=first.rise,
+                recoupling=first.recoupling,
+                g=first.g,
+                **options,
+            ),
         )
         for i, case in enumerate(group):
             cell = result.isel(case=i)

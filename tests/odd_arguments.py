@@ -115,12 +115,16 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "sweep": (slipsweep.sweep, CELL),
     "friction_parameters": (slipsweep.friction_parameters, {**BLOCK, "amplitude": 3.0}),
     "simulate": (slipsweep.simulate, {**CELL, "points_per_cycle": 8}),
-    "sweep_record": (slipsweep.sweep_record, {"record": RECORD, **BLOCK}),
+    "sweep under a record": (slipsweep.sweep, {**BLOCK, "excitation": RECORD}),
     "limit_amplitude": (
         slipsweep.limit_amplitude,
         {"displacement": 0.1, **BLOCK, "frequency": 1.0, "amplitude_steps": 4},
     ),
     "sample": (slipsweep.sample, {**CELL, "uncertain": UNCERTAIN, "samples": 8}),
+    "Mendez": (slipsweep.Mendez, {}),
+    "Step": (slipsweep.Step, {}),
+    "Triangle": (slipsweep.Triangle, {}),
+    "Harmonics": (slipsweep.Harmonics, {"amplitudes": [1.0, 0.5], "multiples": [1, 3]}),
     "Record": (slipsweep.Record, {"times": [0.0, 0.1, 0.2], "acceleration": [0.0, 1.0, -1.0]}),
     "Record.sampled": (slipsweep.Record.sampled, {"acceleration": [0.0, 1.0, -1.0], "interval": 0.1}),
     "Record.corrected": (RECORD.corrected, {"baseline": "mean"}),
@@ -133,10 +137,10 @@ WORDS = ("cannot be read", "record: ", "no bit mask", "the name of a result", "i
 
 #: What goes with an argument that means something only beside others.
 _BESIDE: dict[str, dict[str, Any]] = {
-    "harmonics": {"waveform": "harmonics"},
     "displacement_amplitude": {"amplitude": None},
-    "steps_per_cycle": {"solver": "step"},
-    "rule": {"solver": "step", "steps_per_cycle": 8},
+    **{
+        key: {"excitation": RECORD, "amplitude": None, "frequency": None} for key in ("scale", "time_scale", "polarity")
+    },
 }
 
 

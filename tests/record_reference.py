@@ -31,7 +31,7 @@ Rate = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Response:
-    """What a block does: as `slipsweep.sweep_record` has it."""
+    """What a block does: as `slipsweep.sweep` under a record has it."""
 
     permanent_displacement: float
     peak_relative_velocity: float

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import reference
 import strategies
-from cases import Case, read_cases, solve
+from cases import Case, choices, read_cases, solve
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
@@ -218,8 +218,8 @@ def test_held_back_cells(regime: str) -> None:
         cell = {**cell, **options}
         expected = reference.solve(**cell)
         second = strategies.phase_scale(cell)
-        exact = slipsweep.sweep(**cell, solver="cycle")
-        stepped = slipsweep.sweep(**cell, solver="step", rule="trapezoid", steps_per_cycle=8192)
+        exact = slipsweep.sweep(**choices(**cell, solver="cycle"))
+        stepped = slipsweep.sweep(**choices(**cell, solver="step", rule="trapezoid", steps_per_cycle=8192))
         for result, solver, tolerance in ((exact, "cycle", 1e-11), (stepped, "step", 2e-3)):
             assert int(result.sliding_mode) == expected.sliding_mode, f"{solver}: sliding mode"
             assert Validity(int(result.validity)) == Validity(expected.validity), f"{solver}: validity"
@@ -248,7 +248,7 @@ def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
     """A closed form however many cycles: 1e-11 at a million of them."""
     cell = {**cell, "cycles": cycles}
     expected = reference.solve(**cell)
-    result = slipsweep.sweep(**cell, solver="cycle")
+    result = slipsweep.sweep(**choices(**cell, solver="cycle"))
     scale = cell["amplitude"] * strategies.phase_scale(cell) ** 2
     growth = cycles**2 if expected.sliding_mode == 2 else cycles
     right = float(expected.permanent_displacement)
@@ -263,7 +263,7 @@ def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cyc
     fourth pulse begins again, and W of the cycles repeats."""
     cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "cycles": cycles}
     expected = reference.solve(**cell)
-    result = slipsweep.sweep(**cell, solver="cycle")
+    result = slipsweep.sweep(**choices(**cell, solver="cycle"))
     for name in ("permanent_displacement", "peak_relative_velocity"):
         right = float(getattr(expected, name))
         assert abs(float(result[name]) / right - 1) <= 1e-13, name
@@ -278,7 +278,7 @@ def test_pulses_that_stop_anew() -> None:
         grown = []
         for cycles in range(1, 9):
             expected = reference.solve(**cell, cycles=cycles)
-            result = slipsweep.sweep(**cell, cycles=cycles, solver="cycle")
+            result = slipsweep.sweep(**choices(**cell, cycles=cycles, solver="cycle"))
             for name in ("permanent_displacement", "peak_relative_velocity"):
                 right = float(getattr(expected, name))
                 assert abs(float(result[name]) / right - 1) <= 1e-12, f"{name} of {cell}, {cycles} cycles"
@@ -290,9 +290,13 @@ def test_pulses_that_stop_anew_as_event_by_event() -> None:
     """A sweep follows them by what its lanes know of a pulse, a time history from event to event."""
     theta, mu_s = 10.508, 0.2
     amplitude = np.linspace(0.055, 0.12, 131) * strategies.G
-    swept = slipsweep.sweep(theta=theta, mu_s=mu_s, amplitude=amplitude, frequency=1.0, cycles=20)
+    swept = slipsweep.sweep(
+        theta=theta, mu_s=mu_s, amplitude=amplitude, frequency=1.0, excitation=slipsweep.Sine(cycles=20)
+    )
     for value, u in zip(amplitude, swept.permanent_displacement.values.ravel(), strict=True):
-        history = slipsweep.simulate(theta=theta, mu_s=mu_s, amplitude=value, frequency=1.0, cycles=20)
+        history = slipsweep.simulate(
+            theta=theta, mu_s=mu_s, amplitude=value, frequency=1.0, excitation=slipsweep.Sine(cycles=20)
+        )
         assert abs(u / float(history.relative_displacement[-1]) - 1) <= 1e-11
 
 
@@ -304,7 +308,7 @@ def test_peaks_of_continuous_sliding(delta_mu: float, cycles: int) -> None:
     decay_rate = np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 5.5, 7.0]) * strategies.G / amplitude
     cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "delta_mu": delta_mu}
     cell |= {"frequency": 1.0, "cycles": cycles}
-    swept = slipsweep.sweep(**cell, decay_rate=decay_rate)
+    swept = slipsweep.sweep(**choices(**cell, decay_rate=decay_rate))
     assert (swept.sliding_mode == 2).all()
     for rate, velocity in zip(decay_rate, swept.peak_relative_velocity.values.ravel(), strict=True):
         right = float(reference.solve(**cell, decay_rate=rate).peak_relative_velocity)
@@ -321,7 +325,7 @@ def test_sharp_decay(cell: strategies.Cell, exponent: float, options: dict[str, 
     """lambda A / g up to 1e6: friction gone in a layer of 1e-6 of phase."""
     cell = {**cell, **options, "decay_rate": 10**exponent * strategies.G / cell["amplitude"]}
     expected = reference.solve(**cell)
-    result = slipsweep.sweep(**cell, solver="cycle")
+    result = slipsweep.sweep(**choices(**cell, solver="cycle"))
     assert Validity(int(result.validity)) == Validity(expected.validity), "validity"
     if expected.validity & VALUELESS:
         return
@@ -344,7 +348,7 @@ def test_just_above_yield(cell: strategies.Cell, exponent: float) -> None:
     expected = reference.solve(**cell)
     if expected.sliding_mode != 1:
         return
-    result = slipsweep.sweep(**cell, solver="cycle")
+    result = slipsweep.sweep(**choices(**cell, solver="cycle"))
     right = float(expected.permanent_displacement)
     conditioning = 2 * np.finfo(float).eps / excess
     scale = amplitude * strategies.phase_scale(cell) ** 2

@@ -167,7 +167,9 @@ def test_contours_lie_where_the_displacement_is_their_level(result: Result) -> N
             # between rows the amplitude is interpolated too
             rows = points[np.isclose(points[:, 1:], result.axes["amplitude"]).any(axis=1)][::5]
             for frequency, amplitude in rows:
-                exact = slipsweep.sweep(6.0, 0.45, amplitude, frequency, cycles=5).permanent_displacement.item()
+                exact = slipsweep.sweep(
+                    6.0, 0.45, amplitude, frequency, excitation=slipsweep.Sine(cycles=5)
+                ).permanent_displacement.item()
                 # straight in f between points a factor of 1.21 apart
                 assert exact == pytest.approx(10**level, rel=0.02)
             checked += len(rows)
@@ -232,7 +234,7 @@ def test_ratio_to_newmark_is_that_of_a_direct_sweep(result: Result) -> None:
         "mu_s": 0.45,
         "amplitude": result.axes["amplitude"],
         "frequency": table["frequency"].item(),
-        "cycles": 5,
+        "excitation": slipsweep.Sine(cycles=5),
     }
     ours, theirs = (
         slipsweep.sweep(**given, model=model).permanent_displacement.values.T for model in ("mendez", "newmark")
@@ -291,7 +293,9 @@ def test_only_what_is_shown_is_read(grid: Path, monkeypatch: pytest.MonkeyPatch,
 def test_nearest_values_are_taken(result: Result, asked: tuple[float, float], theta: float, mu_s: float) -> None:
     table = plane(result, "permanent_displacement", theta=asked[0], mu_s=asked[1])
     assert (table["theta"].item(), table["mu_s"].item()) == (theta, mu_s)
-    direct = slipsweep.sweep(theta, mu_s, result.axes["amplitude"], result.axes["frequency"], cycles=5)
+    direct = slipsweep.sweep(
+        theta, mu_s, result.axes["amplitude"], result.axes["frequency"], excitation=slipsweep.Sine(cycles=5)
+    )
     np.testing.assert_allclose(table["permanent_displacement"].values, direct.permanent_displacement, rtol=1e-13)
 
 

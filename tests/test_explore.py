@@ -18,7 +18,7 @@ import pytest
 import xarray as xr
 from processes import slipsweep
 
-from slipsweep import InputError, SlidingMode, Validity, simulate, sweep
+from slipsweep import InputError, Sine, SlidingMode, Validity, simulate, sweep
 from slipsweep.cli.explore import parse_size
 from slipsweep.explore.page import evenly, thinned_lengths, write_page
 
@@ -162,7 +162,7 @@ def test_histories_are_those_of_simulate(written: Path) -> None:
         if case["amplitude"] % 2 != 0 or case["theta"] == 0.0:
             continue
         times = np.array(told["phase"]) / omega
-        expected = simulate(**case, frequency=frequency, cycles=4, times=times)
+        expected = simulate(**case, frequency=frequency, times=times, excitation=Sine(cycles=4))
         if np.isnan(scale).any():
             assert expected.validity & Validity.STATICALLY_UNSTABLE
             continue
@@ -469,7 +469,7 @@ def test_history_is_of_the_cell_that_was_chosen(opened: Any, result: Path) -> No
     drawn = opened.execute_script(
         "const d = Bokeh.documents[0].get_model_by_name('history').data; return [[...d.t], [...d.v], [...d.u]]"
     )
-    expected = simulate(theta, mu_s, amplitude, frequency, cycles=4, times=drawn[0])
+    expected = simulate(theta, mu_s, amplitude, frequency, times=drawn[0], excitation=Sine(cycles=4))
     assert drawn[0][-1] == pytest.approx(3 / frequency, rel=1e-12)
     for values, exact in ((drawn[1], expected.relative_velocity), (drawn[2], expected.relative_displacement * 1000)):
         assert float(exact.max()) > 0.0
@@ -484,7 +484,7 @@ def test_map_colours_are_the_dataset(opened: Any) -> None:
     )
     pixels = np.reshape(np.array(image[1], float), image[0])
     amplitude, frequency = np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)
-    mm = 1000 * sweep(5, 0.3, amplitude, frequency, cycles=4).permanent_displacement.values
+    mm = 1000 * sweep(5, 0.3, amplitude, frequency, excitation=Sine(cycles=4)).permanent_displacement.values
     rows = ((np.arange(23) + 0.5) * image[0][0] / 23).astype(int)
     columns = ((np.arange(18) + 0.5) * image[0][1] / 18).astype(int)
     np.testing.assert_allclose(pixels[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from cases import choices
 
 import slipsweep
 from slipsweep.errors import InputError
@@ -86,6 +87,11 @@ WAVES: list[dict[str, Any]] = [
 ]
 
 
+def without(given: dict[str, Any], *names: str) -> dict[str, Any]:
+    """Arguments but for some, which a function does not take."""
+    return {name: value for name, value in given.items() if name not in names}
+
+
 def options_of(rng: random.Random) -> dict[str, Any]:
     options: dict[str, Any] = {"cycles": rng.choice([2, 10, 10**6]), **rng.choice(WAVES)}
     if rng.random() < 0.25:
@@ -96,17 +102,19 @@ def options_of(rng: random.Random) -> dict[str, Any]:
 def sweep(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     options = options_of(rng)
     solver = {"solver": "step", "rule": rng.choice(["rectangle", "trapezoid", "simpson"]), "steps_per_cycle": 64}
-    return slipsweep.sweep(**cell | options | rng.choice([solver, {"solver": "cycle"}]))
+    return slipsweep.sweep(**choices(**cell | options | rng.choice([solver, {"solver": "cycle"}])))
 
 
 def friction(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
-    return slipsweep.friction_parameters(**{name: value for name, value in cell.items() if name != "frequency"})
+    given = without(choices(**cell), "frequency", "excitation", "solver")
+    return slipsweep.friction_parameters(**given)
 
 
 def simulate(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     options = options_of(rng) | {"cycles": 10}
     end = options["cycles"] / cell["frequency"]
-    return slipsweep.simulate(**cell | options, times=np.linspace(0.0, 1.5 * end, 50))
+    given = without(choices(**cell | options), "solver")
+    return slipsweep.simulate(**given, times=np.linspace(0.0, 1.5 * end, 50))
 
 
 def record(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
@@ -115,22 +123,22 @@ def record(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     peak = max(cell["amplitude"], 1e-300)
     times = np.arange(values.size) / min(max(cell["frequency"], 1e-90), 1e90)
     options: dict[str, Any] = {"rise": rng.choice(["monotone", "literal"]), "scale": rng.choice([1.0, 1e-90, 1e90])}
-    return slipsweep.sweep_record(
-        slipsweep.Record(times, peak * values), **own, **options, time_scale=rng.choice([1.0, 1e-90, 1e90])
-    )
+    motion = slipsweep.Record(times, peak * values)
+    return slipsweep.sweep(**choices(**own, **options, excitation=motion, time_scale=rng.choice([1.0, 1e-90, 1e90])))
 
 
 def limit(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     own: dict[str, Any] = {name: value for name, value in cell.items() if name != "amplitude"}
     highest = {"maximum_amplitude": cell["amplitude"]} if cell["amplitude"] > 0.0 else {}
-    found = slipsweep.limit_amplitude(rng.choice([1e-300, 0.1, 1e300]), **own, **highest, amplitude_steps=16)
+    given = without(choices(**own), "solver")
+    found = slipsweep.limit_amplitude(rng.choice([1e-300, 0.1, 1e300]), **given, **highest, amplitude_steps=16)
     assert not np.isinf(found.limit_amplitude)
     return found[["validity"]]
 
 
 def sample(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     drawn = {"mu_s": {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"}}
-    found = slipsweep.sample(**cell, uncertain=drawn, samples=16, thresholds=[rng.choice([0.0, 0.1, 1e300])])
+    found = slipsweep.sample(**choices(**cell), uncertain=drawn, samples=16, thresholds=[rng.choice([0.0, 0.1, 1e300])])
     for name in ("displacement_quantile", "mean_displacement", "exceedance_probability"):
         assert not np.isinf(found[name]).any(), name
         assert bool((found.valueless_share == 1.0) | np.isfinite(found[name]).all()), name
@@ -205,19 +213,19 @@ def test_served_or_refused_by_name(way: str) -> None:
 def test_refusals_name_what_is_too_much(given: dict[str, Any], message: str, solver: str) -> None:
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency": 1.0, "solver": solver}
     with pytest.raises(InputError, match=re.escape(message)):
-        slipsweep.sweep(**block | given)
+        slipsweep.sweep(**choices(**block | given))
 
 
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 def test_ends_of_the_ranges_are_served(solver: str) -> None:
     """u = W/ω² at any size: a block 1e300 times as large does what a common one does."""
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "solver": solver, "cycles": 2, "yield_acceleration": 0.59}
-    common_one = slipsweep.sweep(**block, amplitude=3.0, frequency=1.0)
+    common_one = slipsweep.sweep(**choices(**block, amplitude=3.0, frequency=1.0))
     for size in (1e-290, 1e290):
         large = block | {"yield_acceleration": 0.59 * size, "g": 9.81 * size}
-        found = slipsweep.sweep(**large, amplitude=3.0 * size, frequency=1.0)
+        found = slipsweep.sweep(**choices(**large, amplitude=3.0 * size, frequency=1.0))
         assert float(found.permanent_displacement) / size == pytest.approx(float(common_one.permanent_displacement))
     for frequency in (1e-100, 1e100):
-        found = slipsweep.sweep(**block, amplitude=3.0, frequency=frequency)
+        found = slipsweep.sweep(**choices(**block, amplitude=3.0, frequency=frequency))
         moved = float(found.permanent_displacement) * frequency * frequency
         assert moved == pytest.approx(float(common_one.permanent_displacement))

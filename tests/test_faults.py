@@ -17,6 +17,7 @@ import pytest
 import xarray as xr
 from fault_rounds import SWEEP, run, stopped, values
 
+from slipsweep import Step
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs, spec
 from slipsweep.grid import blocks
@@ -213,8 +214,8 @@ def test_blocks_of_another_sweep_are_refused_with_the_difference(
     before = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
     with pytest.raises(InputError, match="the sweep file differs: line 4 was 'stop = 20', is 'stop = 21'"):
         run(path, SWEEP.replace("stop = 20\nnum = 30", "stop = 21\nnum = 30"), resume=True)
-    with pytest.raises(InputError, match="solver was auto, is step"):
-        store.run(spec.parse(SWEEP, "a").with_solver("step"), path, command="x", resume=True)
+    with pytest.raises(InputError, match=r"solver was Cycle\(\), is Step\("):
+        store.run(spec.parse(SWEEP, "a").with_solver(Step()), path, command="x", resume=True)
     with pytest.raises(InputError, match="--split was False, is True"):
         run(path, resume=True, split=True)
     with pytest.raises(InputError, match="--memory: too little for the blocks of 4000 cells"):

@@ -24,7 +24,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., xr.Dataset], dict[str, Any]]] = {
     "sweep": (slipsweep.sweep, CELL),
     "friction_parameters": (slipsweep.friction_parameters, {**BLOCK, "amplitude": 3.0}),
     "simulate": (slipsweep.simulate, CELL),
-    "sweep_record": (slipsweep.sweep_record, {"record": RECORD, **BLOCK}),
+    "sweep of a record": (slipsweep.sweep, {"excitation": RECORD, **BLOCK}),
     "limit_amplitude": (slipsweep.limit_amplitude, {"displacement": 0.1, **BLOCK, "frequency": 1.0}),
     "sample": (slipsweep.sample, {**CELL, "uncertain": UNCERTAIN, "samples": 8}),
 }
@@ -40,7 +40,7 @@ NUMBERS = {
     "sweep": (*CELL, *_GIVEN, "structure_frequency"),
     "friction_parameters": (*_BLOCK, "amplitude", *_GIVEN),
     "simulate": (*CELL, *_GIVEN, "times"),
-    "sweep_record": (*_BLOCK, *_GIVEN, "scale", "time_scale"),
+    "sweep of a record": (*_BLOCK, *_GIVEN, "amplitude", "scale", "time_scale"),
     "limit_amplitude": ("displacement", *_BLOCK, "frequency", *_GIVEN, "structure_frequency"),
     "sample": (*CELL, *_GIVEN, "quantiles", "thresholds"),
 }
@@ -134,7 +134,7 @@ def test_stacked_coordinates_come_apart() -> None:
 RESULT_OF = {
     "sweep": "validity",
     "friction_parameters": "sliding_mode",
-    "sweep_record": "number_of_slips",
+    "sweep of a record": "number_of_slips",
     "limit_amplitude": "limit_status",
     "sample": "quantile",
 }
@@ -175,15 +175,23 @@ def test_a_variable_keeps_its_dimensions() -> None:
 # -------------------------------------------------------------------------- other arguments
 
 REFUSED: list[tuple[str, dict[str, Any], str]] = [
-    ("sweep_record", {"variables": []}, r"variables = \[\]: must name one of 'permanent_displacement'"),
+    ("sweep of a record", {"variables": []}, r"variables = \[\]: must name one of 'permanent_displacement'"),
     ("sweep", {"variables": 5}, "variables = 5: must be a list of names"),
     ("sweep", {"variables": [["validity"]]}, r"variables = \['validity'\]: must be one of"),
     ("sweep", {"theta": [1.0, 2.0], "chunks": 0}, "chunks = 0: "),
     ("sweep", {"theta": [1.0, 2.0], "chunks": {"theta": 0}}, r"chunks = \{'theta': 0\}: "),
     ("sweep", {"theta": True}, "theta = True: must be a number"),
-    ("sweep", {"rise": ["monotone"]}, r"rise = \['monotone'\]: must be one of 'monotone', 'literal'"),
+    ("sweep", {"model": ["mendez"]}, r"model = \['mendez'\]: must be one of 'mendez', 'newmark', or Mendez\(...\)"),
     ("sweep", {"solver": np.zeros(3)}, r"solver = array\(\[0., 0., 0.\]\): must be one of"),
-    ("sweep", {"cycles": np.array([3.0])}, r"cycles = array\(\[3.\]\): must be a whole number >= 1"),
+    ("sweep", {"excitation": "harmonics"}, "amplitudes: must be given with waveform = 'harmonics'"),
+    ("sweep", {"excitation": slipsweep.Sine}, "excitation = <class .*>: must be one of 'sine'"),
+    (
+        "simulate",
+        {"excitation": RECORD, "amplitude": None, "frequency": None},
+        "excitation = Record.*: must be one of 'sine'",
+    ),
+    ("limit_amplitude", {"excitation": RECORD}, "excitation = Record.*: must be one of 'sine'"),
+    ("sample", {"excitation": RECORD}, "excitation = Record.*: must be one of 'sine'"),
     ("sweep", {"progress": 3}, "progress = 3: must be a function"),
     ("limit_amplitude", {"progress": 3}, "progress = 3: must be a function"),
     ("sample", {"progress": 3}, "progress = 3: must be a function"),
@@ -192,7 +200,7 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("sample", {"correlation": [["mu_s", ["theta"], 0.1]]}, r"correlation: \['theta'\] is not drawn"),
     ("sample", {"correlation": [[["mu_s"], {}, 0.1]]}, r"correlation: \['mu_s'\] is not drawn"),
     ("sample", {"uncertain": {"mu_s": stats.beta}}, "uncertain.mu_s.distribution = .*: its median cannot be had"),
-    ("sweep_record", {"polarity": {1}}, r"polarity = \{1\}: must be 1, -1"),
+    ("sweep of a record", {"polarity": {1}}, r"polarity = \{1\}: must be 1, -1"),
 ]
 
 
@@ -212,11 +220,11 @@ def test_long_values_are_cut_short() -> None:
 
 @pytest.mark.parametrize("number", [np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2), xr.DataArray(0.5)])
 def test_numbers_of_other_types(number: Any) -> None:
+    assert slipsweep.Sine(ramp_in=number) == slipsweep.Sine(ramp_in=0.5)
     for function, name in [
         ("sample", "thresholds"),
-        ("sweep", "ramp_in"),
         ("sweep", "mu_s"),
-        ("sweep_record", "scale"),
+        ("sweep of a record", "scale"),
     ]:
         xr.testing.assert_identical(call(function, **{name: number}), call(function, **{name: 0.5}))
 

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from cases import choices
 from processes import slipsweep as command
 from scipy.optimize import brentq
 
 import slipsweep
 from slipsweep.charts.limit_figures import limit_chart
 from slipsweep.errors import InputError
-from slipsweep.files.spec import quantity
 from slipsweep.grid.tables import Variable
+from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 from slipsweep.studies.limits import limit_table
 
@@ -32,7 +33,9 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
         name: xr.DataArray(values, dims=name) if np.ndim(values) else values for name, values in inputs.items()
     }
     return slipsweep.sweep(
-        amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
+        **choices(
+            amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
+        )
     ).permanent_displacement
 
 
@@ -40,7 +43,7 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
 def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
     inputs: dict[str, Any] = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
     displacement = [1e-3, 0.05, 0.8]
-    limits = slipsweep.limit_amplitude(displacement, **inputs, **options)
+    limits = slipsweep.limit_amplitude(displacement, **choices(**inputs, **options))
     assert limits.limit_amplitude.dims == ("theta", "mu_s", "frequency", "displacement")
     found = limits.limit_amplitude.notnull()
     assert found.mean() > 0.5
@@ -89,7 +92,14 @@ def test_newmark_closed_form() -> None:
     for target in (1e-4, 0.004, 0.02):
         expected = brentq(lambda a, target=target: displacement(a) - target, yielded * 1.0001, 5 * g, xtol=1e-14)
         limits = slipsweep.limit_amplitude(
-            target, 3, 0.5, 2.0, yield_acceleration=yielded, model="newmark", cycles=1, maximum_amplitude=5 * g
+            target,
+            3,
+            0.5,
+            2.0,
+            yield_acceleration=yielded,
+            maximum_amplitude=5 * g,
+            model="newmark",
+            excitation=slipsweep.Sine(cycles=1),
         )
         assert limits.limit_amplitude.item() == pytest.approx(expected, rel=1e-10)
         assert limits.limit_status.item() == LimitStatus.REACHED
@@ -113,9 +123,9 @@ def test_gap_in_validity() -> None:
     limit = slipsweep.friction_parameters(10, 1.2, 1.0, yield_acceleration=4.0).limiting_acceleration.item()
     edge = limit / math.sqrt(1.2)
     amplitudes = np.linspace(4.0, edge * (1 - 1e-12), 20_001)
-    below = slipsweep.sweep(amplitude=amplitudes, **given).permanent_displacement.max().item()
-    assert slipsweep.sweep(amplitude=edge * (1 + 1e-9), **given).permanent_displacement.isnull()
-    limits = slipsweep.limit_amplitude([below * 0.5, below * 1.001], **given)
+    below = slipsweep.sweep(**choices(amplitude=amplitudes, **given)).permanent_displacement.max().item()
+    assert slipsweep.sweep(**choices(amplitude=edge * (1 + 1e-9), **given)).permanent_displacement.isnull()
+    limits = slipsweep.limit_amplitude([below * 0.5, below * 1.001], **choices(**given))
     assert limits.limit_amplitude[0].item() < edge
     assert limits.limit_amplitude[1].item() == np.nextafter(limit, np.inf)
     assert limits.limit_status[1].item() == LimitStatus.AFTER_GAP
@@ -131,9 +141,9 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
         (2, 0.4, {"rise": "literal"}),
     ]
     for theta, mu_s, options in cases:
-        moved = slipsweep.sweep(theta, mu_s, amplitudes, 1.5, **options).permanent_displacement.values
+        moved = slipsweep.sweep(theta, mu_s, amplitudes, 1.5, **choices(**options)).permanent_displacement.values
         targets = np.geomspace(1e-4, np.nanmax(moved), 60)[:-1]
-        limits = slipsweep.limit_amplitude(targets, theta, mu_s, 1.5, **options).limit_amplitude.values
+        limits = slipsweep.limit_amplitude(targets, theta, mu_s, 1.5, **choices(**options)).limit_amplitude.values
         first = amplitudes[(moved[:, np.newaxis] >= targets).argmax(axis=0)]
         assert ((first - limits >= 0) & (first - limits <= step)).all()
 
@@ -159,11 +169,11 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     monkeypatch.setattr("slipsweep.studies.limits._SCANNED", 1024)
     zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
-    together = slipsweep.limit_amplitude(**zipped)
+    together = slipsweep.limit_amplitude(**choices(**zipped))
     assert together.limit_amplitude.dims == ("case",)
     for number in range(3):
         single: dict[str, Any] = {name: row[number] for name, row in case.items()}
-        alone = slipsweep.limit_amplitude(**single)
+        alone = slipsweep.limit_amplitude(**choices(**single))
         for name in alone.data_vars:
             np.testing.assert_array_equal(together[name][number], alone[name])
 
@@ -183,7 +193,7 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_refusals(given: dict[str, Any], message: str) -> None:
     asked: dict[str, Any] = {"displacement": 0.05, "theta": 5, "mu_s": 0.4, "frequency": 1.0, **given}
     with pytest.raises(InputError) as refused:
-        slipsweep.limit_amplitude(**asked)
+        slipsweep.limit_amplitude(**choices(**asked))
     assert message in str(refused.value)
 
 
@@ -231,7 +241,9 @@ def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SWEEP)
     assert command(tmp_path, "run", "small.toml", "-q").returncode == 0
     # the file holds what `limit_amplitude` gives with the sweep's own options
-    expected = slipsweep.limit_amplitude([0.02, 0.05], [0, 5], [0.3, 0.5], [1, 2, 4], model="newmark", cycles=3)
+    expected = slipsweep.limit_amplitude(
+        [0.02, 0.05], [0, 5], [0.3, 0.5], [1, 2, 4], model="newmark", excitation=slipsweep.Sine(cycles=3)
+    )
     for source, result in (("small.toml", "one.nc"), ("small.nc", "two.nc")):
         done = command(tmp_path, "limit", source, "-d", "50mm", "-d", "2 cm", "-o", result, "-o", "l.svg")
         assert (done.returncode, done.stderr) == (0, "")

@@ -6,7 +6,7 @@ from math import asin, atan, exp, inf, pi, radians, sin, tan
 import numpy as np
 import pytest
 import xarray as xr
-from cases import Case, read_cases
+from cases import Case, choices, read_cases
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -41,7 +41,9 @@ def test_newmark_against_pyslammer(theta: float, mu_s: float, amplitude: float, 
     ground = amplitude * np.sin(2 * np.pi * np.arange(samples * cycles + 1) / samples)
     yield_acceleration = G * tan(atan(mu_s) - radians(theta))
     analysis = RigidAnalysis(yield_acceleration / G_EARTH, GroundMotion(ground / G_EARTH, 1 / (samples * frequency)))
-    result = slipsweep.sweep(theta, mu_s, amplitude, frequency, cycles=cycles, model="newmark")
+    result = slipsweep.sweep(
+        theta, mu_s, amplitude, frequency, model="newmark", excitation=slipsweep.Sine(cycles=cycles)
+    )
     assert analysis.max_sliding_disp == pytest.approx(float(result.permanent_displacement), rel=5e-7), "displacement"
     assert analysis.sliding_vel.max() == pytest.approx(float(result.peak_relative_velocity), rel=5e-7), "peak velocity"
 
@@ -204,13 +206,7 @@ def test_motion_against_scipy(case: Case) -> None:
     else:
         integrated.stick_slip()
     omega = 2 * pi * case.frequency
-    result = slipsweep.sweep(
-        case.theta,
-        case.mu_s,
-        case.amplitude,
-        case.frequency,
-        **case.options,
-    )
+    result = slipsweep.sweep(case.theta, case.mu_s, case.amplitude, case.frequency, **choices(**case.options))
     displacement, velocity = integrated.displacement / omega**2, integrated.peak / omega
     assert float(result.permanent_displacement) == pytest.approx(
         displacement, rel=1e-8, abs=1e-10 * case.displacement_scale
@@ -229,8 +225,8 @@ def test_mendez_reduces_to_newmark_just_above_yield(solver: str, recoupling: str
     onset = slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration.drop_vars("amplitude")
     excess = xr.DataArray(10.0 ** -np.arange(1.0, 9.0), dims="excess")
     cells = {"theta": theta, "mu_s": mu_s, "amplitude": onset * (1 + excess), "frequency": 1.0, "cycles": 3}
-    mendez = slipsweep.sweep(**cells, solver=solver, recoupling=recoupling)
-    newmark = slipsweep.sweep(**cells, solver=solver, model="newmark")
+    mendez = slipsweep.sweep(**choices(**cells, solver=solver, recoupling=recoupling))
+    newmark = slipsweep.sweep(**choices(**cells, solver=solver, model="newmark"))
     assert (mendez.validity & 16 > 0).all(), "Eq. 4 stays below yield"
     for name in ("permanent_displacement", "peak_relative_velocity"):
         assert (newmark[name] > 0).all()
@@ -242,8 +238,10 @@ def test_mendez_held_at_yield_is_newmark() -> None:
     theta = np.linspace(0.0, 25.0, 6)
     mu_s = np.linspace(0.5, 0.8, 4)
     amplitude = np.linspace(0.5, 12.0, 24)
-    mendez = slipsweep.sweep(theta, mu_s, amplitude, 2.0, recoupling="integrate", cycles=4)
-    newmark = slipsweep.sweep(theta, mu_s, amplitude, 2.0, model="newmark", cycles=4)
+    mendez = slipsweep.sweep(
+        theta, mu_s, amplitude, 2.0, model=slipsweep.Mendez(recoupling="integrate"), excitation=slipsweep.Sine(cycles=4)
+    )
+    newmark = slipsweep.sweep(theta, mu_s, amplitude, 2.0, model="newmark", excitation=slipsweep.Sine(cycles=4))
     held = (mendez.validity & 16 > 0).to_numpy()
     assert held.sum() > 20, "cells held at yield"
     for name in ("permanent_displacement", "peak_relative_velocity"):

@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 import slipsweep
 from slipsweep import InputError
+from slipsweep.model.choices import Choice
 
 #: How the calls ended: printed with pytest -s.
 ended: Counter[str] = Counter()
@@ -34,5 +35,5 @@ def test_a_call_gives_a_result_or_is_refused_by_name(call: odd_arguments.Call) -
             assert any(name in message for name in (*call.arguments, *odd_arguments.WORDS)), message
             ended[f"{call.function} refused"] += 1
             return
-    assert isinstance(found, (xr.Dataset, slipsweep.Record))
+    assert isinstance(found, (xr.Dataset, slipsweep.Record, Choice))
     ended[f"{call.function} solved"] += 1

@@ -54,7 +54,7 @@ def test_decay_rate_is_what_eq_6_gives(experiment: dict[str, Any], computed: str
 
 @EXPERIMENTS
 def test_eq_6_meets_the_minimum_friction_at_the_peak(experiment: dict[str, Any]) -> None:
-    parameters = slipsweep.friction_parameters(**experiment, g=9.81)
+    parameters = slipsweep.friction_parameters(**experiment, model=slipsweep.Mendez(g=9.81))
     loading = experiment["amplitude"] / 9.81
     peak = (experiment["mu_s"] + parameters.delta_mu) * 2.718281828459045 ** (-parameters.decay_rate * loading)
     assert float(peak) == pytest.approx(float(parameters.minimum_friction), rel=1e-13)
@@ -62,7 +62,7 @@ def test_eq_6_meets_the_minimum_friction_at_the_peak(experiment: dict[str, Any])
 
 def test_attenuation_coefficient_with_the_printed_decay_rate() -> None:
     """Kd = max(U)/g of the stick-slip experiment; Table 3 prints 0.17."""
-    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, cycles=1, decay_rate=2.70)
+    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, decay_rate=2.70, excitation=slipsweep.Sine(cycles=1))
     attenuation = history.block_acceleration.max() / 9.81
     assert printed(attenuation, 3) == "0.157", "Eq. 12: Kd with lambda 2.70"
 
@@ -77,7 +77,13 @@ def test_figures_with_the_printed_decay_rate(
     experiment: dict[str, Any], mode: str, frequency: float, displacement: str, velocity: str, solver: str
 ) -> None:
     """Five cycles of a pure sine; delta_mu by Eqs. 10 and 11."""
-    result = slipsweep.sweep(**experiment, frequency=frequency, cycles=5, decay_rate=PRINTED_DECAY[mode], solver=solver)
+    result = slipsweep.sweep(
+        **experiment,
+        frequency=frequency,
+        decay_rate=PRINTED_DECAY[mode],
+        solver=solver,
+        excitation=slipsweep.Sine(cycles=5),
+    )
     assert printed(result.permanent_displacement * 1000, 0) == displacement, "displacement, mm"
     assert printed(result.peak_relative_velocity, 3) == velocity, "peak relative velocity, m/s"
     assert int(result.validity) == 0

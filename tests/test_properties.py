@@ -10,6 +10,7 @@ import pytest
 import reference
 import strategies
 import xarray as xr
+from cases import choices
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf, workdps
@@ -25,7 +26,7 @@ FINE, COARSE = 8192, 256
 
 
 def respond(cell: strategies.Cell, **changes: Any) -> xr.Dataset:
-    return slipsweep.sweep(**{**cell, **changes})
+    return slipsweep.sweep(**choices(**{**cell, **changes}))
 
 
 def value(result: xr.Dataset, name: str = "permanent_displacement") -> float:
@@ -372,33 +373,33 @@ def test_axes_hold_every_mode_and_the_flags() -> None:
 
 @WRITTEN
 def test_integers_and_single_precision_mean_the_same(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**AXES, **options)
+    expected = slipsweep.sweep(**choices(**AXES, **options))
     single: dict[str, Any] = {name: values.astype(np.float32) for name, values in AXES.items()}
-    assert_same(slipsweep.sweep(**single, **options), expected)
+    assert_same(slipsweep.sweep(**choices(**single, **options)), expected)
     whole: dict[str, Any] = {**AXES, "theta": AXES["theta"].astype(int), "frequency": [1, 4]}
-    assert_same(slipsweep.sweep(**whole, **options), expected.isel(frequency=[1, 2]))
+    assert_same(slipsweep.sweep(**choices(**whole, **options)), expected.isel(frequency=[1, 2]))
 
 
 @WRITTEN
 def test_order_of_values_does_not_matter(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**AXES, **options)
+    expected = slipsweep.sweep(**choices(**AXES, **options))
     generator = np.random.default_rng(12)
     orders = {name: generator.permutation(values.size) for name, values in AXES.items()}
-    shuffled = slipsweep.sweep(**{name: values[orders[name]] for name, values in AXES.items()}, **options)
+    shuffled = slipsweep.sweep(**choices(**{name: values[orders[name]] for name, values in AXES.items()}, **options))
     assert_same(shuffled, expected.isel(orders))
     strided: dict[str, Any] = {name: np.repeat(values, 2)[::2] for name, values in AXES.items()}
-    assert_same(slipsweep.sweep(**strided, **options), expected)
+    assert_same(slipsweep.sweep(**choices(**strided, **options)), expected)
 
 
 @WRITTEN
 def test_order_of_dimensions_does_not_matter(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**AXES, **options)
+    expected = slipsweep.sweep(**choices(**AXES, **options))
     theta, amplitude = xr.broadcast(
         xr.DataArray(AXES["theta"], dims="row"), xr.DataArray(AXES["amplitude"], dims="column")
     )
     rest: dict[str, Any] = {name: AXES[name] for name in ("mu_s", "frequency")}
     for dims in (("row", "column"), ("column", "row")):
-        result = slipsweep.sweep(theta=theta.transpose(*dims), amplitude=amplitude, **rest, **options)
+        result = slipsweep.sweep(**choices(theta=theta.transpose(*dims), amplitude=amplitude, **rest, **options))
         assert_same(
             result.transpose("row", "mu_s", "column", "frequency"),
             expected,
@@ -407,23 +408,23 @@ def test_order_of_dimensions_does_not_matter(options: dict[str, Any]) -> None:
 
 @WRITTEN
 def test_zipped_is_the_diagonal_of_crossed(options: dict[str, Any]) -> None:
-    crossed = slipsweep.sweep(**AXES, **options)
+    crossed = slipsweep.sweep(**choices(**AXES, **options))
     grid = np.meshgrid(*AXES.values(), indexing="ij")
     zipped: dict[str, Any] = {
         name: xr.DataArray(values.reshape(-1), dims="case") for name, values in zip(AXES, grid, strict=True)
     }
-    result = slipsweep.sweep(**zipped, **options)
+    result = slipsweep.sweep(**choices(**zipped, **options))
     assert result.permanent_displacement.dims == ("case",)
     assert_same(result, crossed.stack(case=list(AXES)))
 
 
 @WRITTEN
 def test_one_cell_is_a_cell_of_the_grid(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**AXES, **options)
+    expected = slipsweep.sweep(**choices(**AXES, **options))
     for at in ((0, 1, 5, 1), (1, 1, 6, 2), (3, 2, 4, 0), (4, 3, 8, 2), (2, 0, 2, 1)):
         index = dict(zip(AXES, at, strict=True))
         cell: strategies.Cell = {name: float(AXES[name][i]) for name, i in index.items()}
-        assert_same(slipsweep.sweep(**cell, **options), expected.isel(index))
+        assert_same(slipsweep.sweep(**choices(**cell, **options)), expected.isel(index))
 
 
 @WRITTEN
@@ -437,10 +438,10 @@ def test_one_cell_is_a_cell_of_the_grid(options: dict[str, Any]) -> None:
 )
 def test_chunked_is_eager(options: dict[str, Any], chunks: dict[str, int]) -> None:
     """Bit for bit, and nothing computed until asked."""
-    lazy = slipsweep.sweep(**AXES, **options, chunks=chunks)
+    lazy = slipsweep.sweep(**choices(**AXES, **options, chunks=chunks))
     assert all(hasattr(lazy[name].data, "dask") for name in DEFAULT_RESULTS), "lazy"
     assert dict(lazy.chunksizes)["theta"] == tuple(min(chunks["theta"], 5 - i) for i in range(0, 5, chunks["theta"]))
-    assert_same(lazy.compute(), slipsweep.sweep(**AXES, **options))
+    assert_same(lazy.compute(), slipsweep.sweep(**choices(**AXES, **options)))
 
 
 @pytest.mark.parametrize("name", ["yield_acceleration", "decay_rate", "delta_mu", "minimum_friction"])
@@ -448,11 +449,11 @@ def test_default_given_back_changes_nothing(name: str) -> None:
     """A parameter given at its own estimate is the estimate, to the conditioning of the cells."""
     axes: dict[str, Any] = {name: values for name, values in AXES.items() if name != "frequency"}
     axes["amplitude"] = axes["amplitude"][1:]
-    result = slipsweep.sweep(**axes, frequency=1.0)
+    result = slipsweep.sweep(**choices(**axes, frequency=1.0))
     sliding = (result.sliding_mode > 0).to_numpy()
-    estimate = slipsweep.friction_parameters(**axes)[name].broadcast_like(result.permanent_displacement)
+    estimate = slipsweep.friction_parameters(**choices(**axes))[name].broadcast_like(result.permanent_displacement)
     given = xr.where(sliding, estimate, 1.0).drop_vars("frequency", errors="ignore")
-    again = slipsweep.sweep(**axes, frequency=1.0, **{name: given})
+    again = slipsweep.sweep(**choices(**axes, frequency=1.0, **{name: given}))
     for what in ("permanent_displacement", "peak_relative_velocity"):
         np.testing.assert_allclose(again[what].to_numpy()[sliding], result[what].to_numpy()[sliding], rtol=1e-11)
 
@@ -484,7 +485,9 @@ def test_grazing_displacement_has_its_leading_term() -> None:
     for excess in (1e-4, 1e-6, 1e-8):
         amplitude = onset * (1 + excess)
         excess = float(mpf(amplitude) / onset - 1)
-        result = slipsweep.sweep(10.0, 0.6, amplitude, 1.0, yield_acceleration=onset, cycles=1, model="newmark")
+        result = slipsweep.sweep(
+            10.0, 0.6, amplitude, 1.0, yield_acceleration=onset, model="newmark", excitation=slipsweep.Sine(cycles=1)
+        )
         leading = 4.5 * onset * excess**2 / (2 * pi) ** 2
         assert value(result) == pytest.approx(leading, rel=excess + 2e-15 / excess), f"A/Uy - 1 = {excess:g}"
         with workdps(30):

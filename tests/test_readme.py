@@ -183,7 +183,7 @@ CONTINUOUS: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "yi
 
 def five_cycles(experiment: dict[str, Any], frequency: float, **friction: Any) -> tuple[str, str]:
     """Displacement in mm and peak velocity in m/s, as the tutorial prints them."""
-    result = slipsweep.sweep(**experiment, frequency=frequency, cycles=5, **friction)
+    result = slipsweep.sweep(**experiment, frequency=frequency, **friction, excitation=slipsweep.Sine(cycles=5))
     return f"{result.permanent_displacement.item() * 1000:.0f}", f"{result.peak_relative_velocity.item():.3f}"
 
 
@@ -204,7 +204,7 @@ def test_comparison_with_the_paper(document: str) -> None:
         cells = (slipsweep.friction_parameters(**experiment)[name] for experiment in (STICK_SLIP, CONTINUOUS))
         return tuple(f"{cell.item():.2f}" for cell in cells)
 
-    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, cycles=1, decay_rate=2.70)
+    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, decay_rate=2.70, excitation=slipsweep.Sine(cycles=1))
     attenuation = history.block_acceleration.max().item() / 9.81
     printed = five_cycles(STICK_SLIP, 1.8, decay_rate=2.70), five_cycles(CONTINUOUS, 3.5, decay_rate=2.30)
     own = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
@@ -229,9 +229,9 @@ def test_numbers_of_the_paper_sweep(document: str) -> None:
     for experiment, frequency, decay_rate, delta_mu in ((STICK_SLIP, 1.8, 2.70, 0.09), (CONTINUOUS, 3.5, 2.30, 0.11)):
         displacement, velocity = five_cycles(experiment, frequency, decay_rate=decay_rate, delta_mu=delta_mu)
         assert f"{displacement} mm and {velocity} m/s" in text
-    assert slipsweep.Validity(slipsweep.sweep(**STICK_SLIP, frequency=1.8, cycles=5).validity.item()) == (
-        Validity.NOT_RECOUPLED
-    )
+    assert slipsweep.Validity(
+        slipsweep.sweep(**STICK_SLIP, frequency=1.8, excitation=slipsweep.Sine(cycles=5)).validity.item()
+    ) == (Validity.NOT_RECOUPLED)
 
 
 # ------------------------------------------------------------------- tables of the program
@@ -254,10 +254,9 @@ def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
     [
         ("## `[axes.NAME]`", spec.Axis),
         ("## `[[cases]]`", spec.Case),
-        ("## `[model]`", spec.Model),
-        ("## `[excitation]`", spec.Excitation),
-        ("## `[excitation.harmonics]`", spec.Harmonics),
-        ("## `[solver]`", spec.Solver),
+        ("## `[model]`", spec.ModelTable),
+        ("## `[excitation]`", spec.ExcitationTable),
+        ("## `[solver]`", spec.SolverTable),
         ("## `[output]`", spec.Output),
         ("## `[uncertainty]`", spec.Uncertainty),
     ],

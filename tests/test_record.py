@@ -14,12 +14,13 @@ import mpmath
 import numpy as np
 import pytest
 import xarray as xr
+from cases import choices
 from numba import njit
 from record_reference import Block
 from scipy.integrate import solve_ivp
 
 import slipsweep
-from slipsweep import InputError, Record, sweep_record
+from slipsweep import InputError, Record, sweep
 from slipsweep.kernels.block import MONOTONE, Cell, block_of
 from slipsweep.kernels.linear import held_stop
 from slipsweep.kernels.record import follow_integrals
@@ -33,7 +34,7 @@ def sine_record(amplitude: float, frequency: float, cycles: int, samples: int) -
 
 
 def displacement(record: Record, **given: Any) -> float:
-    return float(sweep_record(record, **given).permanent_displacement)
+    return float(sweep(**choices(**given, excitation=record)).permanent_displacement)
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +119,12 @@ def test_newmark_rectangular_pulse() -> None:
     """Newmark's own: u = A T²/2 (A/Üy − 1) for a pulse of height A and length T."""
     height, length, onset = 3.0, 0.4, 1.2
     u = height * length**2 / 2 * (height / onset - 1)
-    result = sweep_record(
-        Record(np.array([0.0, length]), np.array([height, height])), 0.0, 0.3, yield_acceleration=onset, model="newmark"
+    result = sweep(
+        0.0,
+        0.3,
+        yield_acceleration=onset,
+        excitation=Record(np.array([0.0, length]), np.array([height, height])),
+        model="newmark",
     )
     assert float(result.permanent_displacement) == pytest.approx(u, rel=1e-15)
     assert float(result.peak_relative_velocity) == pytest.approx((height - onset) * length, rel=1e-15)
@@ -224,7 +229,7 @@ def test_mendez_against_scipy_on_recorded_motions(
     largest, half = int(np.argmax(np.abs(motion.accel))), round(2.5 / motion.dt)
     record = Record.sampled(motion.accel[max(largest - half, 0) : largest + half] * G, motion.dt)
     scale = peak / float(np.abs(record.acceleration).max())
-    result = sweep_record(record, 5.0, 0.38, scale=scale, **given, **options)
+    result = sweep(5.0, 0.38, **choices(scale=scale, **given, **options, excitation=record))
     expected = Block(5.0, 0.38, G, **given, **options).respond(record, scale)
     assert (expected.stick_slip_pulses, expected.continuous_pulses) == modes
     assert expected.permanent_displacement > 1e-6
@@ -258,7 +263,7 @@ def test_mendez_against_scipy_on_made_up_records(seed: int) -> None:
         }
         given["recoupling"] = str(rng.choice(["eq12", "integrate"]))
         given["rise"] = str(rng.choice(["monotone", "literal"]))
-        result = sweep_record(record, theta, mu_s, **given)
+        result = sweep(theta, mu_s, **choices(**given, excitation=record))
         if not np.isnan(result.permanent_displacement):
             compared += 1
             for quantity, value in vars(Block(theta, mu_s, G, **given).respond(record, 1.0)).items():
@@ -314,7 +319,7 @@ class Stepped:
 def test_newmark_against_scipy(shaking: Record) -> None:
     part = Record(shaking.times[300:900], shaking.acceleration[300:900])
     stepped = Stepped(part, 1.3)
-    result = sweep_record(part, 0.0, 0.3, yield_acceleration=1.3, model="newmark")
+    result = sweep(0.0, 0.3, yield_acceleration=1.3, excitation=part, model="newmark")
     assert float(result.permanent_displacement) == pytest.approx(stepped.newmark(), rel=1e-9)
     assert int(result.number_of_slips) > 5
 
@@ -335,7 +340,7 @@ def test_stick_slip_pulse_with_two_maxima_by_small_steps() -> None:
         friction = (mu_s + delta_mu) * np.exp(-decay * ground / G)
         return np.asarray(ground - (G + ground * t_theta) * (mu_s - t_theta - friction) - G * t_theta)
 
-    result = sweep_record(record, theta, mu_s)
+    result = sweep(theta, mu_s, excitation=record)
     errors = []
     for steps in (50_000, 800_000):
         times = np.linspace(0.0, 0.8, steps + 1)
@@ -379,11 +384,14 @@ def test_stick_slip_pulse_with_two_maxima_by_small_steps() -> None:
 def test_finely_sampled_sine(options: dict[str, Any], cell: tuple[float, float, float, float]) -> None:
     """Straight lines lie under a sine by up to h²/8: the response to them differs in second order."""
     theta, mu_s, amplitude, frequency = cell
-    sine = slipsweep.sweep(theta, mu_s, amplitude, frequency, cycles=3, **options)
+    sine = slipsweep.sweep(theta, mu_s, amplitude, frequency, **choices(cycles=3, **options))
     for name in ("permanent_displacement", "peak_relative_velocity"):
         errors = [
             abs(
-                float(sweep_record(sine_record(amplitude, frequency, 3, n), theta, mu_s, **options)[name] / sine[name])
+                float(
+                    sweep(theta, mu_s, **choices(**options, excitation=sine_record(amplitude, frequency, 3, n)))[name]
+                    / sine[name]
+                )
                 - 1
             )
             for n in (250, 4000)
@@ -405,10 +413,10 @@ def test_finely_sampled_sine(options: dict[str, Any], cell: tuple[float, float, 
 def test_a_triangle_is_its_own_record(options: dict[str, Any], cell: tuple[float, float, float, float]) -> None:
     """A wave of straight lines is a record of its corners: two ways through other pieces to one answer."""
     theta, mu_s, amplitude, frequency = cell
-    wave = slipsweep.sweep(theta, mu_s, amplitude, frequency, cycles=3, waveform="triangle", **options)
+    wave = slipsweep.sweep(theta, mu_s, amplitude, frequency, **choices(cycles=3, waveform="triangle", **options))
     times = np.arange(13) / (4 * frequency)
     record = Record(times, amplitude * np.array([0.0, *[1.0, 0.0, -1.0, 0.0] * 3]))
-    result = sweep_record(record, theta, mu_s, **options)
+    result = sweep(theta, mu_s, **choices(**options, excitation=record))
     assert float(wave.permanent_displacement) > 1e-4
     for name in ("permanent_displacement", "peak_relative_velocity", "validity"):
         assert float(result[name]) == pytest.approx(float(wave[name]), rel=3e-13), name
@@ -418,9 +426,9 @@ def test_finely_sampled_sine_in_continuous_sliding() -> None:
     """A record ends with the plane at rest: what velocity is left when the sine ends is braked by Eq. 12."""
     theta, mu_s, amplitude, frequency = 6.0, 0.38, 6.5, 2.0
     given: dict[str, Any] = {"yield_acceleration": 0.08}
-    sine = slipsweep.simulate(theta, mu_s, amplitude, frequency, cycles=3, times=[1.5], **given)
+    sine = slipsweep.simulate(theta, mu_s, amplitude, frequency, **choices(cycles=3, times=[1.5], **given))
     assert int(sine.sliding_mode) == 2
-    own = slipsweep.friction_parameters(theta, mu_s, amplitude, **given)
+    own = slipsweep.friction_parameters(theta, mu_s, amplitude, **choices(**given))
     t_theta = tan(radians(theta))
     friction = float(own.minimum_friction)
     b = amplitude - (G + amplitude * t_theta) * (mu_s - t_theta - friction) - G * t_theta
@@ -428,7 +436,7 @@ def test_finely_sampled_sine_in_continuous_sliding() -> None:
     u = float(sine.permanent_displacement) + left * abs(left) / (2 * b)
     errors = []
     for n in (250, 4000):
-        result = sweep_record(sine_record(amplitude, frequency, 3, n), theta, mu_s, **given)
+        result = sweep(theta, mu_s, **choices(**given, excitation=sine_record(amplitude, frequency, 3, n)))
         assert [int(result[name]) for name in ("number_of_slips", "stick_slip_pulses", "continuous_pulses")] == [
             1,
             0,
@@ -450,7 +458,7 @@ def test_modes_alternate_between_pulses() -> None:
         np.concatenate([record.times + 10.0 * i for i, record in enumerate(alone)]),
         np.concatenate([record.acceleration for record in alone]),
     )
-    results = [sweep_record(record, theta, mu_s) for record in (*alone, together)]
+    results = [sweep(theta, mu_s, excitation=record) for record in (*alone, together)]
     counts = [[int(r[name]) for name in ("stick_slip_pulses", "continuous_pulses")] for r in results]
     assert counts == [[1, 0], [0, 1], [0, 0], [1, 1]]
     moved = [float(r.permanent_displacement) for r in results]
@@ -471,10 +479,10 @@ MODELS = pytest.mark.parametrize(
 
 @MODELS
 def test_time_scale_and_polarity(shaking: Record, options: dict[str, Any]) -> None:
-    grid = {"theta": [0.0, 5.0, 10.0], "mu_s": [0.3, 0.4, 0.5], "scale": [0.5, 1.0, 1.5], **options}
-    swept = sweep_record(shaking, time_scale=[1.0, 1.7], polarity="both", **grid)
+    grid = {"theta": [0.0, 5.0, 10.0], "mu_s": [0.3, 0.4, 0.5], "scale": [0.5, 1.0, 1.5], **choices(**options)}
+    swept = sweep(time_scale=[1.0, 1.7], polarity="both", **grid, excitation=shaking)
     for sign in (1, -1):
-        direct = sweep_record(Record(1.7 * shaking.times, sign * shaking.acceleration), **grid)
+        direct = sweep(**grid, excitation=Record(1.7 * shaking.times, sign * shaking.acceleration))
         part = swept.sel(time_scale=1.7, polarity=sign)
         for name in (*RESULTS, *COUNTS):
             np.testing.assert_allclose(part[name], direct[name], rtol=2e-11, atol=1e-14, err_msg=name)
@@ -486,11 +494,70 @@ def test_time_scale_and_polarity(shaking: Record, options: dict[str, Any]) -> No
 
 @MODELS
 def test_scale_is_the_scaled_record(shaking: Record, options: dict[str, Any]) -> None:
-    swept = sweep_record(shaking, 5.0, 0.4, scale=[0.8, 1.3], **options)
+    swept = sweep(5.0, 0.4, **choices(scale=[0.8, 1.3], **options, excitation=shaking))
     for scale in (0.8, 1.3):
-        direct = sweep_record(Record(shaking.times, scale * shaking.acceleration), 5.0, 0.4, **options)
+        direct = sweep(5.0, 0.4, **choices(**options, excitation=Record(shaking.times, scale * shaking.acceleration)))
         for name in (*RESULTS, *COUNTS):
             np.testing.assert_allclose(swept[name].sel(scale=scale), direct[name], rtol=1e-11, err_msg=name)
+
+
+@MODELS
+def test_amplitude_is_the_peak_that_the_record_is_scaled_to(shaking: Record, options: dict[str, Any]) -> None:
+    """The same bits as under the scale, amplitude over the record's own peak, whichever sign that has."""
+    amplitude = np.array([0.5, 2.0, 4.5])
+    for record in (shaking, Record(shaking.times, -2.5 * shaking.acceleration)):
+        peak = np.abs(record.acceleration).max()
+        block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "time_scale": 1.5, "polarity": "both", **choices(**options)}
+        scaled = sweep(**block, scale=amplitude / peak, excitation=record)
+        found = sweep(**block, amplitude=amplitude, excitation=record)
+        assert found.permanent_displacement.dims == ("amplitude", "polarity")
+        assert "scale" not in found.coords
+        # as printed, Eq. 4 leaves these blocks at rest or Eq. 12 without braking
+        assert (found.permanent_displacement > 0).any() or "rise" in options
+        np.testing.assert_array_equal(found.amplitude, amplitude)
+        for name in (*RESULTS, *COUNTS):
+            np.testing.assert_array_equal(found[name], scaled[name], err_msg=name)
+
+
+def test_the_block_slides_once_the_peak_passes_the_yield_acceleration(shaking: Record) -> None:
+    """Whatever the record: amplitude is the largest acceleration that comes."""
+    sign = 1 if shaking.acceleration.max() > -shaking.acceleration.min() else -1
+    for onset in (0.3, 2.0):
+        amplitude = onset * np.array([1 - 1e-9, 1 + 1e-6])
+        slides = sweep(
+            5.0, 0.6, amplitude, yield_acceleration=onset, polarity=sign, excitation=shaking, model="newmark"
+        ).number_of_slips
+        assert slides.values.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"amplitude": 1.0, "scale": 1.0}, "amplitude, scale: must not both be given"),
+        ({"amplitude": -1.0}, "amplitude = -1: must be a finite number >= 0"),
+        ({"frequency": 1.0}, "frequency: not allowed with a Record, which takes amplitude, scale, time_scale"),
+        ({"displacement_amplitude": 1.0}, "displacement_amplitude: not allowed with a Record"),
+        ({"structure_frequency": 1.0}, "structure_frequency: not allowed with a Record"),
+        ({"solver": "step"}, "solver = Step(rule='trapezoid', steps_per_cycle=1024): not allowed with a Record"),
+    ],
+)
+def test_what_does_not_go_with_a_record(shaking: Record, given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as error:
+        sweep(5.0, 0.4, **given, excitation=shaking)
+    assert str(error.value).startswith(message)
+
+
+def test_what_goes_with_a_record_only() -> None:
+    for name in ("scale", "time_scale", "polarity"):
+        with pytest.raises(InputError, match=f"{name}: not allowed with a waveform, which takes amplitude"):
+            sweep(5.0, 0.4, 3.0, 1.0, **{name: 1})  # type: ignore[arg-type]
+
+
+def test_a_record_without_acceleration_has_no_scale() -> None:
+    still = Record(np.arange(3.0), np.zeros(3))
+    with pytest.raises(InputError, match="amplitude: record has no acceleration to scale; give scale"):
+        sweep(5.0, 0.4, 1.0, excitation=still)
+    assert sweep(5.0, 0.4, scale=1.0, excitation=still).permanent_displacement.item() == 0.0
 
 
 @MODELS
@@ -498,8 +565,8 @@ def test_samples_added_on_the_lines_change_nothing(shaking: Record, options: dic
     middle = 0.5 * (shaking.times[1:] + shaking.times[:-1])
     times = np.sort(np.concatenate([shaking.times, middle]))
     finer = Record(times, np.interp(times, shaking.times, shaking.acceleration))
-    grid = {"theta": [0.0, 6.0], "mu_s": [0.3, 0.45], "scale": [0.6, 1.4], **options}
-    one, two = sweep_record(shaking, **grid), sweep_record(finer, **grid)
+    grid = {"theta": [0.0, 6.0], "mu_s": [0.3, 0.45], "scale": [0.6, 1.4], **choices(**options)}
+    one, two = sweep(**grid, excitation=shaking), sweep(**grid, excitation=finer)
     for name in (*RESULTS, *COUNTS):
         np.testing.assert_allclose(one[name], two[name], rtol=1e-9, atol=1e-13, err_msg=name)
 
@@ -509,19 +576,19 @@ def test_mendez_held_at_yield_is_newmark(shaking: Record) -> None:
     theta, mu_s = 5.0, 0.5
     onset = float(slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration)
     scale = 1.05 * onset / float(shaking.acceleration.max())
-    mendez = sweep_record(shaking, theta, mu_s, scale=scale, recoupling="integrate")
-    newmark = sweep_record(shaking, theta, mu_s, scale=scale, model="newmark")
+    mendez = sweep(theta, mu_s, scale=scale, excitation=shaking, model=slipsweep.Mendez(recoupling="integrate"))
+    newmark = sweep(theta, mu_s, scale=scale, excitation=shaking, model="newmark")
     assert float(newmark.permanent_displacement) > 0
     for name in (*RESULTS, *COUNTS):
         np.testing.assert_allclose(mendez[name], newmark[name], rtol=1e-12, err_msg=name)
 
 
 def test_where_there_is_no_value(shaking: Record) -> None:
-    steep = sweep_record(shaking, 30.0, 0.4)
+    steep = sweep(30.0, 0.4, excitation=shaking)
     assert np.isnan(steep.permanent_displacement)
     assert int(steep.number_of_slips) == -1
     assert int(steep.validity) & 1
-    lifted = sweep_record(Record(np.array([0.0, 1.0, 2.0]), np.array([0.0, -40.0, 0.0])), 20.0, 0.6)
+    lifted = sweep(20.0, 0.6, excitation=Record(np.array([0.0, 1.0, 2.0]), np.array([0.0, -40.0, 0.0])))
     assert int(lifted.validity) == 2, "n = g + Üg tan θ < 0 on the way down"
 
 
@@ -542,17 +609,23 @@ def test_where_there_is_no_value(shaking: Record) -> None:
 )
 def test_arguments_that_are_refused(shaking: Record, given: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
-        sweep_record(shaking, **{"theta": 5.0, "mu_s": 0.4, **given})
+        sweep(**choices(**{"theta": 5.0, "mu_s": 0.4, **given}, excitation=shaking))
     assert message in str(error.value)
 
 
 def test_dimensions(shaking: Record) -> None:
     theta = xr.DataArray([0.0, 5.0], dims="case", coords={"case": ["a", "b"]})
-    result = sweep_record(
-        shaking, theta, [0.3, 0.4, 0.5], scale=[0.5, 1.0, 1.5, 2.0], time_scale=[1.0], polarity="both", model="newmark"
+    result = sweep(
+        theta,
+        [0.3, 0.4, 0.5],
+        scale=[0.5, 1.0, 1.5, 2.0],
+        time_scale=[1.0],
+        polarity="both",
+        excitation=shaking,
+        model="newmark",
     )
     assert dict(result.sizes) == {"mu_s": 3, "case": 2, "scale": 4, "time_scale": 1, "polarity": 2}
-    one = sweep_record(shaking, 5.0, 0.4, scale=1.5, polarity=-1, model="newmark")
+    one = sweep(5.0, 0.4, scale=1.5, polarity=-1, excitation=shaking, model="newmark")
     picked = result.sel(mu_s=0.4, scale=1.5, time_scale=1.0, polarity=-1, case="b")
     assert float(picked.permanent_displacement) == float(one.permanent_displacement)
 
@@ -572,7 +645,7 @@ def test_command(tmp_path: Path, shaking: Record) -> None:
     assert done.returncode == 0, done.stderr
     assert "12 cells (3 theta x 2 mu_s x 2 polarity)" in done.stdout
     with xr.open_dataset(output) as stored:
-        direct = sweep_record(shaking, [0.0, 5.0, 10.0], [0.3, 0.4], polarity="both")
+        direct = sweep([0.0, 5.0, 10.0], [0.3, 0.4], polarity="both", excitation=shaking)
         np.testing.assert_array_equal(stored.permanent_displacement, direct.permanent_displacement)
         assert stored.attrs["record_units"] == "m/s2"
         np.testing.assert_array_equal(stored.record_acceleration, shaking.acceleration)

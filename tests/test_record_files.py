@@ -186,7 +186,7 @@ def test_damaged_files_are_refused_or_read_but_never_break(tmp_path: Path, kind:
     path = tmp_path / "a"
     path.write_bytes(content)
     with suppress(InputError):
-        record = read_record(path, file_format=kind, baseline=data.draw(st.sampled_from(records.BASELINES)))
+        record = read_record(path, format=kind, baseline=data.draw(st.sampled_from(["none", "mean", "linear"])))
         assert np.isfinite(record.acceleration).all()
 
 

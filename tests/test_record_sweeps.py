@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Record, RunError, read_record, sweep_record
+from slipsweep import InputError, Record, RunError, read_record, sweep
 from slipsweep.files import export, spec
 from slipsweep.grid import blocks
 from slipsweep.grid.tables import Table
@@ -77,11 +77,11 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
 # ---------------------------------------------------------------------------- what is written
 
 
-def test_a_sweep_file_gives_what_sweep_record_gives(folder: Path) -> None:
+def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
     run(folder / "a.toml", folder / "a.nc")
     record = read_record(folder / "motion.csv", units="g")
-    expected = sweep_record(
-        record, [0, 5, 25], [0.3, 0.4], scale=np.linspace(0.5, 3, 4), time_scale=[1, 2], polarity="both"
+    expected = sweep(
+        [0, 5, 25], [0.3, 0.4], scale=np.linspace(0.5, 3, 4), time_scale=[1, 2], polarity="both", excitation=record
     )
     assert 0 < float(expected.permanent_displacement.max()) < 100
     assert (expected.number_of_slips == -1).any()
@@ -147,8 +147,14 @@ def test_rows_of_cases_may_hold_the_scales(folder: Path) -> None:
     record = read_record(folder / "motion.csv", units="g")
     found = stored(folder / "b.nc")["permanent_displacement"]
     for at, (theta, scale, time_scale) in enumerate([(0, 2, 1.5), (5, 3, 0.5)]):
-        alone = sweep_record(
-            record, theta, [0.3, 0.4], scale=scale, time_scale=time_scale, yield_acceleration=0.5, model="newmark"
+        alone = sweep(
+            theta,
+            [0.3, 0.4],
+            scale=scale,
+            time_scale=time_scale,
+            yield_acceleration=0.5,
+            excitation=record,
+            model="newmark",
         )
         np.testing.assert_allclose(found[:, at], alone.permanent_displacement, rtol=1e-15)
         assert (found[:, at] > 0).all()
@@ -203,13 +209,18 @@ def test_blocks_of_a_record_are_seconds_of_work(folder: Path) -> None:
     [
         ('"motion.csv"', '"no.csv"', "no.csv: cannot be read"),
         ('units = "g"\n', "", "motion.csv: units: must be given"),
-        ('units = "g"', 'units = "feet"', "excitation.units = \"feet\": must be 'm/s2'"),
+        ('units = "g"', 'units = "feet"', "excitation.units = 'feet': must be one of 'm/s2'"),
         ('units = "g"', 'units = "g"\nchannel = 2', "channel = 2: only COSMOS files"),
         ('"both"', "0", "excitation.polarity = 0: must be 1, -1 or 'both'"),
         ('"both"', '"both"\ncycles = 5', "excitation.cycles: not allowed with excitation.record"),
         ('record = "motion.csv"\n', "", "excitation.polarity: only beside excitation.record"),
         ("[excitation]", "[other]", "other: unknown key"),
-        ("axes.scale", "axes.amplitude", "axes.amplitude: not allowed with excitation.record; give scale"),
+        ("[axes.time_scale]", "[axes.amplitude]", "axes.scale: not allowed beside amplitude: give one of them"),
+        (
+            "axes.scale",
+            "axes.displacement_amplitude",
+            "axes.displacement_amplitude: not allowed with excitation.record; give amplitude, or scale",
+        ),
         ("axes.time_scale", "axes.frequency", "axes.frequency: not allowed with excitation.record"),
         ("start = 0.5", "start = 0", "axes.scale.start = 0.0: must be a finite number > 0"),
         ("[axes.mu_s]\nvalues = [0.3, 0.4]", "", "axes.mu_s: missing"),
@@ -236,6 +247,29 @@ def test_sweep_files_that_are_refused(folder: Path, old: str, new: str, message:
     assert "\n" not in str(error.value)
 
 
+def test_a_sweep_file_may_scale_the_record_to_its_peak(folder: Path) -> None:
+    given = SWEEP.replace("[axes.scale]", "[axes.amplitude]").replace("num = 4\n", 'num = 4\nunits = "g"\n')
+    (folder / "a.toml").write_text(given)
+    run(folder / "a.toml", folder / "a.nc")
+    found = xr.load_dataset(folder / "a.nc", mask_and_scale=False)
+    record = read_record(folder / "motion.csv", units="g")
+    peak = np.abs(record.acceleration).max()
+    amplitude = np.linspace(0.5, 3, 4) * 9.81
+    np.testing.assert_allclose(found.amplitude, amplitude, rtol=1e-15)
+    scaled = sweep(
+        [0, 5, 25], [0.3, 0.4], excitation=record, scale=amplitude / peak, time_scale=[1, 2], polarity="both"
+    )
+    assert (scaled.permanent_displacement > 0).any()
+    for name in RECORD_RESULTS:
+        assert found[name].dims == tuple(
+            dim.replace("scale", "amplitude") if dim == "scale" else dim for dim in scaled[name].dims
+        )
+        np.testing.assert_array_equal(found[name].values, scaled[name].values)
+    again = folder / "again.nc"
+    store.run(spec.load(folder / "a.nc"), again, command="x")
+    xr.testing.assert_equal(found, xr.load_dataset(again, mask_and_scale=False))
+
+
 def test_scales_need_a_record(folder: Path) -> None:
     text = SWEEP[SWEEP.index("[axes.theta]") :]
     (folder / "a.toml").write_text(text)
@@ -247,7 +281,7 @@ def test_a_grid_too_large_for_memory_is_refused() -> None:
     record = Record.sampled([0.0, 1.0, 0.0], 0.01)
     many = np.linspace(0.1, 1.0, 30_000)
     with pytest.raises(InputError, match="of memory is free"):
-        sweep_record(record, 5.0, np.linspace(0.2, 0.9, 3000), scale=many, time_scale=many)
+        sweep(5.0, np.linspace(0.2, 0.9, 3000), scale=many, time_scale=many, excitation=record)
 
 
 # ------------------------------------------------------------------------------ other commands

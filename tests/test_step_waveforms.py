@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from cases import choices
 
 import slipsweep
 
@@ -39,7 +40,7 @@ def solve(wave: str, cycles: int = 5, **options: Any) -> xr.Dataset:
     """All cells under all options; dimensions `options` and `cell`."""
     columns: dict[str, Any] = {name: xr.DataArray(values, dims="cell") for name, values in CELLS.items()}
     runs = [
-        slipsweep.sweep(**columns, frequency=1 / (2 * pi), cycles=cycles, **WAVES[wave], **given, **options)
+        slipsweep.sweep(**choices(**columns, frequency=1 / (2 * pi), cycles=cycles, **WAVES[wave], **given, **options))
         for given in OPTIONS
     ]
     return xr.concat(runs, "options", combine_attrs="drop")
@@ -55,10 +56,9 @@ def errors(wave: str, rule: str, counts: list[int]) -> np.ndarray:
 
 def newmark(wave: str, rule: str, steps: int, **options: Any) -> float:
     """W of a Newmark block on the level with A = 2 and Üy = 1."""
-    result = slipsweep.sweep(
-        theta=0.0, mu_s=0.1, amplitude=2.0, yield_acceleration=1.0, frequency=1 / (2 * pi), cycles=3, model="newmark",
-        waveform=wave, solver="step", rule=rule, steps_per_cycle=steps, **options,
-    )  # fmt: skip
+    stepping = {"solver": "step", "rule": rule, "steps_per_cycle": steps}
+    block = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0, "frequency": 1 / (2 * pi)}
+    result = slipsweep.sweep(**choices(**block, model="newmark", cycles=3, waveform=wave, **stepping, **options))
     return float(result.permanent_displacement)
 
 
@@ -83,8 +83,10 @@ def test_no_ramp_is_no_ramp() -> None:
     """A ramp over the first cycle leaves the later ones as they are: 9 cycles more, 9 plain cycles more."""
     options: dict[str, Any] = {"solver": "step", "steps_per_cycle": 256, "theta": 5.0, "mu_s": 0.38, "amplitude": 4.0}
     options |= {"frequency": 1.0, "waveform": "triangle"}
-    plain = slipsweep.sweep(cycles=9, **options).permanent_displacement
-    short, long = (slipsweep.sweep(cycles=cycles, ramp_in=1.0, **options).permanent_displacement for cycles in (3, 12))
+    plain = slipsweep.sweep(**choices(cycles=9, **options)).permanent_displacement
+    short, long = (
+        slipsweep.sweep(**choices(cycles=cycles, ramp_in=1.0, **options)).permanent_displacement for cycles in (3, 12)
+    )
     assert float(long - short) == pytest.approx(float(plain), rel=1e-12)
 
 
@@ -121,9 +123,9 @@ def test_finest_steps_reach_the_cycle_solver(wave: str) -> None:
 def test_cells_do_not_depend_on_their_neighbours(wave: str) -> None:
     """Lanes of other cells beside it change no bit of a cell."""
     options: dict[str, Any] = {"frequency": 1.0, "cycles": 5, "solver": "step", "steps_per_cycle": 64, **WAVES[wave]}
-    whole = slipsweep.sweep(theta=18.0, mu_s=0.34, amplitude=np.linspace(0.3, 3.0, 60), **options)
+    whole = slipsweep.sweep(**choices(theta=18.0, mu_s=0.34, amplitude=np.linspace(0.3, 3.0, 60), **options))
     for i in (0, 17, 59):
-        alone = slipsweep.sweep(theta=18.0, mu_s=0.34, amplitude=whole.amplitude.values[i], **options)
+        alone = slipsweep.sweep(**choices(theta=18.0, mu_s=0.34, amplitude=whole.amplitude.values[i], **options))
         assert float(alone.permanent_displacement) == float(whole.permanent_displacement[i])
 
 
@@ -143,8 +145,8 @@ def test_slides_that_run_past_the_end_of_a_cycle(wave: dict[str, Any], given: di
     """A cycle that does not begin at rest does not stand for those that begin otherwise."""
     block: dict[str, Any] = {"theta": [0.0, 4.0], "mu_s": 0.57, "yield_acceleration": 0.73, "frequency": 1.0}
     block |= {"amplitude": [1.7, 2.6, 3.4], "waveform": "harmonics", "cycles": 10}
-    exact = slipsweep.sweep(**block, **wave, **given, solver="cycle")
-    found = slipsweep.sweep(**block, **wave, **given, solver="step", rule="simpson", steps_per_cycle=2048)
+    exact = slipsweep.sweep(**choices(**block, **wave, **given, solver="cycle"))
+    found = slipsweep.sweep(**choices(**block, **wave, **given, solver="step", rule="simpson", steps_per_cycle=2048))
     np.testing.assert_array_equal(found.validity, exact.validity)
     for name in ("permanent_displacement", "peak_relative_velocity"):
         np.testing.assert_allclose(found[name], exact[name], rtol=1e-7, err_msg=name)

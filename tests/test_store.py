@@ -149,7 +149,7 @@ def test_workers_share_a_sweep_evenly_within_the_memory() -> None:
     assert blocks.cells_within(2 * 10**9, night, 4) == (2 * 10**9 - 1400 * 10**6) // (14 * 19 + 8)
     with pytest.raises(InputError, match=r"--memory = 1 GB: must be 1\.41 GB at least with --workers 4"):
         blocks.cells_within(10**9, night, 4)
-    stepping = night.with_solver("step")
+    stepping = night.with_solver(slipsweep.Step())
     assert blocks.cells_shared(stepping, 2) == 60_000_000 // 32
     assert blocks.cells_shared(stepping, None) == 60_000_000 // 1024
     assert blocks.cells_shared(stepping, 1000) == 10_000
@@ -355,12 +355,12 @@ def test_ncdump_reads_it(tmp_path: Path, text: str) -> None:
 
 
 def test_a_result_repeats_its_run(tmp_path: Path) -> None:
-    sweep_spec = spec.parse(CASES, "a.toml").with_solver("step")
+    sweep_spec = spec.parse(CASES, "a.toml").with_solver(slipsweep.Step())
     store.run(sweep_spec, tmp_path / "a.nc", command="x")
     again = spec.load(tmp_path / "a.nc")
     assert again.text == CASES
     # the solver was not the sweep file's own: it is remembered all the same
-    assert again.solver.method == "step"
+    assert again.solver == slipsweep.Step()
     store.run(again, tmp_path / "b.nc", command="x")
     assert_same_data(tmp_path / "a.nc", tmp_path / "b.nc")
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from cases import choices
 
 import slipsweep
 from slipsweep._version import __version__
@@ -346,7 +347,7 @@ def test_parts_of_a_task_are_the_whole() -> None:
 
 
 def test_attributes_tell_how_it_was_made() -> None:
-    attrs = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, cycles=3).attrs
+    attrs = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, excitation=slipsweep.Sine(cycles=3)).attrs
     assert attrs["title"] == "Permanent displacement of a rigid block, swept"
     assert attrs["source"] == f"slipsweep {__version__}"
     assert "10.1016/j.soildyn.2011.08.007" in attrs["references"]
@@ -356,16 +357,18 @@ def test_attributes_tell_how_it_was_made() -> None:
         "solver": "cycle",
     }  # fmt: skip
     assert not {"rule", "steps_per_cycle"} & {*attrs}
-    stepped = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, model="newmark", solver="step", rule="simpson").attrs
+    stepped = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
     assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
     assert not {"rise", "recoupling"} & {*stepped}
-    assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {"title", "source", "references", "g"}
+    assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
+        "title", "source", "references", "model", "rise", "recoupling", "g"
+    }  # fmt: skip
 
 
 def test_a_history_has_the_results_of_the_sweep() -> None:
-    history = slipsweep.simulate(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, cycles=5)
+    history = slipsweep.simulate(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, excitation=slipsweep.Sine(cycles=5))
     assert history.relative_displacement.dims == ("time",)
-    swept = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, cycles=5)
+    swept = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, excitation=slipsweep.Sine(cycles=5))
     xr.testing.assert_identical(
         history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"), swept.assign_attrs(history.attrs)
     )
@@ -409,15 +412,18 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"cycles": True}, "cycles = True: must be a whole number >= 1"),
     ({"cycles": math.inf}, "cycles = inf: must be a whole number >= 1"),
     ({"cycles": 10**20}, "cycles = 100000000000000000000: must be a whole number <= 1000000000"),
-    ({"steps_per_cycle": 10}, "steps_per_cycle = 10: must be a multiple of 4 >= 8"),
-    ({"steps_per_cycle": 4}, "steps_per_cycle = 4: must be a multiple of 4 >= 8"),
-    ({"steps_per_cycle": 40_000_000}, "steps_per_cycle = 40000000: must be a multiple of 4 <= 16777216"),
-    ({"model": "coulomb"}, "model = 'coulomb': must be one of 'mendez', 'newmark'"),
+    ({"solver": "step", "steps_per_cycle": 10}, "steps_per_cycle = 10: must be a multiple of 4 >= 8"),
+    ({"solver": "step", "steps_per_cycle": 4}, "steps_per_cycle = 4: must be a multiple of 4 >= 8"),
+    (
+        {"solver": "step", "steps_per_cycle": 40_000_000},
+        "steps_per_cycle = 40000000: must be a multiple of 4 <= 16777216",
+    ),
+    ({"model": "coulomb"}, "model = 'coulomb': must be one of 'mendez', 'newmark', or Mendez(...), Newmark(...)"),
     ({"rise": "slow"}, "rise = 'slow': must be one of 'monotone', 'literal'"),
     ({"recoupling": "eq13"}, "recoupling = 'eq13': must be one of 'eq12', 'integrate'"),
-    ({"waveform": "saw"}, "waveform = 'saw': must be one of 'sine'"),
-    ({"solver": "fast"}, "solver = 'fast': must be one of 'auto', 'step', 'cycle'"),
-    ({"rule": "euler"}, "rule = 'euler': must be one of 'rectangle', 'trapezoid', 'simpson'"),
+    ({"waveform": "saw"}, "excitation = 'saw': must be one of 'sine'"),
+    ({"solver": "fast"}, "solver = 'fast': must be one of 'auto', 'cycle', 'step', or Cycle(...), Step(...)"),
+    ({"solver": "step", "rule": "euler"}, "rule = 'euler': must be one of 'rectangle', 'trapezoid', 'simpson'"),
     ({"variables": "validity"}, "variables = 'validity': must be a list of names"),
     ({"variables": ["displacement"]}, "variables = 'displacement': must be one of 'permanent_displacement', "),
     ({"variables": []}, "variables = []: must name one of 'permanent_displacement', "),
@@ -444,7 +450,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("change", "message"), BAD, ids=[message[:40] for _, message in BAD])
 def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
-        slipsweep.sweep(**{**GOOD, **change})
+        slipsweep.sweep(**choices(**{**GOOD, **change}))
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
 
@@ -465,7 +471,7 @@ def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
 )
 def test_bad_histories_are_named(change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
-        slipsweep.simulate(**{**GOOD, **change})
+        slipsweep.simulate(**choices(**{**GOOD, **change}))
     assert str(error.value).startswith(message)
 
 

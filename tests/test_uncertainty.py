@@ -468,13 +468,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_sweep_file_is_what_python_says(folder: Path) -> None:
     found = xr.load_dataset(folder / "fragile.nc")
     direct = slipsweep.sample(
-        theta=[0, 5], amplitude=np.linspace(0.1, 1, 10) * G, frequency=[1, 2], cycles=5, samples=256, seed=7,
-        thresholds=["10mm", 0.1], correlation=[("yield_acceleration", "mu_s", 0.5)],
+        theta=[0, 5],
+        amplitude=np.linspace(0.1, 1, 10) * G,
+        frequency=[1, 2],
+        excitation=slipsweep.Sine(cycles=5),
+        samples=256,
+        seed=7,
+        thresholds=["10mm", 0.1],
+        correlation=[("yield_acceleration", "mu_s", 0.5)],
         uncertain={
-            "yield_acceleration": {**FACTOR, "s": 0.15}, "amplitude": FACTOR,
+            "yield_acceleration": {**FACTOR, "s": 0.15},
+            "amplitude": FACTOR,
             "mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4},
         },
-    )  # fmt: skip
+    )
     for name, values in direct.data_vars.items():
         np.testing.assert_array_equal(found[name], values)
         assert found[name].dims == values.dims

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from cases import choices
 
 import slipsweep
 from slipsweep.model.variables import VALUELESS, Validity
@@ -46,7 +47,7 @@ def test_every_flag_that_takes_the_value_is_here() -> None:
 @pytest.mark.parametrize("wave", WAVES, ids=str)
 def test_sweep_gives_no_value(flag: Validity, wave: dict[str, Any]) -> None:
     for solver in SOLVERS:
-        found = slipsweep.sweep(**CELLS[flag], **wave, **solver, frequency=1.0)
+        found = slipsweep.sweep(**choices(**CELLS[flag], **wave, **solver, frequency=1.0))
         assert_no_value(found, flag)
         assert int(found.sliding_mode) == -1
 
@@ -55,7 +56,7 @@ def test_sweep_gives_no_value(flag: Validity, wave: dict[str, Any]) -> None:
 @pytest.mark.parametrize("wave", WAVES, ids=str)
 def test_history_gives_no_value(flag: Validity, wave: dict[str, Any]) -> None:
     """From its beginning, also where only a later pulse takes the value."""
-    history = slipsweep.simulate(**CELLS[flag], **wave, frequency=1.0, times=[0.0, 0.01, 0.3, 5.0, 60.0])
+    history = slipsweep.simulate(**choices(**CELLS[flag], **wave, frequency=1.0, times=[0.0, 0.01, 0.3, 5.0, 60.0]))
     assert_no_value(history, flag)
     for name in ("block_acceleration", "friction_coefficient", "relative_velocity", "relative_displacement"):
         assert np.isnan(history[name]).all(), name
@@ -67,7 +68,7 @@ def test_record_gives_no_value(flag: Validity) -> None:
     cell = {name: value for name, value in CELLS[flag].items() if name != "amplitude"}
     peak = CELLS[flag]["amplitude"]
     record = slipsweep.Record(np.arange(9.0), peak * np.array([0.0, 1, 0, -1, 0, 1, 0, -1, 0]))
-    found = slipsweep.sweep_record(record, **cell)
+    found = slipsweep.sweep(**choices(**cell, excitation=record))
     assert_no_value(found, flag)
     for name in ("number_of_slips", "stick_slip_pulses", "continuous_pulses"):
         assert int(found[name]) == -1, name
@@ -79,7 +80,7 @@ def test_grids_of_literal_rises(wave: dict[str, Any]) -> None:
     axes: dict[str, Any] = {"theta": np.linspace(0.0, 20.0, 7), "mu_s": np.linspace(0.2, 1.0, 7), "frequency": 1.0}
     axes |= {"amplitude": np.linspace(0.5, 9.0, 30), "rise": "literal", "cycles": 3}
     for solver in SOLVERS:
-        found = slipsweep.sweep(**axes, **wave, **solver)
+        found = slipsweep.sweep(**choices(**axes, **wave, **solver))
         missing = (found.validity & int(VALUELESS)) != 0
         assert (found.validity & int(Validity.KD_NOT_POSITIVE)).any()
         np.testing.assert_array_equal(np.isnan(found.permanent_displacement), missing)

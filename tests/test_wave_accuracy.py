@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import choices
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import nstr
@@ -37,12 +38,12 @@ every_wave = pytest.mark.parametrize("wave", WAVES)
 
 
 def displacement(**given: Any) -> float:
-    return float(slipsweep.sweep(**{"frequency": 1.0, **given}).permanent_displacement)
+    return float(slipsweep.sweep(**choices(**{"frequency": 1.0, **given})).permanent_displacement)
 
 
 def miss(case: WaveCase) -> str | None:
     """What is wrong with the cycle solver's answer: 1e-11 |u| + 1e-12 A/ω², peak velocity likewise."""
-    found = slipsweep.sweep(**case.arguments, solver="cycle")
+    found = slipsweep.sweep(**choices(**case.arguments, solver="cycle"))
     if (int(found.sliding_mode), int(found.validity)) != (case.sliding_mode, case.validity):
         return f"{case}: mode {int(found.sliding_mode)}, {Validity(int(found.validity))!r}, not {case.sliding_mode}, "
     if case.sliding_mode < 0:
@@ -156,7 +157,7 @@ def test_peak_below_zero_decides_the_mode_alone() -> None:
     """A wave whose positive peak stays below Üy moves no block, however large A is."""
     harmonics = {"amplitudes": [1.0, 0.5], "multiples": [1, 2], "phases": [0.0, 90.0]}  # 0.75 up, 1.5 down
     cell: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "waveform": "harmonics", "harmonics": harmonics}
-    still = slipsweep.sweep(**cell, amplitude=3.55, frequency=1.0, yield_acceleration=1.8)
+    still = slipsweep.sweep(**choices(**cell, amplitude=3.55, frequency=1.0, yield_acceleration=1.8))
     assert float(still.permanent_displacement) == 0.0
     assert int(still.sliding_mode) == 1
     assert displacement(**cell, amplitude=3.55, yield_acceleration=1.7) > 0.0
@@ -181,7 +182,7 @@ def test_a_million_cycles(wave: str, cell: str) -> None:
 @every_wave
 def test_frequency_enters_by_the_scaling_law_alone(wave: str) -> None:
     for cell in CELLS.values():
-        found = slipsweep.sweep(**cell, **WAVES[wave], frequency=[0.3, 1.0, 7.0], cycles=5)
+        found = slipsweep.sweep(**choices(**cell, **WAVES[wave], frequency=[0.3, 1.0, 7.0], cycles=5))
         np.testing.assert_allclose(
             found.permanent_displacement * found.frequency**2, found.permanent_displacement[1], rtol=1e-14
         )
@@ -206,7 +207,7 @@ def test_a_ramp_of_nothing_is_no_ramp(wave: str) -> None:
 def test_history_is_that_of_the_sweep(wave: str, cell: str) -> None:
     """v integrates Üg − Ü, u integrates v, and u ends where the sweep does."""
     options = {**CELLS[cell], **WAVES[wave], "frequency": 1.0, "cycles": 4}
-    found = slipsweep.simulate(**options, points_per_cycle=2048)
+    found = slipsweep.simulate(**choices(**options, points_per_cycle=2048))
     step = float(found.time[1])
     excess = (found.ground_acceleration - found.block_acceleration).values
     v, u = found.relative_velocity.values, found.relative_displacement.values
@@ -240,8 +241,8 @@ def test_a_grid_is_its_cells() -> None:
         "amplitude": [2.0, 4.0, 7.0],
         "frequency": [1.0, 2.0],
     }
-    grid = slipsweep.sweep(**axes, **WAVES["ramped harmonics"], cycles=5)
-    lazy = slipsweep.sweep(**axes, **WAVES["ramped harmonics"], cycles=5, chunks={"amplitude": 1}).compute()
+    grid = slipsweep.sweep(**choices(**axes, **WAVES["ramped harmonics"], cycles=5))
+    lazy = slipsweep.sweep(**choices(**axes, **WAVES["ramped harmonics"], cycles=5, chunks={"amplitude": 1})).compute()
     assert lazy.equals(grid)
     one = displacement(theta=5.0, mu_s=0.3, amplitude=4.0, frequency=2.0, **WAVES["ramped harmonics"], cycles=5)
     assert float(grid.permanent_displacement.sel(theta=5, mu_s=0.3, amplitude=4, frequency=2)) == one

@@ -7,27 +7,34 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from slipsweep import InputError
+from slipsweep import Cosine, Harmonics, InputError, Sine, Square, Triangle
+from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP
-from slipsweep.motion.waveforms import MOST_RAMP, Waveform, check_waveform, text_of, wave_of
+from slipsweep.motion.waveforms import MOST_RAMP, WAVEFORMS, Waveform
 
-RICH = {"amplitudes": [1.0, 0.6, 0.35, 0.2], "multiples": [1, 2, 5, 50], "phases": [0.0, 40.0, 100.0, 7.0]}
-EVERY = {
-    "sine": Waveform(),
-    "cosine": Waveform("cosine"),
-    "triangle": Waveform("triangle"),
-    "square": Waveform("square"),
-    "harmonics": check_waveform("harmonics", RICH),
-    "ramped harmonics": check_waveform("harmonics", RICH, 1.3, 0.4),
-    "ramped cosine": check_waveform("cosine", None, 0.25, 2.0),
-    "ramped triangle": check_waveform("triangle", None, 1.5, 1.25),
-    "ramped square": check_waveform("square", None, 1.5, 1.25),
-}
 CYCLES = 4
+RICH = Harmonics([1.0, 0.6, 0.35, 0.2], [1, 2, 5, 50], [0.0, 40.0, 100.0, 7.0], cycles=CYCLES)
+EVERY: dict[str, Waveform] = {
+    "sine": Sine(CYCLES),
+    "cosine": Cosine(CYCLES),
+    "triangle": Triangle(CYCLES),
+    "square": Square(CYCLES),
+    "harmonics": RICH,
+    "ramped harmonics": RICH.but(ramp_in=1.3, ramp_out=0.4),
+    "ramped cosine": Cosine(CYCLES, ramp_in=0.25, ramp_out=2.0),
+    "ramped triangle": Triangle(CYCLES, ramp_in=1.5, ramp_out=1.25),
+    "ramped square": Square(CYCLES, ramp_in=1.5, ramp_out=1.25),
+}
 each = pytest.mark.parametrize("name", EVERY)
 
 
-def defined(waveform: Waveform, phase: np.ndarray, cycles: int) -> np.ndarray:
+def terms_of(waveform: Harmonics) -> list[tuple[float, int, float]]:
+    """Amplitude, multiple and phase of each harmonic."""
+    assert waveform.phases is not None
+    return list(zip(waveform.amplitudes, waveform.multiples, waveform.phases, strict=True))
+
+
+def defined(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
     """w by its definition; harmonics not normalised."""
     turns = phase / (2 * pi)
     if waveform.name == "sine":
@@ -39,19 +46,19 @@ def defined(waveform: Waveform, phase: np.ndarray, cycles: int) -> np.ndarray:
     elif waveform.name == "square":
         w = np.where(turns % 1 < 0.5, 1.0, -1.0)
     else:
-        terms = zip(waveform.amplitudes, waveform.multiples, waveform.phases, strict=True)
-        w = sum((a * np.sin(m * phase + np.radians(p)) for a, m, p in terms), np.zeros(phase.shape))
+        assert isinstance(waveform, Harmonics)
+        w = sum((a * np.sin(m * phase + np.radians(p)) for a, m, p in terms_of(waveform)), np.zeros(phase.shape))
     envelope = np.ones(phase.shape)
     if waveform.ramp_in:
         envelope = np.minimum(envelope, turns / waveform.ramp_in)
     if waveform.ramp_out:
-        envelope = np.minimum(envelope, (cycles - turns) / waveform.ramp_out)
+        envelope = np.minimum(envelope, (waveform.cycles - turns) / waveform.ramp_out)
     return w * envelope
 
 
-def exact_peak(waveform: Waveform) -> float:
+def exact_peak(waveform: Harmonics) -> float:
     """The largest magnitude of the sum of harmonics: mpmath's root of its derivative beside a fine grid's best."""
-    terms = list(zip(waveform.amplitudes, waveform.multiples, waveform.phases, strict=True))
+    terms = terms_of(waveform)
 
     def total(phase: mpf) -> mpf:
         return mp.fsum(mpf(a) * mp.sin(m * phase + mp.radians(p)) for a, m, p in terms)
@@ -68,8 +75,10 @@ def exact_peak(waveform: Waveform) -> float:
 def test_pieces_are_the_wave(name: str) -> None:
     """1e-14 and the rounding of mφ, monotone and of one sign; harmonics of fifty times the frequency included."""
     waveform = EVERY[name]
-    wave = wave_of(waveform, CYCLES)
-    scale = exact_peak(waveform) if waveform.multiples else 1.0
+    wave = wave_of(waveform)
+    scale, fastest = 1.0, 1
+    if isinstance(waveform, Harmonics):
+        scale, fastest = exact_peak(waveform), max(waveform.multiples)
     for p in range(len(wave.pieces)):
         tau = wave.pieces[p, BEGIN] + np.linspace(0.01, 0.99, 23) * (wave.pieces[p, FINISH] - wave.pieces[p, BEGIN])
         phase = wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])
@@ -78,8 +87,8 @@ def test_pieces_are_the_wave(name: str) -> None:
         found = wave.pieces[p, TOP] + sum(
             c * tau ** (k + 1) for k, c in enumerate(wave.pieces[p, COEFFICIENTS : COEFFICIENTS + TERMS])
         )
-        error = np.abs(found - defined(waveform, phase, CYCLES) / scale).max()
-        assert error < 1e-14 + 4e-16 * max(waveform.multiples, default=1) * 8 * pi, f"piece {p}: off by {error:.1e}"
+        error = np.abs(found - defined(waveform, phase) / scale).max()
+        assert error < 1e-14 + 4e-16 * fastest * 8 * pi, f"piece {p}: off by {error:.1e}"
         assert np.all(np.diff(found) * (wave.pieces[p, LAST] - wave.pieces[p, FIRST]) >= 0), f"piece {p}: not monotone"
         assert np.all(found * (wave.pieces[p, FIRST] + wave.pieces[p, LAST]) > 0), f"piece {p}: changes its sign"
 
@@ -87,7 +96,7 @@ def test_pieces_are_the_wave(name: str) -> None:
 @each
 def test_pieces_join(name: str) -> None:
     """No phase is left out, and w jumps only where it is said to, upwards, or down."""
-    wave = wave_of(EVERY[name], CYCLES)
+    wave = wave_of(EVERY[name])
     assert wave.pieces[0, START] == 0.0
     np.testing.assert_array_equal(wave.pieces[1:, START], wave.pieces[:-1, END])
     assert wave.pieces[-1, END] == pytest.approx(2 * pi * (wave.cycle.size - 1), rel=1e-15)
@@ -105,21 +114,20 @@ def test_peak_is_exact(seed: int) -> None:
     draw = np.random.default_rng(seed)
     count = int(draw.integers(2, 7))
     multiples = draw.choice(np.arange(1, 51), count, replace=False)
-    waveform = check_waveform(
-        "harmonics",
-        {"amplitudes": draw.normal(size=count), "multiples": multiples, "phases": draw.uniform(0, 360, count)},
+    waveform = Harmonics(
+        draw.normal(size=count).tolist(), multiples.tolist(), draw.uniform(0, 360, count).tolist(), cycles=1
     )
-    wave = wave_of(waveform, 1)
+    wave = wave_of(waveform)
     assert np.abs(wave.pieces[:, TOP]).max() == 1.0
     # scaled by the peak, the coefficients give it back
     p = int(np.abs(wave.pieces[:, TOP]).argmax())
     phase = wave.pieces[p, START] if wave.pieces[p, BEGIN] == 0.0 else wave.pieces[p, END]
-    assert abs(defined(waveform, np.array([phase]), 1)[0]) == pytest.approx(exact_peak(waveform), rel=1e-13)
+    assert abs(defined(waveform, np.array([phase]))[0]) == pytest.approx(exact_peak(waveform), rel=1e-13)
 
 
 def test_stretches_of_several_maxima() -> None:
     """sin φ + 0.6 sin 5φ is above zero in one run with three maxima, and its mirror image below."""
-    wave = wave_of(check_waveform("harmonics", {"amplitudes": [1, 0.6], "multiples": [1, 5]}), 1)
+    wave = wave_of(Harmonics([1, 0.6], [1, 5], cycles=1))
     ((a, b),) = wave.stretch[:1]
     tops = [p for p in range(a, b - 1) if wave.pieces[p, FIRST] < wave.pieces[p, LAST] > wave.pieces[p + 1, LAST]]
     assert len(wave.stretch) == 3 or len(tops) == 3
@@ -128,38 +136,41 @@ def test_stretches_of_several_maxima() -> None:
 
 def test_one_plain_cycle_stands_for_all() -> None:
     """Tables do not grow with the cycles, but for ramps."""
-    assert len(wave_of(Waveform("square"), 10**9).pieces) == 4
-    long = wave_of(EVERY["ramped triangle"], 10**9)
+    assert len(wave_of(Square(10**9)).pieces) == 4
+    long = wave_of(EVERY["ramped triangle"].but(cycles=10**9))
     assert long.repeats == 10**9 - long.lead - 3
     assert len(long.pieces) == 4 * (long.lead + 4)
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("waveform", "given", "message"),
     [
-        ({"waveform": "saw"}, "waveform = 'saw'"),
-        ({"waveform": "harmonics"}, "harmonics: must be given"),
-        ({"harmonics": RICH}, "only with 'harmonics'"),
-        ({"waveform": "harmonics", "harmonics": {"amplitudes": [1.0]}}, "must have amplitudes, multiples"),
-        ({"waveform": "harmonics", "harmonics": {"amplitudes": [1.0, 2.0], "multiples": [1]}}, "harmonics.multiples"),
-        ({"waveform": "harmonics", "harmonics": {"amplitudes": [1.0], "multiples": [0]}}, "harmonics.multiples[0] = 0"),
-        ({"waveform": "harmonics", "harmonics": {"amplitudes": [1.0], "multiples": [1.5]}}, "= 1.5"),
-        ({"waveform": "harmonics", "harmonics": {"amplitudes": [0.0], "multiples": [1]}}, "must not all be 0"),
-        ({"waveform": "harmonics", "harmonics": {"amplitudes": [1, 1], "multiples": [2, 2]}}, "not be repeated"),
-        ({"waveform": "harmonics", "harmonics": "1:1:0;2"}, "amplitude:multiple:phase"),
-        ({"ramp_in": -1}, "ramp_in = -1"),
-        ({"ramp_out": MOST_RAMP + 1}, f"ramp_out = {MOST_RAMP + 1}"),
-        ({"ramp_in": float("nan")}, "ramp_in = nan"),
-        ({"ramp_in": 6, "ramp_out": 5}, "must not exceed the 10 cycles"),
+        ("saw", {}, "excitation.waveform = 'saw': must be one of 'sine'"),
+        ("harmonics", {}, "excitation.amplitudes: must be given with excitation.waveform = 'harmonics'"),
+        ("sine", {"amplitudes": [1.0]}, "only with 'harmonics'"),
+        ("harmonics", {"amplitudes": [1.0]}, "excitation.multiples: must be given"),
+        ("harmonics", {"amplitudes": [1.0, 2.0], "multiples": [1]}, "excitation.multiples: 1 numbers; must be as many"),
+        ("harmonics", {"amplitudes": [1.0], "multiples": [1], "phases": [0, 1]}, "excitation.phases: 2 numbers"),
+        ("harmonics", {"amplitudes": [1.0], "multiples": [0]}, "excitation.multiples[0] = 0"),
+        ("harmonics", {"amplitudes": [1.0], "multiples": [1.5]}, "= 1.5"),
+        ("harmonics", {"amplitudes": [0.0], "multiples": [1]}, "must not all be 0"),
+        ("harmonics", {"amplitudes": [], "multiples": []}, "excitation.amplitudes = []"),
+        ("harmonics", {"amplitudes": [1, 1], "multiples": [2, 2]}, "not be repeated"),
+        ("harmonics", {"amplitudes": "1:1:0;2", "multiples": [1]}, "excitation.amplitudes = '1:1:0;2': must be a list"),
+        ("sine", {"ramp_in": -1}, "excitation.ramp_in = -1"),
+        ("sine", {"ramp_out": MOST_RAMP + 1}, f"excitation.ramp_out = {MOST_RAMP + 1}"),
+        ("sine", {"ramp_in": float("nan")}, "excitation.ramp_in = nan"),
+        ("sine", {"ramp_in": 6, "ramp_out": 5}, "must not exceed the 10 cycles"),
     ],
 )
-def test_refused(given: dict[str, Any], message: str) -> None:
+def test_refused(waveform: str, given: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
-        check_waveform(**given)
+        WAVEFORMS.made(waveform, given, lambda key: f"excitation.{key}")
     assert message in str(error.value)
 
 
 def test_attributes_give_the_waveform_again() -> None:
     for waveform in EVERY.values():
-        assert check_waveform(**waveform.attributes) == waveform
-    assert text_of(EVERY["ramped square"].attributes) == "square wave, ramp in 1.5 cycles, ramp out 1.25 cycles"
+        assert WAVEFORMS.from_attributes(WAVEFORMS.attributes(waveform)) == waveform
+    text = "4 cycles of a square wave, ramp in 1.5 cycles, ramp out 1.25 cycles"
+    assert str(EVERY["ramped square"]) == text

@@ -1,10 +1,11 @@
 """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
 
 `sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
-inputs are uncertain, `sweep_record` solves one under a recorded motion, `friction_parameters` gives the
-paper's Eqs. 7-11, `simulate` one time history, `flags` takes a result's `validity` apart.  The model is
-that of Mendez, Romo and Botero (2012); `Validity` and
-`SlidingMode` name the codes of the results.
+inputs are uncertain, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history,
+`flags` takes a result's `validity` apart.  The shaking is a waveform (`Sine`, `Cosine`, `Triangle`,
+`Square`, `Harmonics`) or a `Record` (`read_record`); the model is that of Mendez, Romo and Botero
+(2012), `Mendez`, or `Newmark`; the solver `Cycle` or `Step`.  `Validity` and `SlidingMode` name the
+codes of the results.
 """
 
 import importlib
@@ -15,15 +16,26 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.model.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
+    from slipsweep.model.options import Cycle, Mendez, Newmark, Step
     from slipsweep.motion.records import Record, read_record
-    from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep, sweep_record
+    from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
+    from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
 
 __all__ = [
+    "Cosine",
+    "Cycle",
+    "Harmonics",
     "InputError",
+    "Mendez",
+    "Newmark",
     "Record",
     "RunError",
+    "Sine",
     "SlidingMode",
+    "Square",
+    "Step",
+    "Triangle",
     "Validity",
     "__version__",
     "flags",
@@ -33,21 +45,18 @@ __all__ = [
     "sample",
     "simulate",
     "sweep",
-    "sweep_record",
 ]
 
 #: Loaded when first used: numba and xarray take half a second to import, `--help` needs neither.
 #: No submodule may have one of these names: importing it would put the module in the function's place.
 _LAZY = {
-    "Record": "slipsweep.motion.records",
+    **dict.fromkeys(("Mendez", "Newmark", "Cycle", "Step"), "slipsweep.model.options"),
+    **dict.fromkeys(("Sine", "Cosine", "Triangle", "Square", "Harmonics"), "slipsweep.motion.waveforms"),
+    **dict.fromkeys(("Record", "read_record"), "slipsweep.motion.records"),
+    **dict.fromkeys(
+        ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
+    ),
     "flags": "slipsweep.studies.decoding",
-    "friction_parameters": "slipsweep.studies.datasets",
-    "limit_amplitude": "slipsweep.studies.datasets",
-    "read_record": "slipsweep.motion.records",
-    "sample": "slipsweep.studies.datasets",
-    "simulate": "slipsweep.studies.datasets",
-    "sweep": "slipsweep.studies.datasets",
-    "sweep_record": "slipsweep.studies.datasets",
 }
 
 

@@ -9,10 +9,9 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from slipsweep.charts.charts import set_scale
-from slipsweep.charts.style import SYMBOLS, axis_label, plain, value_text
+from slipsweep.charts.style import SYMBOLS, axis_label, model_text, plain, value_text
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
-from slipsweep.motion.waveforms import text_of
 
 #: Most curves in a panel, and panels across and down, that a page can show.
 _MOST_CURVES, _MOST_PANELS = 6, 3
@@ -138,11 +137,9 @@ def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], l
     ]
     if any(sizes[dim] > 1 for dim in fixed):
         thinned += [f"1 of {sizes[dim]} {SYMBOLS.get(dim, dim)}" for dim in fixed if sizes[dim] > 1]
-    options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
     lines = [
         ", ".join(single),
-        f"model: {', '.join(options)}; {attributes['cycles']} cycles of a {text_of(attributes)}; "
-        "circles: reached in a jump or behind a gap",
+        f"{model_text(attributes)}; circles: reached in a jump or behind a gap",
         f"shown: {', '.join(thinned)}" if thinned else "",
     ]
     return "\n".join(line for line in lines if line)

@@ -186,7 +186,7 @@ class Result:
             if name == "case":
                 allowed = f"a number or one of {', '.join(self.labels)}"
                 raise InputError(f"{self.path}: {name} = {value}: must be {allowed}") from None
-        from slipsweep.files.spec import quantity  # imports pydantic: only for values with units
+        from slipsweep.model.units import quantity
 
         # of the same unit
         parameter = name if name in PARAMETERS else "displacement_amplitude" if name == "threshold" else "mu_s"
@@ -286,11 +286,12 @@ def boundaries(table: Table) -> dict[str, Variable]:
         they depend on; NaN where the block slides under its own weight.
     """
     from slipsweep.grid.plans import plan_friction_parameters
+    from slipsweep.model.options import Mendez
 
     given = {name: table[name] for name in ("theta", "mu_s", "yield_acceleration") if name in table.coords}
     # neither depends on the amplitude, nor on what it is taken for otherwise
     found = plan_friction_parameters(
-        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, g=float(table.attrs["g"]), **given
+        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=float(table.attrs["g"])), **given
     ).solve()
     slides_at_rest = found["yield_acceleration"].values <= 0
     limit = found["limiting_acceleration"]
@@ -307,16 +308,15 @@ def boundaries(table: Table) -> dict[str, Variable]:
 def newmark(table: Table) -> Variable:
     """Permanent displacement of Newmark's block on the cells of a slice, swept anew."""
     from slipsweep.grid.plans import plan_sweep
-    from slipsweep.motion.waveforms import ATTRIBUTES
+    from slipsweep.model.options import Newmark
+    from slipsweep.motion.waveforms import WAVEFORMS
 
     drive = "displacement_amplitude" if "displacement_amplitude" in table.coords else "amplitude"
     given = ("theta", "mu_s", drive, "frequency", "yield_acceleration")
     plan = plan_sweep(
         **{name: table[name] for name in given if name in table.coords},
-        model="newmark",
-        cycles=int(table.attrs["cycles"]),
-        **{name: table.attrs[name] for name in ATTRIBUTES if name in table.attrs},
-        g=float(table.attrs["g"]),
+        model=Newmark(g=float(table.attrs["g"])),
+        excitation=WAVEFORMS.from_attributes(table.attrs),
         variables=["permanent_displacement"],
     )
     return plan.solve()["permanent_displacement"]

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from slipsweep.grid.tables import Table
+from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS
-from slipsweep.motion.waveforms import text_of
+from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -58,9 +59,14 @@ def caption(table: Table) -> str:
     parts = [value_text(name, table[name].item()) for name in single]
     attributes = table.attrs
     uncertain = [f"uncertain: {_drawn_text(attributes)}"] if "uncertain" in attributes else []
-    options = [str(attributes[name]) for name in ("model", "rise", "recoupling") if name in attributes]
-    shaking = f"{attributes['cycles']} cycles of a {text_of(attributes)}"
-    return "\n".join([", ".join(parts), *uncertain, f"model: {', '.join(options)}; {shaking}"]).strip()
+    return "\n".join([", ".join(parts), *uncertain, model_text(attributes)]).strip()
+
+
+def model_text(attributes: Mapping[str, Any]) -> str:
+    """The model and the shaking of a result: ``model: mendez, monotone, eq12; 10 cycles of a sine``."""
+    model = MODELS.from_attributes(attributes)
+    words = [model.name, *(value for value in model.options.values() if isinstance(value, str))]
+    return f"model: {', '.join(words)}; {WAVEFORMS.from_attributes(attributes)}"
 
 
 def _drawn_text(attributes: Mapping[str, Any]) -> str:

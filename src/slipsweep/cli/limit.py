@@ -78,11 +78,11 @@ def limit(
 
 def _arguments(sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None) -> dict[str, Any]:
     """Arguments of `limit_table`: those of the sweep but for the amplitude and the time stepping."""
-    from slipsweep.files.spec import quantity
+    from slipsweep.model.units import quantity
 
     if sweep.sampling is not None:
         raise InputError(f"{sweep.source}: has uncertain inputs; limits are those of a sweep without [uncertainty]")
-    skipped = ("amplitude", "displacement_amplitude", "solver", "rule", "steps_per_cycle", "variables")
+    skipped = ("amplitude", "displacement_amplitude", "solver", "variables")
     given = {name: value for name, value in sweep.arguments().items() if name not in skipped}
     g = sweep.model.g
     lengths = [quantity("--displacement", text, "displacement_amplitude", g) for text in displacement]

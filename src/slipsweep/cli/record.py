@@ -1,13 +1,16 @@
 """`slipsweep record`: a recorded motion over a grid of blocks."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 from slipsweep.cli.common import Overwrite, Quiet, echo_tally, progress_bar, typed_command
+from slipsweep.cli.options import chooses, reads_record
 from slipsweep.errors import InputError
+from slipsweep.model.options import MODELS, Model
 
 EXAMPLE = "Example: slipsweep record motion.AT2 --theta 5 --mu-s 0.3:0.6:4 --scale 0.5,1,2 -o motion.nc"
 
@@ -15,7 +18,10 @@ EXAMPLE = "Example: slipsweep record motion.AT2 --theta 5 --mu-s 0.3:0.6:4 --sca
 _MOST_POINTS = 1_000_000
 
 
+@reads_record
+@chooses(model=MODELS)
 def record(
+    *,
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="CSV (time, acceleration), PEER AT2, COSMOS or ESM text.")
     ],
@@ -26,19 +32,7 @@ def record(
     polarity: Annotated[Literal["1", "-1", "both"], typer.Option(help="Sign of the record, or both.")] = "1",
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="OUT.nc", help="File to write.")] = None,
     overwrite: Overwrite = False,
-    units: Annotated[
-        Literal["m/s2", "g", "cm/s2", "gal"] | None,
-        typer.Option(help="Unit of the file's accelerations, where it does not name it."),
-    ] = None,
-    baseline: Annotated[
-        Literal["none", "mean", "linear"], typer.Option(help="What is taken off the accelerations.")
-    ] = "none",
-    file_format: Annotated[
-        Literal["auto", "csv", "at2", "esm", "cosmos"], typer.Option("--format", help="Format of the file.")
-    ] = "auto",
-    channel: Annotated[
-        int | None, typer.Option(help="Channel of acceleration in a COSMOS file that holds several, from 1.")
-    ] = None,
+    reading: Mapping[str, Any],
     yield_acceleration: Annotated[
         str | None, typer.Option(metavar="VALUES", help="Yield accelerations, m/s² (default: Coulomb's).")
     ] = None,
@@ -51,10 +45,7 @@ def record(
     minimum_friction: Annotated[
         str | None, typer.Option(metavar="VALUES", help="Minimum friction μmin (default: Eq. 9).")
     ] = None,
-    model: Annotated[Literal["mendez", "newmark"], typer.Option(help="Model of the interface.")] = "mendez",
-    rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
-    recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
-    g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
+    model: Model,
     quiet: Quiet = False,
 ) -> None:
     """Compute the response to a recorded motion, over a grid of blocks and scales."""
@@ -74,7 +65,7 @@ def record(
     from slipsweep.grid.resources import size_text
     from slipsweep.motion.records import read_record
 
-    motion = read_record(file, units=units, baseline=baseline, file_format=file_format, channel=channel)
+    motion = read_record(file, **reading)
     if output is not None:
         outputs.check_outputs([output], overwrite, reads=[file])
 
@@ -83,13 +74,10 @@ def record(
     from slipsweep.studies.record_sweeps import plan_record
 
     plan = plan_record(
-        motion,
-        **given,
-        polarity=polarity if polarity == "both" else int(polarity),
+        excitation=motion,
         model=model,
-        rise=rise,
-        recoupling=recoupling,
-        g=g,
+        polarity=polarity if polarity == "both" else int(polarity),
+        **given,
     )
     with progress_bar(math.prod(plan.sizes.values()), quiet) as progress:
         table = plan.solve(progress)

@@ -8,6 +8,7 @@ import typer
 
 from slipsweep.cli.common import Overwrite, Quiet, echo_tally, examples, progress_bar, typed_command
 from slipsweep.errors import InputError
+from slipsweep.model.options import SOLVERS
 
 if TYPE_CHECKING:
     from slipsweep.files.spec import SweepSpec
@@ -71,7 +72,8 @@ def run(
     if solver is not None and checked.record is not None:
         raise InputError(f"--solver {solver}: not allowed with excitation.record, to which the response is exact")
     if solver is not None:
-        checked = checked.with_solver(solver)
+        same = solver == checked.solver.name  # with the options that the sweep file gives it
+        checked = checked if same else checked.with_solver(SOLVERS.of(solver))
     if output is None and checked.output.path is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; give the output's with -o or output.path")
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")

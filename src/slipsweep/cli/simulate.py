@@ -3,13 +3,16 @@
 import csv
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
+from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
+from slipsweep.model.options import MODELS, Model
 from slipsweep.model.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
     from slipsweep.grid.tables import Table
@@ -22,7 +25,9 @@ EXAMPLE = examples(
 )
 
 
+@chooses(excitation=WAVEFORMS, model=MODELS)
 def simulate(
+    *,
     theta: Annotated[float, typer.Option(help="Plane inclination, degrees.")],
     mu_s: Annotated[float, typer.Option(help="Static friction coefficient.")],
     frequency: Annotated[float, typer.Option(help="Excitation frequency, Hz.")],
@@ -35,16 +40,7 @@ def simulate(
         typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .csv, .png, .svg or .pdf; may be repeated."),
     ] = None,
     overwrite: Overwrite = False,
-    cycles: Annotated[int, typer.Option(help="Cycles of shaking.")] = 10,
-    waveform: Annotated[
-        Literal["sine", "cosine", "triangle", "square", "harmonics"], typer.Option(help="Shape of the shaking.")
-    ] = "sine",
-    harmonics: Annotated[
-        str | None,
-        typer.Option(metavar="A:M:P,...", help="Terms of harmonics: amplitude:multiple:phase in degrees, again."),
-    ] = None,
-    ramp_in: Annotated[float, typer.Option(help="Cycles over which the shaking grows.")] = 0.0,
-    ramp_out: Annotated[float, typer.Option(help="Cycles over which it fades.")] = 0.0,
+    excitation: Waveform,
     yield_acceleration: Annotated[
         float | None, typer.Option(help="Yield acceleration, m/s² (default: Coulomb's).")
     ] = None,
@@ -54,10 +50,7 @@ def simulate(
     structure_frequency: Annotated[
         float | None, typer.Option(help="Natural frequency of the structure, Hz, for the flexible_block flag.")
     ] = None,
-    model: Annotated[Literal["mendez", "newmark"], typer.Option(help="Model of the interface.")] = "mendez",
-    rise: Annotated[Literal["monotone", "literal"], typer.Option(help="Block acceleration on the rise.")] = "monotone",
-    recoupling: Annotated[Literal["eq12", "integrate"], typer.Option(help="How sliding ends.")] = "eq12",
-    g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
+    model: Model,
     points: Annotated[int, typer.Option(min=4, help="Points in time per cycle.")] = 512,
     quiet: Quiet = False,
 ) -> None:
@@ -82,20 +75,13 @@ def simulate(
         amplitude=amplitude,
         displacement_amplitude=displacement_amplitude,
         frequency=frequency,
-        cycles=cycles,
-        waveform=waveform,
-        harmonics=harmonics,
-        ramp_in=ramp_in,
-        ramp_out=ramp_out,
+        excitation=excitation,
         yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
         structure_frequency=structure_frequency,
         model=model,
-        rise=rise,
-        recoupling=recoupling,
-        g=g,
         points_per_cycle=points,
     )
     for path in paths:

@@ -27,9 +27,9 @@ from slipsweep.files import netcdf, outputs
 from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import WAVEFORMS
+from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, VALIDITY_TEXT, VALUELESS, SlidingMode, Validity
-from slipsweep.motion.waveforms import ATTRIBUTES
+from slipsweep.motion.waveforms import WAVEFORMS
 from slipsweep.studies.history import history_table
 
 #: Bytes of a page when no other number is asked for: what most mail servers let pass.
@@ -233,9 +233,10 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
         even one history fits.
     """
     table = excerpt.table
-    if table.attrs.get("waveform") not in WAVEFORMS:
+    if "waveform" not in table.attrs:
         return None
-    if int(table.attrs["cycles"]) > _CYCLES and "ramp_out" in table.attrs:
+    motion = WAVEFORMS.from_attributes(table.attrs)
+    if motion.cycles > _CYCLES and motion.ramp_out > 0.0:
         return None  # the first cycles alone have no ramp at their end
     inputs = {
         name: variable
@@ -247,7 +248,8 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
         for dim in table["permanent_displacement"].dims
         if any(dim in variable.dims for variable in inputs.values())
     }
-    cycles = min(int(table.attrs["cycles"]), _CYCLES)
+    cycles = min(motion.cycles, _CYCLES)
+    motion, model = motion.but(cycles=cycles), MODELS.from_attributes(table.attrs)
     points = _POINTS * cycles + 1
     each = len(_HISTORY) * (2 * points + 4) * _BASE64
     if each > most_bytes:
@@ -256,9 +258,6 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     keep = {dim: evenly(length, left[dim]) for dim, length in sizes.items()}
     if math.prod(left.values()) * each > most_bytes:
         return None
-    options: dict[str, Any] = {
-        name: table.attrs[name] for name in ("model", "rise", "recoupling", *ATTRIBUTES, "g") if name in table.attrs
-    }
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)
     values = np.zeros((*left.values(), len(_HISTORY), points), np.int16)
@@ -267,12 +266,8 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
         cell = {dim: int(keep[dim][i]) for dim, i in zip(keep, at, strict=True)}
         case = {name: variable.values[tuple(cell[dim] for dim in variable.dims)] for name, variable in inputs.items()}
         given: dict[str, Any] = {name: float(value) for name, value in case.items()}
-        given |= options
-        given |= {"frequency": 1.0 / (2.0 * math.pi), "cycles": cycles}
-        history = history_table(
-            times=phase,
-            **given,
-        )
+        given["frequency"] = 1.0 / (2.0 * math.pi)
+        history = history_table(times=phase, excitation=motion, model=model, **given)
         columns = np.array([history[name].values for name in _HISTORY])
         if np.isfinite(columns).all():
             largest = np.abs(columns).max(axis=1)

@@ -95,7 +95,7 @@ def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[st
             target.setncattr(name, value.encode(errors="backslashreplace"))
         elif name in ("flag_values", "flag_masks"):
             target.setncattr(name, np.asarray(value, target.dtype))
-        elif isinstance(value, int):
+        elif np.asarray(value).dtype.kind == "i":
             target.setncattr(name, np.int32(value))  # not every program reads 64-bit attributes
         else:
             target.setncattr(name, value)

@@ -6,7 +6,6 @@ know of another, turn axes into arrays and convert their units.  Every refusal i
 `InputError` of one line, ``FILE: key = VALUE: what is allowed``.
 """
 
-import json
 import math
 import re
 import tomllib
@@ -17,26 +16,30 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from slipsweep.errors import InputError
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import Read
 from slipsweep.grid.tables import Variable
-from slipsweep.model.parameters import BOUNDS, MOST_CYCLES, MOST_STEPS
+from slipsweep.model.choices import Family, declared
+from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
+from slipsweep.model.parameters import BOUNDS
 from slipsweep.model.suggest import did_you_mean
+from slipsweep.model.units import show, unit_factor
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     DIMENSION_ORDER,
+    DRAWN,
     PARAMETERS,
-    RECORD_PARAMETERS,
     RECORD_RESULTS,
     RECORD_SAMPLES,
     RESULT_DTYPES,
     RESULTS,
 )
+from slipsweep.motion.reading import Reading
 from slipsweep.motion.records import Record, read_record
-from slipsweep.motion.waveforms import check_waveform
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
     from slipsweep.studies.uncertainty import Sampling
@@ -46,14 +49,11 @@ Floats = NDArray[np.float64]
 #: Parameters that [model] may give as one number for the whole sweep.
 _MODEL_PARAMETERS = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency")
 
-#: What shakes the block without a record, which has neither; `structure_frequency` is compared with the second.
-_HARMONIC = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
-
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
-_INPUTS = PARAMETERS | {name: attrs for name, attrs in RECORD_PARAMETERS.items() if name != "polarity"}
+_INPUTS = tuple(name for name in PARAMETERS if name != "polarity")
 
 #: Keys of [excitation] that go with a record, and no other.
-_RECORD_KEYS = ("record", "units", "baseline", "format", "channel", "polarity")
+_RECORD_KEYS = ("record", *(one.name for one in declared(Reading)), "polarity")
 
 #: What stands for standard input on a command line.
 _STANDARD_INPUT = Path("-")
@@ -99,93 +99,47 @@ class Axis(_Table):
     units: Text | None = None
 
 
-class Axes(_Table):
-    """The dimensions of the grid."""
-
-    theta: Axis | None = None
-    mu_s: Axis | None = None
-    amplitude: Axis | None = None
-    displacement_amplitude: Axis | None = None
-    frequency: Axis | None = None
-    yield_acceleration: Axis | None = None
-    decay_rate: Axis | None = None
-    delta_mu: Axis | None = None
-    minimum_friction: Axis | None = None
-    structure_frequency: Axis | None = None
-    scale: Axis | None = None
-    time_scale: Axis | None = None
+def _table(name: str, about: str, fields: Mapping[str, Any]) -> Any:
+    """The schema of a table whose keys are declared elsewhere."""
+    return create_model(name, __base__=_Table, __doc__=about, **fields)
 
 
-class Case(_Table):
-    """One row of [[cases]]: parameters that change together, along the dimension ``case``."""
+#: The dimensions of the grid.
+Axes: Any = _table("Axes", "The dimensions of the grid.", dict.fromkeys(_INPUTS, (Axis | None, None)))
 
-    label: Text | None = None
-    theta: Number | None = None
-    mu_s: Number | None = None
-    amplitude: Number | None = None
-    displacement_amplitude: Number | None = None
-    frequency: Number | None = None
-    yield_acceleration: Number | None = None
-    decay_rate: Number | None = None
-    delta_mu: Number | None = None
-    minimum_friction: Number | None = None
-    structure_frequency: Number | None = None
-    scale: Number | None = None
-    time_scale: Number | None = None
+#: One row of [[cases]].
+Case: Any = _table(
+    "Case",
+    "One row of [[cases]]: parameters that change together, along the dimension ``case``.",
+    {"label": (Text | None, None)} | dict.fromkeys(_INPUTS, (Number | None, None)),
+)
 
 
-class Model(_Table):
-    """Which model, its options, and parameters that are one number for the whole sweep."""
-
-    friction: Literal["mendez", "newmark"] = "mendez"
-    rise: Literal["monotone", "literal"] = "monotone"
-    recoupling: Literal["eq12", "integrate"] = "eq12"
-    yield_acceleration: Annotated[Number | None, BeforeValidator(_coulomb_or_number)] = None
-    decay_rate: Number | None = None
-    delta_mu: Number | None = None
-    minimum_friction: Number | None = None
-    structure_frequency: Number | None = None
-    g: Annotated[Number, Field(gt=0)] = 9.81
+def _family(family: Family[Any], about: str, more: Mapping[str, Any]) -> Any:
+    """The schema of a table that names a choice and gives its options, which the choice itself checks."""
+    choice = {family.key: (Any, family.default)} | dict.fromkeys(family.options, (Any, None))
+    return _table(family.keyword.title(), about, choice | dict(more))
 
 
-class Harmonics(_Table):
-    """Terms of waveform = "harmonics", a sin(m phi + p) each; phases in degrees."""
+#: Which model, its options, and parameters that are one number for the whole sweep.
+ModelTable = _family(
+    MODELS,
+    "The model of the interface.",
+    dict.fromkeys(_MODEL_PARAMETERS, (Number | None, None))
+    | {"yield_acceleration": (Annotated[Number | None, BeforeValidator(_coulomb_or_number)], None)},
+)
 
-    amplitudes: Annotated[list[Number], Field(min_length=1)]
-    multiples: Annotated[list[Whole], Field(min_length=1)]
-    phases: list[Number] | None = None
+#: The shaking, but for its strength and its time, which are axes.
+ExcitationTable = _family(
+    WAVEFORMS,
+    "The shaking.",
+    {"record": (Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None, None)}
+    | {one.name: (Any, None) for one in declared(Reading)}
+    | {"polarity": (Literal[1, -1, "both"], 1)},
+)
 
-
-class Excitation(_Table):
-    """The shaking, but for its amplitude and frequency, or the scales of a record, which are axes."""
-
-    waveform: Literal["sine", "cosine", "triangle", "square", "harmonics"] = "sine"
-    cycles: Annotated[Whole, Field(ge=1, le=MOST_CYCLES)] = 10
-    harmonics: Harmonics | None = None
-    ramp_in: Number = 0.0
-    ramp_out: Number = 0.0
-    record: Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None = None
-    units: Literal["m/s2", "g", "cm/s2", "gal"] | None = None
-    baseline: Literal["none", "mean", "linear"] = "none"
-    format: Literal["auto", "csv", "at2", "esm", "cosmos"] = "auto"
-    channel: Annotated[Whole, Field(ge=1)] | None = None
-    polarity: Literal[1, -1, "both"] = 1
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Keyword arguments of `slipsweep.sweep`."""
-        return {**self.model_dump(exclude={"harmonics", *_RECORD_KEYS}), "harmonics": self._columns()}
-
-    def _columns(self) -> dict[str, Any] | None:
-        return None if self.harmonics is None else self.harmonics.model_dump(exclude_none=True)
-
-
-class Solver(_Table):
-    """How cells are solved; `steps_per_cycle` and `rule` matter to the step solver alone."""
-
-    method: Literal["auto", "step", "cycle"] = "auto"
-    steps_per_cycle: Annotated[Whole, Field(ge=8, le=MOST_STEPS, multiple_of=4)] | None = None
-    rule: Literal["rectangle", "trapezoid", "simpson"] = "trapezoid"
+#: How cells are solved.
+SolverTable = _family(SOLVERS, "The solver.", {})
 
 
 class Output(_Table):
@@ -201,8 +155,8 @@ class Output(_Table):
 Drawn = dict[Text, Any]
 
 
-class Uncertainty(_Table):
-    """Inputs that are drawn, how they are sampled, and the statistics wanted of the displacement."""
+class _Sampling(_Table):
+    """How inputs are sampled, and the statistics wanted of the displacement."""
 
     samples: Whole = 4096
     method: Text = "sobol"
@@ -210,19 +164,10 @@ class Uncertainty(_Table):
     quantiles: list[Number] = [0.05, 0.5, 0.95]
     thresholds: list[Any] = [0.01, 0.1, 1.0]
     correlation: list[Any] = []
-    theta: Drawn | None = None
-    mu_s: Drawn | None = None
-    amplitude: Drawn | None = None
-    displacement_amplitude: Drawn | None = None
-    frequency: Drawn | None = None
-    yield_acceleration: Drawn | None = None
-    decay_rate: Drawn | None = None
-    delta_mu: Drawn | None = None
-    minimum_friction: Drawn | None = None
 
     def sampling(self, g: float) -> "Sampling":
         """What `slipsweep.studies.uncertainty` makes of the table (InputError: what is not allowed)."""
-        from slipsweep.studies.uncertainty import DRAWN, check_sampling  # imports scipy: only for sweeps that need it
+        from slipsweep.studies.uncertainty import check_sampling  # imports scipy: only for sweeps that need it
 
         return check_sampling(
             {name: drawn for name in DRAWN if (drawn := getattr(self, name)) is not None},
@@ -237,16 +182,27 @@ class Uncertainty(_Table):
         )
 
 
-class SweepFile(_Table):
-    """A sweep file as written: its tables, defaults filled in."""
+#: Inputs that are drawn, and how.
+Uncertainty: Any = create_model(
+    "Uncertainty",
+    __base__=_Sampling,
+    **dict.fromkeys(DRAWN, (Drawn | None, None)),  # type: ignore[call-overload]
+)
 
-    axes: Axes = Axes()
-    cases: Annotated[list[Case], Field(min_length=1)] | None = None
-    model: Model = Model()
-    excitation: Excitation = Excitation()
-    solver: Solver = Solver()
-    output: Output = Output()
-    uncertainty: Uncertainty | None = None
+#: A sweep file as written: its tables, defaults filled in.
+SweepFile = _table(
+    "SweepFile",
+    "A sweep file.",
+    {
+        "axes": (Axes, Axes()),
+        "cases": (Annotated[list[Case], Field(min_length=1)] | None, None),
+        "model": (ModelTable, ModelTable()),
+        "excitation": (ExcitationTable, ExcitationTable()),
+        "solver": (SolverTable, SolverTable()),
+        "output": (Output, Output()),
+        "uncertainty": (Uncertainty | None, None),
+    },
+)
 
 
 # ----------------------------------------------------------------------- what comes out
@@ -273,12 +229,13 @@ class SweepSpec:
         Inputs in the units of `slipsweep.model.variables.PARAMETERS`.
     labels : tuple of str
         Names of the rows of [[cases]]; empty without them.
-    model, excitation, solver, output
-        The tables of the sweep file.
+    model : Mendez or Newmark
+    excitation : Waveform or Record
+    solver : Cycle or Step
+    output : Output
+        The table of the sweep file.
     sampling : Sampling or None
         What [uncertainty] says; such a sweep gives statistics of the displacement.
-    record : Record, optional
-        The motion of [excitation] record.
     files : tuple of Path or int
         The files that were read for it, by name or descriptor.
     """
@@ -288,12 +245,16 @@ class SweepSpec:
     parameters: dict[str, Parameter]
     labels: tuple[str, ...]
     model: Model
-    excitation: Excitation
+    excitation: Waveform | Record
     solver: Solver
     output: Output
     sampling: "Sampling | None" = None
-    record: Record | None = None
     files: tuple[Read, ...] = ()
+
+    @property
+    def record(self) -> Record | None:
+        """The recorded motion, where the shaking is one."""
+        return self.excitation if isinstance(self.excitation, Record) else None
 
     @property
     def shape(self) -> dict[str, int]:
@@ -315,14 +276,12 @@ class SweepSpec:
         """Bytes of all results, uncompressed."""
         return self.cells * sum(self.dtype(name).itemsize for name in self.output.variables)
 
-    def with_solver(self, method: Literal["auto", "step", "cycle"]) -> "SweepSpec":
+    def with_solver(self, solver: Solver) -> "SweepSpec":
         """Return the same sweep under another solver."""
-        return replace(self, solver=self.solver.model_copy(update={"method": method}))
+        return replace(self, solver=solver)
 
     def arguments(self, block: Mapping[str, slice] | None = None) -> dict[str, Any]:
         """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.grid.plans.plan_sweep`).
-
-        Those of a record are for `slipsweep.studies.record_sweeps.plan_record`.
 
         Parameters
         ----------
@@ -338,19 +297,12 @@ class SweepSpec:
                 arguments[name] = values[block.get(dim, slice(None))]
             else:
                 arguments[name] = Variable((dim,), values[block.get(dim, slice(None))])
-        arguments |= {"model": self.model.friction, "g": self.model.g, "variables": list(self.output.variables)}
-        if self.model.friction == "mendez":
-            arguments |= {"rise": self.model.rise, "recoupling": self.model.recoupling}
-        if self.record is not None:
-            return {"record": self.record, **arguments}
-        arguments |= {
-            **self.excitation.arguments,
-            "solver": self.solver.method,
-            "rule": self.solver.rule,
+        return arguments | {
+            "excitation": self.excitation,
+            "model": self.model,
+            "solver": self.solver,
+            "variables": list(self.output.variables),
         }
-        if self.solver.steps_per_cycle is not None:
-            arguments["steps_per_cycle"] = self.solver.steps_per_cycle
-        return arguments
 
 
 def load(path: str | Path) -> SweepSpec:
@@ -407,21 +359,20 @@ def is_stream(path: Path) -> bool:
 def _load_result(path: Path) -> SweepSpec:
     try:
         with open_netcdf(path) as file:
-            attributes = {name: str(file.getncattr(name)) for name in file.ncattrs()}
+            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
             kept = RECORD_SAMPLES.keys() <= file.variables.keys()
             times, acceleration = (np.asarray(file[name][...]) if kept else None for name in RECORD_SAMPLES)
     except OSError:
         raise InputError(f"{path}: not a netCDF file") from None
     if "sweep" not in attributes:
         raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
-    about = {name: text for name, text in attributes.items() if name == "baseline" or name.startswith("record")}
+    about = {name: str(text) for name, text in attributes.items() if name == "baseline" or name.startswith("record")}
     record = None
     if times is not None and acceleration is not None:
         record = Record(times, acceleration, about.get("record", str(path)), about)
-    spec = parse(attributes["sweep"], str(path), path.parent, record)
+    spec = parse(str(attributes["sweep"]), str(path), path.parent, record)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
-    ran: Any = attributes.get("solver", spec.solver.method)
-    return spec.with_solver(ran)
+    return spec.with_solver(SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
 
 
 def parse(text: str, source: str, folder: Path | None = None, record: Record | None = None) -> SweepSpec:
@@ -447,32 +398,47 @@ def parse(text: str, source: str, folder: Path | None = None, record: Record | N
     except ValidationError as error:
         raise InputError(f"{source}: {_one_line(_words(error))}") from None
     try:
-        sampling = file.uncertainty.sampling(file.model.g) if file.uncertainty is not None else None
-        parameters = _parameters(file, sampling)
-        _check_model(file)
-        _check_excitation(file.excitation)
-        _check_variables(file, parameters)
-        files: tuple[Read, ...] = ()
-        if file.excitation.record is not None and record is None:
-            path = (folder or Path()) / file.excitation.record
-            record, files = _read(file.excitation, path), (path,)
+        model = _chosen(MODELS, file.model, dict.fromkeys(_MODEL_PARAMETERS))
+        sampling = file.uncertainty.sampling(model.g) if file.uncertainty is not None else None
+        parameters = _parameters(file, model, sampling)
+        files = [(folder or Path()) / name for name in [file.excitation.record] if name and record is None]
+        excitation = record or _excitation(file.excitation, *files)
+        solver = _chosen(SOLVERS, file.solver, {})
+        output = _output(file, parameters)
     except InputError as error:
         raise InputError(f"{source}: {_one_line(str(error))}") from None
     labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
-    excitation, output = file.excitation, file.output
-    if excitation.record is not None and "variables" not in output.model_fields_set:
-        output = output.model_copy(update={"variables": list(RECORD_RESULTS)})
-    return SweepSpec(
-        source, text, parameters, labels, file.model, excitation, file.solver, output, sampling, record, files
-    )
+    return SweepSpec(source, text, parameters, labels, model, excitation, solver, output, sampling, tuple(files))
+
+
+def _chosen(family: Family[Any], table: BaseModel, others: Mapping[str, Any]) -> Any:
+    """The choice that a table names, with its options; `others` are keys of the table that are none."""
+    given = {name: value for name, value in table.model_dump(exclude_unset=True).items() if name not in others}
+    name = given.pop(family.key, family.default)
+    return family.made(name, given, lambda text: f"{family.keyword}.{text}")
+
+
+def _excitation(table: Any, path: Path | None = None) -> Waveform | Record:
+    """What [excitation] says: a waveform, or the record in a file."""
+    if path is None:
+        waveform: Waveform = _chosen(WAVEFORMS, table, {})
+        return waveform
+    try:
+        reading = Reading(**table.model_dump(exclude_unset=True, exclude={"record", "polarity"}))
+    except InputError as error:
+        raise InputError(f"excitation.{error}") from None
+    try:
+        return read_record(path, **reading.options)
+    except InputError as error:
+        raise InputError(f"excitation.record: {error}") from None
 
 
 # ------------------------------------------------------------- from tables to parameters
 
 
-def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Parameter]:
+def _parameters(file: Any, model: Model, sampling: "Sampling | None") -> dict[str, Parameter]:
     """Gather the inputs from [axes], [[cases]] and [model]: each once, none missing that is not drawn."""
-    _check_shaking(file)
+    _check_shaking(file, model)
     axes = {name: axis for name in _INPUTS if (axis := getattr(file.axes, name)) is not None}
     cases = _cases(file.cases or [])
     # yield_acceleration = "coulomb" is None here: it only says what holds by default
@@ -493,10 +459,11 @@ def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Param
             raise InputError(f"axes.{name}: missing: give it in [axes.{name}] or in every row of [[cases]]")
     if harmonic and not given & {"amplitude", "displacement_amplitude"}:
         raise InputError("axes.amplitude: missing: give amplitude or displacement_amplitude, in [axes] or [[cases]]")
-    if given >= {"amplitude", "displacement_amplitude"}:
-        raise InputError("axes.displacement_amplitude: not allowed beside amplitude: give one of them")
+    for other in ("displacement_amplitude", "scale"):
+        if given >= {"amplitude", other}:
+            raise InputError(f"axes.{other}: not allowed beside amplitude: give one of them")
 
-    parameters = {name: Parameter(name, _axis(name, axis, file.model.g)) for name, axis in axes.items()}
+    parameters = {name: Parameter(name, _axis(name, axis, model.g)) for name, axis in axes.items()}
     parameters |= {name: Parameter("case", values) for name, values in cases.items()}
     for name, value in numbers.items():
         if _first_bad(name, np.array([value])) is not None:
@@ -507,10 +474,10 @@ def _parameters(file: SweepFile, sampling: "Sampling | None") -> dict[str, Param
         parameters["polarity"] = (
             Parameter("polarity", np.array([1, -1])) if sign == "both" else Parameter(None, np.array(sign))
         )
-    return {name: parameters[name] for name in PARAMETERS | RECORD_PARAMETERS if name in parameters}
+    return {name: parameters[name] for name in PARAMETERS if name in parameters}
 
 
-def _check_shaking(file: SweepFile) -> None:
+def _check_shaking(file: Any, model: Model) -> None:
     """Refuse keys of a harmonic motion beside a record, and keys of a record without one."""
     given = file.excitation.model_fields_set
     if file.excitation.record is None:
@@ -523,41 +490,27 @@ def _check_shaking(file: SweepFile) -> None:
     why = "not allowed with excitation.record"
     for key in sorted(given - {*_RECORD_KEYS}):
         raise InputError(f"excitation.{key}: {why}, which is the shaking itself")
-    for name in _HARMONIC:
+    for name in ("displacement_amplitude", "frequency", "structure_frequency"):
         if place := _place(file, name):
-            instead = "; give scale, a factor on the recorded acceleration" if "amplitude" in name else ""
+            instead = "; give amplitude, or scale" if "amplitude" in name else ""
             raise InputError(f"{place}: {why}{instead}")
     if file.uncertainty is not None:
         raise InputError(f"uncertainty: {why}; draw the inputs of a harmonic motion")
     for key in sorted(file.solver.model_fields_set):
         raise InputError(f"solver.{key}: {why}, to which the response is exact")
     for name in ("decay_rate", "delta_mu", "minimum_friction"):
-        if file.model.friction == "newmark" and (place := _place(file, name)):
+        if isinstance(model, Newmark) and (place := _place(file, name)):
             raise InputError(f'{place}: not allowed with friction = "newmark", which has no friction law')
 
 
-def _place(file: SweepFile, name: str) -> str | None:
+def _place(file: Any, name: str) -> str | None:
     """Where an input is given first, as errors name it."""
     rows = {f"cases[row {number}]": row for number, row in enumerate(file.cases or (), 1)}
     tables: dict[str, BaseModel] = {"axes": file.axes, **rows, "model": file.model}
     return next((f"{key}.{name}" for key, table in tables.items() if getattr(table, name, None) is not None), None)
 
 
-def _read(excitation: Excitation, path: Path) -> Record:
-    """Read the record of a sweep file."""
-    try:
-        return read_record(
-            path,
-            units=excitation.units,
-            baseline=excitation.baseline,
-            file_format=excitation.format,
-            channel=excitation.channel,
-        )
-    except InputError as error:
-        raise InputError(f"excitation.record: {error}") from None
-
-
-def _cases(rows: list[Case]) -> dict[str, Floats]:
+def _cases(rows: list[Any]) -> dict[str, Floats]:
     """Return the columns of [[cases]]."""
     if not rows:
         return {}
@@ -627,29 +580,18 @@ def _first_bad(name: str, values: Floats) -> int | None:
     return int(bad[0]) if bad.size else None
 
 
-def _check_model(file: SweepFile) -> None:
-    if file.model.friction == "newmark":
-        for key in sorted(file.model.model_fields_set & {"rise", "recoupling"}):
-            value = getattr(file.model, key)
-            raise InputError(f'model.{key} = "{value}": not allowed with friction = "newmark"')
-
-
-def _check_excitation(excitation: Excitation) -> None:
-    try:
-        check_waveform(**excitation.arguments)
-    except InputError as error:
-        raise InputError(f"excitation.{error}") from None
-
-
-def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> None:
+def _output(file: Any, parameters: Mapping[str, Parameter]) -> Output:
+    """The table [output]; under a record all results are returned if none are named."""
+    output: Output = file.output
+    if "variables" not in output.model_fields_set:
+        named = RECORD_RESULTS if file.excitation.record is not None else DEFAULT_RESULTS
+        return output.model_copy(update={"variables": list(named)})
     variables = file.output.variables
-    if file.uncertainty is not None and "variables" in file.output.model_fields_set:
+    if file.uncertainty is not None:
         raise InputError("output.variables: not allowed beside [uncertainty], which has statistics as its results")
     known = RESULTS if file.excitation.record is None else RECORD_RESULTS
-    if "variables" not in file.output.model_fields_set:
-        return
     for number, name in enumerate(variables, 1):
-        where = f"output.variables[entry {number}] = {_show(name)}"
+        where = f"output.variables[entry {number}] = {show(name)}"
         if name not in known:
             raise InputError(f"{where}: unknown variable; {did_you_mean(name, tuple(known))}")
         if name in parameters:
@@ -660,89 +602,7 @@ def _check_variables(file: SweepFile, parameters: Mapping[str, Parameter]) -> No
                 raise InputError(f"{where}: is a coordinate of the result already, as d and f do not span a grid")
         if name in variables[: number - 1]:
             raise InputError(f"{where}: must not be repeated")
-
-
-# --------------------------------------------------------------------------------- units
-
-#: Spellings of each parameter's own unit that need no units library.
-_OWN_UNITS = {
-    "degree": ("degree", "degrees", "deg"),
-    "m s-2": ("m s-2", "m/s2", "m/s^2", "m/s**2"),
-    "Hz": ("Hz",),
-    "m": ("m",),
-    "1": ("1",),
-}
-
-#: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
-_FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
-_UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
-
-
-def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
-    """Return what to multiply a number in `units` by, to have it in the parameter's own unit.
-
-    `key` is what the units are called in errors.
-    "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
-    meant against the gravity that the block feels.
-    """
-    own = _INPUTS[name]["units"]
-    if units is None or units in _OWN_UNITS[own]:
-        return 1.0
-    if own == "m s-2" and units == "g":
-        return g
-
-    refusal = InputError(f"{key} = {_show(units)}: must be a unit that converts to {own}")
-    # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
-    text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
-    if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
-        raise refusal
-
-    import pint  # only here: it takes 0.2 s to import
-
-    registry = pint.get_application_registry()
-    target = "m/s**2" if own == "m s-2" else own
-    try:
-        quantity = registry.Quantity(1.0, text)
-        root = quantity.to_root_units().units
-        # Pint lets radians pass for pure numbers.  Here a slope in percent is no angle, and
-        # 60 rpm or 2 pi rad/s is 1 Hz: one turn a cycle.
-        if own == "Hz" and "radian" in str(root):
-            target = "turn/s"
-        if root != registry.Quantity(1.0, target).to_root_units().units:
-            raise refusal
-        return float(quantity.to(target).magnitude)
-    except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError):
-        raise refusal from None
-
-
-def quantity(key: str, text: str, parameter: str, g: float) -> float:
-    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit.
-
-    Parameters
-    ----------
-    key : str
-        What to call it in errors.
-    text : str
-        A number and, unless it is in the parameter's own unit, a unit as in `Axis.units`.
-    parameter : str
-        A parameter (`slipsweep.model.variables.PARAMETERS`) of the same unit.
-    g : float
-        What "g" as a unit of acceleration stands for, m/s².
-
-    Raises
-    ------
-    InputError
-        It is not a number, or its unit does not convert.
-    """
-    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
-    own = PARAMETERS[parameter]["units"]
-    refusal = InputError(f"{key} = {_show(text)}: must be a number, with a unit that converts to {own} if in another")
-    if found is None:
-        raise refusal
-    try:
-        return float(found[1]) * unit_factor(key, parameter, found[2] or None, g)
-    except InputError:
-        raise refusal from None
+    return output
 
 
 # --------------------------------------------------------------------- errors into words
@@ -764,7 +624,7 @@ def _words(error: ValidationError) -> str:
     message = {"model_type": "must be a table", "list_type": "must be a list"}.get(kind, message)
     message = re.sub("^(Input|String|List) should", "must", message.removeprefix("Value error, "))
     message = message.removesuffix(" after validation, not 0")
-    return f"{key} = {_show(found['input'])}: {message}"
+    return f"{key} = {show(found['input'])}: {message}"
 
 
 def _keys_beside(location: tuple[int | str, ...]) -> tuple[str, ...]:
@@ -788,9 +648,3 @@ def _one_line(message: str) -> str:
     """Escape what a terminal would not print as it stands (a file may hold control characters), and cut the rest."""
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
     return text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 3]}..."
-
-
-def _show(value: object) -> str:
-    """Write a value as TOML would, on one line of bearable length."""
-    text = json.dumps(value, ensure_ascii=False, default=str)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -13,6 +13,7 @@ from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import RESULT_DTYPES
+from slipsweep.motion.records import Record
 
 if TYPE_CHECKING:
     from slipsweep.grid.plans import Plan
@@ -106,7 +107,7 @@ def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
 
 def cells_shared(spec: SweepSpec, workers: int | None) -> int:
     """Return how many cells a block should have for workers to share a sweep evenly (None: a number unknown)."""
-    solver = "record" if spec.record is not None else "step" if spec.solver.method == "step" else "cycle"
+    solver = "record" if spec.record is not None else spec.solver.name
     share = spec.cells // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
     return min(default_cells(spec), max(_LEAST_CELLS[solver], share))
 
@@ -174,7 +175,7 @@ class _Memory:
 def plan_of(arguments: Mapping[str, Any]) -> "Plan":
     """Return the plan of a sweep, harmonic or under a record, from `SweepSpec.arguments`."""
     # both import numba: not for `info`, and not to be counted as computing time
-    if "record" in arguments:
+    if isinstance(arguments.get("excitation"), Record):
         from slipsweep.studies.record_sweeps import plan_record
 
         return plan_record(**arguments)

@@ -21,8 +21,11 @@ from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
+from slipsweep.model.options import Mendez, Model, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
-from slipsweep.motion.waveforms import Waveform, peak_acceleration, wave_of
+from slipsweep.motion.cutting import wave_of
+from slipsweep.motion.records import Record
+from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -48,35 +51,24 @@ Empty = Callable[[tuple[int, ...], str], NDArray[Any]]
 
 @dataclass(frozen=True)
 class Problem:
-    """What all cells of a grid share: the options of `slipsweep.sweep`, checked."""
+    """What all cells of a grid share: what `slipsweep.sweep` was asked to solve, and how."""
 
-    waveform: Waveform
-    model: str
-    rise: str
-    recoupling: str
-    cycles: int
-    solver: str
-    rule: str
-    steps_per_cycle: int
-    g: float
+    model: Model
+    excitation: Waveform | Record
+    solver: Solver
 
     def options(self, wants_peak: bool) -> Options:
         """The options as the kernels want them."""
-        newmark = self.model == "newmark"
+        model, solver = self.model, self.solver if isinstance(self.solver, Step) else Step()
         return Options(
-            rise=physics.NEWMARK if newmark else RISES[self.rise],
-            recoupling=physics.INTEGRATE if newmark else RECOUPLINGS[self.recoupling],
-            cycles=self.cycles,
-            rule=RULES[self.rule],
-            steps_per_cycle=self.steps_per_cycle,
+            rise=RISES[model.rise] if isinstance(model, Mendez) else physics.NEWMARK,
+            recoupling=RECOUPLINGS[model.recoupling] if isinstance(model, Mendez) else physics.INTEGRATE,
+            cycles=self.excitation.cycles if isinstance(self.excitation, Waveform) else 1,
+            rule=RULES[solver.rule],
+            steps_per_cycle=solver.steps_per_cycle,
             wants_peak=wants_peak,
-            g=self.g,
+            g=model.g,
         )
-
-
-def solver_of(problem: Problem) -> str:
-    """The solver that a problem is given to: "auto" takes "cycle", faster and exact to rounding for every waveform."""
-    return "cycle" if problem.solver == "auto" else problem.solver
 
 
 def cell_inputs(arrays: Mapping[str, Array], dimensions: int) -> list[Array]:
@@ -178,7 +170,7 @@ def _solve_into(
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
     scaled = scaled_dimension(shape, inputs, frequency)
     # what is out of the ordinary is looked at, for which flags are wanted in any case
-    ordinary = all(map(is_ordinary, (np.array(problem.g), *inputs[1:], frequency)))
+    ordinary = all(map(is_ordinary, (np.array(problem.model.g), *inputs[1:], frequency)))
     flags = results.get("validity", np.empty(0 if ordinary else shape, RESULT_DTYPES["validity"]))
     grid = layout(shape, scaled, [*inputs, frequency])
     displacement, velocity, mode = (
@@ -188,19 +180,21 @@ def _solve_into(
     periods = flat(1.0 / (2.0 * math.pi * frequency))
     rows = tuple(flat(values) for values in inputs)
     options = problem.options("peak_relative_velocity" in results)
-    wave = wave_of(problem.waveform, problem.cycles)
+    motion = problem.excitation
+    assert isinstance(motion, Waveform)
+    wave = wave_of(motion)
     # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
     work_per_cell = 1 + grid.frequencies // 32
-    if solver_of(problem) == "step":
-        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, problem.steps_per_cycle)
-        work_per_cell += problem.steps_per_cycle // 16
+    if isinstance(problem.solver, Step):
+        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle)
+        work_per_cell += options.steps_per_cycle // 16
 
     def work(first: int, last: int) -> None:
-        if solver_of(problem) == "step":
+        if isinstance(problem.solver, Step):
             kernel(grid, first, last, rows, periods, options, steps, targets)
         else:
             stretches = np.array([[first, last]])
-            if problem.waveform.is_sine:
+            if motion == Sine(motion.cycles):  # without ramps: shorter ways
                 rest = np.empty(((last - first + 1) // 2, 2), np.int64)
                 stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
             if stretches.size:
@@ -211,7 +205,7 @@ def _solve_into(
     if math.prod(shape):
         threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
     if not ordinary:
-        check_served(problem.g, arrays, results, flags)
+        check_served(problem.model.g, arrays, results, flags)
     if targets.unsolved[0] >= 0:
         raise RunError(_unsolved(int(targets.unsolved[0]), grid, scaled, shape, arrays))
     if "structure_frequency" in arrays and "validity" in results:
@@ -288,7 +282,7 @@ def estimates(
         found = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
         shaped = {name: found[name].reshape(sizes) for name in wanted}
         if checked:
-            check_served(problem.g, own, shaped, found["validity"].reshape(sizes))
+            check_served(problem.model.g, own, shaped, found["validity"].reshape(sizes))
         for name, values in shaped.items():
             if checked and values.dtype.kind == "f":
                 values[np.isinf(values)] = math.nan  # of a cell without a value

@@ -6,7 +6,7 @@ A task can be cut into parts; solved at once or part by part, it gives the same 
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,36 +18,23 @@ from slipsweep.grid import engine
 from slipsweep.grid.engine import MOTION_RESULTS, Problem
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import (
-    BOUNDS,
-    MODELS,
-    MOST_CYCLES,
-    MOST_STEPS,
-    RECOUPLINGS,
-    RISES,
-    RULES,
-    SOLVERS,
-    STEPS_PER_CYCLE,
-    check_choice,
-    check_choices,
-    check_given,
-    check_progress,
-    check_single,
-    check_values,
-    check_whole,
-    number_text,
-)
+from slipsweep.model.options import MODELS, SOLVERS, Cycle
+from slipsweep.model.parameters import BOUNDS, check_choices, check_given, check_progress, check_values, number_text
+from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     DIMENSION_ORDER,
     FRICTION_PARAMETERS,
     PARAMETERS,
+    RECORD_INPUTS,
     RECORD_RESULTS,
     REFERENCE,
     RESULT_DTYPES,
     RESULTS,
+    WAVEFORM_INPUTS,
 )
-from slipsweep.motion.waveforms import check_waveform, peak_acceleration
+from slipsweep.motion.records import Record
+from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
@@ -158,12 +145,14 @@ class Plan:
         return Table(self.coords, {name: found[name] for name in self.names}, self.attrs)
 
 
-def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
-    """Plan of a sweep.
+def plan_sweep(
+    *, excitation: Any = "sine", model: Any = "mendez", solver: Any = "auto", variables: Any = None, **given: Any
+) -> Plan:
+    """Plan of a sweep under a waveform.
 
     Parameters
     ----------
-    variables, given
+    excitation, model, solver, variables, given
         Keyword arguments of `slipsweep.sweep` but for `chunks` and `progress`; arrays with
         dimensions of their own are `Variable` instead of DataArray.
 
@@ -172,11 +161,12 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
     InputError
         As `slipsweep.sweep`.
     """
-    parameters = {name: given.pop(name) for name in PARAMETERS if given.get(name) is not None}
+    problem = check_problem(WAVEFORMS.of(excitation), model, solver)
+    parameters = {name: values for name, values in given.items() if values is not None}
+    check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
     if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
         raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
     check_given(parameters, ("theta", "mu_s", "frequency"))
-    problem = check_options(**{name: value for name, value in given.items() if name not in PARAMETERS})
     wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
     coords = checked(parameters)
     sizes = grid_sizes(coords)
@@ -208,56 +198,46 @@ def plan_sweep(*, variables: Sequence[str] | None = None, **given: Any) -> Plan:
         coords,
         tuple(tasks),
         tuple(name for name in wanted if name in motion + friction + amplitude),
-        _attributes("Permanent displacement of a rigid block, swept", problem),
+        about("Permanent displacement of a rigid block, swept", problem),
     )
 
 
-def plan_friction_parameters(*, g: float, **given: Any) -> Plan:
+def plan_friction_parameters(*, model: Any = "mendez", **given: Any) -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
-    problem = check_options(g=g)
+    problem = check_problem("sine", model, "auto")
     check_given(given, ("theta", "mu_s", "amplitude"))
     coords = checked({name: values for name, values in given.items() if values is not None})
     names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
-    attrs = {"title": "Friction parameters", **_SOURCE, "g": problem.g}
+    attrs = {"title": "Friction parameters", **_SOURCE, **MODELS.attributes(problem.model)}
     return Plan(task.sizes, coords, (task,), names, attrs)
 
 
-def check_options(
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    waveform: str = "sine",
-    harmonics: Mapping[str, Sequence[float]] | str | None = None,
-    ramp_in: float = 0.0,
-    ramp_out: float = 0.0,
-    cycles: int = 10,
-    solver: str = "auto",
-    steps_per_cycle: int = STEPS_PER_CYCLE,
-    rule: str = "trapezoid",
-    g: float = 9.81,
-) -> Problem:
-    """The options of `slipsweep.sweep`, checked (InputError names the one that is not allowed)."""
-    cycles = check_whole("cycles", cycles, 1, MOST_CYCLES)
-    return Problem(
-        waveform=check_waveform(waveform, harmonics, ramp_in, ramp_out, cycles),
-        model=check_choice("model", model, MODELS),
-        rise=check_choice("rise", rise, RISES),
-        recoupling=check_choice("recoupling", recoupling, RECOUPLINGS),
-        cycles=cycles,
-        solver=check_choice("solver", solver, SOLVERS),
-        rule=check_choice("rule", rule, RULES),
-        steps_per_cycle=check_whole("steps_per_cycle", steps_per_cycle, 8, MOST_STEPS, multiple_of=4),
-        g=check_single("g", g),
-    )
+def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
+    """What is to be solved, and how; each is an object, or the name of one with its defaults."""
+    motion = excitation if isinstance(excitation, Record) else WAVEFORMS.of(excitation)
+    chosen = SOLVERS.of(solver)
+    if isinstance(motion, Record) and not isinstance(chosen, Cycle):
+        raise InputError(f"solver = {chosen}: not allowed with a Record, to which Cycle() is exact")
+    return Problem(MODELS.of(model), motion, chosen)
 
 
-def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]] = PARAMETERS) -> dict[str, Variable]:
-    """Every parameter as a float64 array with named dimensions, within its bounds, described as in `known`."""
+def check_inputs(given: Collection[str], shaking: Collection[str], what: str) -> None:
+    """Refuse inputs of another kind of shaking."""
+    others = {*WAVEFORM_INPUTS, *RECORD_INPUTS} - {*shaking}
+    for name in given:
+        if name not in PARAMETERS:
+            raise InputError(f"{name}: unknown; {did_you_mean(name, tuple(PARAMETERS))}")
+        if name in others:
+            raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
+
+
+def checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
+    """Every parameter as a float64 array with named dimensions, within its bounds, described."""
     checked = {}
     for name, given in parameters.items():
         if isinstance(given, Variable):
-            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **known[name]})
+            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
             if len(set(given.dims)) < len(given.dims):
                 raise InputError(f"{name}: dimensions {', '.join(given.dims)}: must be named each once")
         else:
@@ -267,7 +247,7 @@ def checked(parameters: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]
                     f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
                     "that names its dimensions"
                 )
-            variable = Variable((name,) if values.ndim else (), values, known[name])
+            variable = Variable((name,) if values.ndim else (), values, PARAMETERS[name])
         if variable.values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = variable
@@ -349,32 +329,11 @@ def check_memory(sizes: Mapping[str, int], needed: int) -> None:
 _SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 
-def _attributes(title: str, problem: Problem) -> dict[str, Any]:
-    """What the results of a sweep say of themselves."""
-    attributes: dict[str, Any] = {
-        "title": title,
-        **_SOURCE,
-        "g": problem.g,
-        "model": problem.model,
-        **problem.waveform.attributes,
-        "cycles": problem.cycles,
-    }
-    if problem.model == "mendez":
-        attributes |= {"rise": problem.rise, "recoupling": problem.recoupling}
-    attributes["solver"] = engine.solver_of(problem)
-    if attributes["solver"] == "step":
-        attributes |= {"rule": problem.rule, "steps_per_cycle": problem.steps_per_cycle}
-    return attributes
-
-
-def record_attributes(problem: Problem, name: str, read: Mapping[str, str]) -> dict[str, Any]:
-    """What the results of a recorded motion say of themselves; `read` is how the record was read."""
-    attributes = {
-        "title": "Response of a rigid block to a recorded motion",
-        **_SOURCE,
-        "g": problem.g,
-        "model": problem.model,
-        "record": name,
-        **read,
-    }
-    return attributes | ({} if problem.model == "newmark" else {"rise": problem.rise, "recoupling": problem.recoupling})
+def about(title: str, problem: Problem) -> dict[str, Any]:
+    """What results say of themselves: the choices read back from it are those of the problem."""
+    motion = problem.excitation
+    if isinstance(motion, Record):
+        shaking = {"record": motion.name, **motion.attrs}
+    else:
+        shaking = WAVEFORMS.attributes(motion) | SOLVERS.attributes(problem.solver)
+    return {"title": title, **_SOURCE, **MODELS.attributes(problem.model), **shaking}

@@ -1,7 +1,10 @@
 """What a caller gives, checked: one clear message for the first thing that cannot be.
 
 `sweep`, `friction_parameters`, `simulate` and the sweep-file schema share these bounds.
+NumPy is imported where it is needed: the command line's options, hence `slipsweep --help`, come from here.
 """
+
+from __future__ import annotations
 
 import math
 import sys
@@ -9,12 +12,13 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class Bound:
 
     def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which values lie in the interval (NaN and infinity never do)."""
+        import numpy as np
+
         above = values >= self.low if self.includes_low else values > self.low
         return np.asarray(above & (values <= self.high if self.includes_high else values < self.high))
 
@@ -69,13 +75,6 @@ BOUNDS: dict[str, Bound] = {
     "threshold": _AMOUNT,
 }
 
-MODELS = ("mendez", "newmark")
-RISES = ("monotone", "literal")
-RECOUPLINGS = ("eq12", "integrate")
-WAVEFORMS = ("sine", "cosine", "triangle", "square", "harmonics")
-SOLVERS = ("auto", "step", "cycle")
-RULES = ("rectangle", "trapezoid", "simpson")
-
 #: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (docs/speed.md).
 STEPS_PER_CYCLE = 1024
 
@@ -91,6 +90,8 @@ def number_text(value: float) -> str:
 
 def shown(value: Any) -> str:
     """A value as an error shows it: one line, and not a long one."""
+    import numpy as np
+
     with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
         text = " ".join(repr(value).split())
     return text if len(text) <= 160 else f"{text[:157]}..."
@@ -104,6 +105,8 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     InputError
         They are no real numbers, or entries of them are masked: a masked entry has a number, but means none.
     """
+    import numpy as np
+
     array: Any = computed(values)
     among = array if isinstance(array, (list, tuple)) else [array]
     masked = sum(int(np.ma.count_masked(one)) for one in among if isinstance(one, np.ma.MaskedArray))
@@ -140,6 +143,8 @@ def check_single(name: str, value: Any, key: str | None = None) -> float:
 
 def check_finite(key: str, value: Any) -> float:
     """Return a single finite number of whatever sign."""
+    import numpy as np
+
     try:
         number = check_numbers(key, value)
     except InputError:

@@ -113,7 +113,20 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "delta_mu": {"units": "1", "long_name": "friction above static"},
     "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient"},
     "structure_frequency": {"units": "Hz", "long_name": "natural frequency of the structure"},
+    "scale": {"units": "1", "long_name": "scale factor of the recorded acceleration"},
+    "time_scale": {"units": "1", "long_name": "factor on the time of the record"},
+    "polarity": {"units": "1", "long_name": "sign that the recorded acceleration is taken with"},
 }
+
+#: Inputs that the shaking has if it is a waveform, and if it is a record.
+WAVEFORM_INPUTS = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
+RECORD_INPUTS = ("amplitude", "scale", "time_scale", "polarity")
+
+#: Inputs that may be drawn: all that the displacement depends on.
+DRAWN = (
+    "theta", "mu_s", "amplitude", "displacement_amplitude", "frequency",
+    "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
+)  # fmt: skip
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
@@ -168,13 +181,6 @@ LIMIT_RESULTS: dict[str, dict[str, Any]] = {
         "long_name": "permanent displacement, downslope, at the limit amplitude",
         "ancillary_variables": "validity",
     },
-}
-
-#: Inputs that a recorded motion has beside the block's own.
-RECORD_PARAMETERS: dict[str, dict[str, Any]] = {
-    "scale": {"units": "1", "long_name": "scale factor of the recorded acceleration"},
-    "time_scale": {"units": "1", "long_name": "factor on the time of the record"},
-    "polarity": {"units": "1", "long_name": "sign that the recorded acceleration is taken with"},
 }
 
 #: Results of a record, beside the displacement, the velocity and the validity: -1 where there is no value.

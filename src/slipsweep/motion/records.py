@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_choice, check_finite, check_numbers, check_whole, shown
+from slipsweep.model.parameters import check_finite, check_numbers, shown
+from slipsweep.motion.reading import Reading
 
 Floats = NDArray[np.float64]
 
@@ -40,9 +41,6 @@ UNITS: dict[str, float] = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "cm/s2": 0.01, "g
 
 #: A day of acceleration at 100 samples a second; what is larger is no record.
 MOST_BYTES = 200_000_000
-
-BASELINES = ("none", "mean", "linear")
-FORMATS = ("auto", "csv", "at2", "esm", "cosmos")
 
 #: Codes of units in COSMOS files that are accelerations (Table 2 of the format).
 _COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
@@ -111,7 +109,7 @@ class Record:
 
     def corrected(self, baseline: str) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
-        check_choice("baseline", baseline, BASELINES)
+        Reading(baseline=baseline)  # type: ignore[arg-type]
         shape = self.acceleration
         with np.errstate(all="ignore"):  # what is not finite then is refused
             if baseline == "mean":
@@ -126,7 +124,7 @@ def read_record(
     *,
     units: str | None = None,
     baseline: str = "none",
-    file_format: str = "auto",
+    format: str = "auto",
     channel: int | None = None,
 ) -> Record:
     """Read a recorded acceleration from a file.
@@ -139,7 +137,7 @@ def read_record(
         that contradicts the file's own is refused.  "g" is standard gravity, 9.80665 m/s².
     baseline : {"none", "mean", "linear"}
         What is taken off the accelerations.
-    file_format : {"auto", "csv", "at2", "esm", "cosmos"}
+    format : {"auto", "csv", "at2", "esm", "cosmos"}
         "auto" looks into the file.
     channel : int, optional
         Which channel of acceleration in a COSMOS file, from 1; needed where it holds several.
@@ -157,12 +155,7 @@ def read_record(
         path = Path(path)
     except TypeError:
         raise InputError(f"path = {shown(path)}: must be a path") from None
-    check_choice("baseline", baseline, BASELINES)
-    check_choice("file_format", file_format, FORMATS)
-    if units is not None:
-        check_choice("units", units, UNITS)
-    if channel is not None:
-        channel = check_whole("channel", channel, 1)
+    channel = Reading(units, baseline, format, channel).channel  # type: ignore[arg-type]
     try:
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
@@ -174,7 +167,7 @@ def read_record(
         raise InputError(f"{path}: more than {MOST_BYTES} bytes: a record must have that many at most")
     # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
-    kind = _format_of(lines) if file_format == "auto" else file_format
+    kind = _format_of(lines) if format == "auto" else format
     if kind == "cosmos":
         times, values, own = _read_cosmos(path, lines, channel)
     elif channel is not None:

@@ -57,7 +57,7 @@ def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
     return {
         "sweep file": spec.text,
         **({"record": checksum(samples)} if samples else {}),
-        "solver": spec.solver.method,
+        "solver": repr(spec.solver),
         "--split": split,
         "checksums": "XXH3-128",
         **installation(),

@@ -15,20 +15,19 @@ import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
-from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
+from slipsweep.grid.blocks import plan_of
+from slipsweep.grid.plans import Plan, Task, plan_friction_parameters
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import STEPS_PER_CYCLE, computed, shown
-from slipsweep.model.variables import RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.model.options import MODELS, Model, Solver
+from slipsweep.model.parameters import computed, shown
+from slipsweep.model.variables import PARAMETERS, RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.records import Record
+from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies.history import history_table
 from slipsweep.studies.limits import AMPLITUDE_STEPS, limit_table
-from slipsweep.studies.record_sweeps import plan_record
 
 #: What a caller may give for a parameter.
 Values = float | Sequence[float] | np.ndarray | xr.DataArray
-
-#: A sum of harmonics, by columns.
-Harmonics = Mapping[str, Sequence[float]]
 
 
 def sweep(
@@ -37,24 +36,18 @@ def sweep(
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
+    excitation: Waveform | Record | str = "sine",
+    model: Model | str = "mendez",
+    solver: Solver | str = "auto",
     displacement_amplitude: Values | None = None,
-    cycles: int = 10,
+    scale: Values | None = None,
+    time_scale: Values | None = None,
+    polarity: int | Sequence[int] | str | None = None,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
     structure_frequency: Values | None = None,
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    waveform: str = "sine",
-    harmonics: Harmonics | None = None,
-    ramp_in: float = 0.0,
-    ramp_out: float = 0.0,
-    solver: str = "auto",
-    steps_per_cycle: int = STEPS_PER_CYCLE,
-    rule: str = "trapezoid",
-    g: float = 9.81,
     variables: Sequence[str] | None = None,
     chunks: Any = None,
     progress: Callable[[int], None] | None = None,
@@ -72,46 +65,38 @@ def sweep(
     mu_s : float, array or DataArray
         Static friction coefficient, > 0.
     amplitude : float, array or DataArray
-        Peak ground acceleration A, m/s², ≥ 0.
+        Peak ground acceleration A, m/s², ≥ 0; a record is scaled to it.
     frequency : float, array or DataArray
-        Excitation frequency, Hz, > 0.
+        Excitation frequency, Hz, > 0; not with a record.
+    excitation : Sine, Cosine, Triangle, Square, Harmonics, Record or str
+        What the plane does; "sine", "cosine", "triangle" and "square" stand for ten cycles without ramps.
+    model : Mendez, Newmark or str
+        The paper's friction law, or the classical rigid block; "mendez", "newmark".
+    solver : Cycle, Step or str
+        Event by event, exact to rounding, or time stepping; "auto" takes "cycle".
     displacement_amplitude : float, array or DataArray
         Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.  The result has A as a
         coordinate, but where d and `frequency` span a grid: there it is a result to ask for.
-    cycles : int
-        Whole cycles of shaking, from rest.
+    scale : float, array or DataArray
+        With a record: factor on its acceleration, > 0, instead of `amplitude`; by default 1.
+    time_scale : float, array or DataArray
+        With a record: factor on its time, > 0; 2 makes it last twice as long.
+    polarity : {1, -1}, list of these, or "both"
+        With a record: 1 takes its positive accelerations for those that move the block downslope, -1
+        its negative ones.
     yield_acceleration : float, array or DataArray, optional
         Üy, m/s²; by default Coulomb's, g tan(φs − θ).
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11).
+        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under a
+        record every pulse has from its own peak.
     structure_frequency : float, array or DataArray, optional
-        Natural frequency of the sliding structure, Hz, for the `flexible_block` flag.
-    model : {"mendez", "newmark"}
-        The paper's friction law, or the classical rigid block.
-    rise : {"monotone", "literal"}
-        Stick-slip rise of the block's acceleration: not below the yield value and never
-        falling, or Eq. 4 as printed.
-    recoupling : {"eq12", "integrate"}
-        After the plane's acceleration has reversed: Eq. 12, or integration until the stop.
-    waveform : {"sine", "cosine", "triangle", "square", "harmonics"}
-        Shape of the ground acceleration, of peak A.
-    harmonics : mapping, optional
-        With "harmonics": ``amplitudes``, ``multiples`` (of the frequency, whole numbers) and
-        ``phases`` (degrees; 0 if left out) of its terms a sin(mφ + p).  Their scale does not
-        matter: the sum's largest magnitude is A.
-    ramp_in, ramp_out : float
-        Cycles at the beginning and at the end over which the shaking grows and fades linearly.
-    solver : {"auto", "cycle", "step"}
-        Event by event, or time stepping.  "auto" takes "cycle".
-    steps_per_cycle : int
-        Steps of the "step" solver, a multiple of 4, at least 8.
-    rule : {"trapezoid", "rectangle", "simpson"}
-        Rule of the "step" solver; orders 2, 1 and 4.
-    g : float
-        Gravity, m/s².
+        Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a record.
     variables : sequence of str, optional
         Results to compute: `permanent_displacement`, `peak_relative_velocity`,
-        `sliding_mode`, `validity` (these by default), the parameters of Eqs. 7-11, and `amplitude`.
+        `sliding_mode`, `validity` (these by default), the parameters of Eqs. 7-11, and `amplitude`.  Under a record
+        `permanent_displacement`, `peak_relative_velocity`, `number_of_slips` (that begin at rest),
+        `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension of
+        the paper's harmonic motion) and `validity`, all by default.
     chunks : int, tuple, dict or "auto", optional
         Chunks as dask takes them; the result is then lazy.  Frequency is best left whole.
     progress : callable, optional
@@ -128,33 +113,9 @@ def sweep(
     InputError
         A value that no physics allows, an unknown option, a grid that memory cannot hold.
     """
-    given = {
-        "theta": theta,
-        "mu_s": mu_s,
-        "amplitude": amplitude,
-        "displacement_amplitude": displacement_amplitude,
-        "frequency": frequency,
-        "yield_acceleration": yield_acceleration,
-        "decay_rate": decay_rate,
-        "delta_mu": delta_mu,
-        "minimum_friction": minimum_friction,
-        "structure_frequency": structure_frequency,
-    }
-    plan = plan_sweep(
-        **_plain(given),
-        cycles=cycles,
-        model=model,
-        rise=rise,
-        recoupling=recoupling,
-        waveform=waveform,
-        harmonics=harmonics,
-        ramp_in=ramp_in,
-        ramp_out=ramp_out,
-        solver=solver,
-        steps_per_cycle=steps_per_cycle,
-        rule=rule,
-        g=g,
-        variables=variables,
+    given = _inputs(locals())
+    plan = plan_of(
+        {**_plain(given), "excitation": excitation, "model": model, "solver": solver, "variables": variables}
     )
     brought = _brought(given, plan.coords, plan.names)
     return _dataset(plan.solve(progress) if chunks is None else _lazy(plan, chunks), brought)
@@ -169,7 +130,7 @@ def friction_parameters(
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
-    g: float = 9.81,
+    model: Model | str = "mendez",
 ) -> xr.Dataset:
     """Friction parameters of the paper's Eqs. 7-11, and λ, over a grid.
 
@@ -187,16 +148,8 @@ def friction_parameters(
     InputError
         A value that no physics allows.
     """
-    given = {
-        "theta": theta,
-        "mu_s": mu_s,
-        "amplitude": amplitude,
-        "yield_acceleration": yield_acceleration,
-        "decay_rate": decay_rate,
-        "delta_mu": delta_mu,
-        "minimum_friction": minimum_friction,
-    }
-    plan = plan_friction_parameters(**_plain(given), g=g)
+    given = _inputs(locals())
+    plan = plan_friction_parameters(**_plain(given), model=model)
     brought = _brought(given, plan.coords, plan.names)
     return _dataset(plan.solve(), brought)
 
@@ -207,23 +160,16 @@ def simulate(
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
+    excitation: Waveform | str = "sine",
+    model: Model | str = "mendez",
     times: Sequence[float] | np.ndarray | None = None,
     points_per_cycle: int = 512,
     displacement_amplitude: float | None = None,
-    cycles: int = 10,
     yield_acceleration: float | None = None,
     decay_rate: float | None = None,
     delta_mu: float | None = None,
     minimum_friction: float | None = None,
     structure_frequency: float | None = None,
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    waveform: str = "sine",
-    harmonics: Harmonics | None = None,
-    ramp_in: float = 0.0,
-    ramp_out: float = 0.0,
-    g: float = 9.81,
 ) -> xr.Dataset:
     """Time history of one block, event by event: the samples carry rounding errors only.
 
@@ -252,117 +198,15 @@ def simulate(
     InputError
         As `sweep`; or times that are not increasing.
     """
-    given = {
-        "theta": theta,
-        "mu_s": mu_s,
-        "amplitude": amplitude,
-        "displacement_amplitude": displacement_amplitude,
-        "frequency": frequency,
-        "yield_acceleration": yield_acceleration,
-        "decay_rate": decay_rate,
-        "delta_mu": delta_mu,
-        "minimum_friction": minimum_friction,
-        "structure_frequency": structure_frequency,
-    }
+    given = _inputs(locals())
     table = history_table(
         **_plain(given),
+        excitation=excitation,
+        model=model,
         times=times,
         points_per_cycle=points_per_cycle,
-        cycles=cycles,
-        model=model,
-        rise=rise,
-        recoupling=recoupling,
-        waveform=waveform,
-        harmonics=harmonics,
-        ramp_in=ramp_in,
-        ramp_out=ramp_out,
-        g=g,
     )
     return _dataset(table, {})
-
-
-def sweep_record(
-    record: Record,
-    theta: Values,
-    mu_s: Values,
-    *,
-    scale: Values = 1.0,
-    time_scale: Values = 1.0,
-    polarity: int | Sequence[int] | str = 1,
-    yield_acceleration: Values | None = None,
-    decay_rate: Values | None = None,
-    delta_mu: Values | None = None,
-    minimum_friction: Values | None = None,
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    g: float = 9.81,
-    variables: Sequence[str] | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> xr.Dataset:
-    """Response of a sliding block to a recorded motion, over a grid of parameters.
-
-    The record is taken as straight between its samples, and the response to that is exact: it
-    carries rounding errors only.  Parameters span a grid as in `sweep`, whose remaining arguments
-    mean here what they mean there.
-
-    Parameters
-    ----------
-    record : Record
-        From `read_record`, or ``Record(times, acceleration)``, s and m/s².
-    theta, mu_s : float, array or DataArray
-        Plane inclination, degrees, and static friction coefficient.
-    scale : float, array or DataArray
-        Factor on the recorded acceleration, > 0.
-    time_scale : float, array or DataArray
-        Factor on its time, > 0: 2 makes it last twice as long.
-    polarity : {1, -1}, list of these, or "both"
-        Factor on the record: 1 takes its positive accelerations for those that move the block
-        downslope, -1 its negative ones.
-    yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        What replaces its estimate; by default each pulse has those of its own peak.
-    model, rise, recoupling, g
-        As in `sweep`.
-    variables : sequence of str, optional
-        Which of the results below to return, by default all.
-    progress : callable, optional
-        Called with the number of cells just finished, from any thread.
-
-    Returns
-    -------
-    Dataset
-        `permanent_displacement` (m), `peak_relative_velocity` (m/s), `number_of_slips` (that
-        begin at rest), `stick_slip_pulses`, `continuous_pulses` (pulses by mode, Eq. 7 with each
-        pulse's own peak: an extension of the paper's harmonic motion) and `validity`.
-        Dimensions theta, mu_s, given parameters, scale, time_scale, polarity.
-
-    Raises
-    ------
-    InputError
-        A value that no physics allows, an unknown option, a grid that memory cannot hold.
-    """
-    given = {
-        "theta": theta,
-        "mu_s": mu_s,
-        "yield_acceleration": yield_acceleration,
-        "decay_rate": decay_rate,
-        "delta_mu": delta_mu,
-        "minimum_friction": minimum_friction,
-        "scale": scale,
-        "time_scale": time_scale,
-    }
-    plan = plan_record(
-        record,
-        **_plain(given),
-        polarity=polarity,
-        model=model,
-        rise=rise,
-        recoupling=recoupling,
-        g=g,
-        variables=variables,
-    )
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(progress), brought)
 
 
 def limit_amplitude(
@@ -371,20 +215,13 @@ def limit_amplitude(
     mu_s: Values,
     frequency: Values,
     *,
-    cycles: int = 10,
+    excitation: Waveform | str = "sine",
+    model: Model | str = "mendez",
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
     structure_frequency: Values | None = None,
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    waveform: str = "sine",
-    harmonics: Harmonics | None = None,
-    ramp_in: float = 0.0,
-    ramp_out: float = 0.0,
-    g: float = 9.81,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
     progress: Callable[[int], None] | None = None,
@@ -434,28 +271,12 @@ def limit_amplitude(
     InputError
         As `sweep`; or a displacement or a maximum amplitude that is not positive.
     """
-    given = {
-        "theta": theta,
-        "mu_s": mu_s,
-        "frequency": frequency,
-        "yield_acceleration": yield_acceleration,
-        "decay_rate": decay_rate,
-        "delta_mu": delta_mu,
-        "minimum_friction": minimum_friction,
-        "structure_frequency": structure_frequency,
-        "displacement": displacement,
-    }
+    given = _inputs(locals())
     table = limit_table(
         **_plain(given),
-        cycles=cycles,
+        displacement=_plain({"displacement": displacement})["displacement"],
+        excitation=excitation,
         model=model,
-        rise=rise,
-        recoupling=recoupling,
-        waveform=waveform,
-        harmonics=harmonics,
-        ramp_in=ramp_in,
-        ramp_out=ramp_out,
-        g=g,
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,
         progress=progress,
@@ -470,6 +291,9 @@ def sample(
     frequency: Values | None = None,
     *,
     uncertain: Mapping[str, Any],
+    excitation: Waveform | str = "sine",
+    model: Model | str = "mendez",
+    solver: Solver | str = "auto",
     samples: int = 4096,
     method: str = "sobol",
     seed: int = 0,
@@ -477,19 +301,10 @@ def sample(
     thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
     correlation: Sequence[tuple[str, str, float]] = (),
     displacement_amplitude: Values | None = None,
-    cycles: int = 10,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    waveform: str = "sine",
-    solver: str = "auto",
-    steps_per_cycle: int = STEPS_PER_CYCLE,
-    rule: str = "trapezoid",
-    g: float = 9.81,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
@@ -549,17 +364,7 @@ def sample(
     """
     from slipsweep.studies.uncertainty import check_sampling, plan_samples
 
-    given = {
-        "theta": theta,
-        "mu_s": mu_s,
-        "amplitude": amplitude,
-        "displacement_amplitude": displacement_amplitude,
-        "frequency": frequency,
-        "yield_acceleration": yield_acceleration,
-        "decay_rate": decay_rate,
-        "delta_mu": delta_mu,
-        "minimum_friction": minimum_friction,
-    }
+    given = _inputs(locals())
     sampling = check_sampling(
         uncertain,
         samples=samples,
@@ -568,23 +373,22 @@ def sample(
         quantiles=quantiles,
         thresholds=thresholds,
         correlation=correlation,
-        g=g,
+        g=MODELS.of(model).g,
     )
     plan = plan_samples(
         sampling,
         **_plain(given),
-        cycles=cycles,
+        excitation=excitation,
         model=model,
-        rise=rise,
-        recoupling=recoupling,
-        waveform=waveform,
         solver=solver,
-        steps_per_cycle=steps_per_cycle,
-        rule=rule,
-        g=g,
     )
     brought = _brought(given, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
     return _dataset(plan.solve(progress), brought)
+
+
+def _inputs(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters among a function's arguments."""
+    return {name: arguments[name] for name in PARAMETERS if name in arguments}
 
 
 def _plain(given: Mapping[str, Any]) -> dict[str, Any]:

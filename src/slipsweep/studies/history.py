@@ -7,7 +7,7 @@ import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
-from slipsweep.grid.plans import check_options, plan_sweep
+from slipsweep.grid.plans import check_problem, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
@@ -15,25 +15,28 @@ from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history
 from slipsweep.model.parameters import check_numbers, check_whole, number_text
 from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
-from slipsweep.motion.waveforms import wave_of
+from slipsweep.motion.cutting import wave_of
+from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Cycles after the shaking that have as many points each as one of the shaking; longer slides have no more points.
 _CYCLES_BEYOND = 100
 
 
-def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: Any) -> Table:
+def history_table(
+    *, times: Any = None, points_per_cycle: int = 512, excitation: Any = "sine", model: Any = "mendez", **given: Any
+) -> Table:
     """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
-    options = {name: value for name, value in given.items() if name not in PARAMETERS}
-    problem = check_options(**options)
+    motion = WAVEFORMS.of(excitation)
+    problem = check_problem(motion, model, "cycle")
     for name in PARAMETERS:
         value = given.get(name)
         if value is not None and check_numbers(name, value.values if isinstance(value, Variable) else value).ndim:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    summary = plan_sweep(**given, solver="cycle").solve()
+    summary = plan_sweep(**given, excitation=motion, model=problem.model).solve()
     own = {name: variable.values for name, variable in summary.coords.items()}
     omega = 2.0 * math.pi * float(own["frequency"])
     cells = np.repeat([float(values) for values in engine.cell_inputs(own, 0)], TILE)
-    wave = wave_of(problem.waveform, problem.cycles)
+    wave = wave_of(motion)
     valueless = int(summary["validity"].item()) & VALUELESS
 
     def sampled(phases: np.ndarray) -> np.ndarray:
@@ -45,12 +48,12 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
 
     if times is None:
         points = check_whole("points_per_cycle", points_per_cycle, 4)
-        last = sampled(np.array([2.0 * math.pi * problem.cycles]))[0]
+        last = sampled(np.array([2.0 * math.pi * motion.cycles]))[0]
         # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
         braking = last[1] - last[0]
         with np.errstate(divide="ignore", over="ignore"):
             after = last[3] / braking if summary["sliding_mode"].item() == 1 and last[3] > 0.0 else 0.0
-        phases = _phases(points, problem.cycles, float(after))
+        phases = _phases(points, motion.cycles, float(after))
         grid = phases / omega
     else:
         grid = np.atleast_1d(check_numbers("times", times))
@@ -66,7 +69,7 @@ def history_table(*, times: Any = None, points_per_cycle: int = 512, **given: An
         table[:, 4] /= omega * omega
     if not valueless:
         moved = {name: table[:, at] for at, name in enumerate(HISTORY)}
-        check_served(problem.g, own, moved, np.zeros(len(table), np.int16))
+        check_served(problem.model.g, own, moved, np.zeros(len(table), np.int16))
     columns = {
         name: Variable(("time",), np.ascontiguousarray(column), attributes)
         for (name, attributes), column in zip(HISTORY.items(), table.T, strict=True)

@@ -72,10 +72,10 @@ def limit_table(
     steps = check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
 
     # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
-    plan = plan_sweep(**given, amplitude=target, solver="cycle", variables=["permanent_displacement"])
+    plan = plan_sweep(**given, amplitude=target, variables=["permanent_displacement"])
     task = plan.tasks[0]
     if maximum_amplitude is None:
-        maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.g
+        maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.model.g
     highest = check_single("maximum_amplitude", maximum_amplitude)
     check_progress(progress)
     check_dimensions(plan.sizes, {}, {*LIMIT_RESULTS, "sliding_mode", "validity"})

@@ -6,7 +6,7 @@ v ∝ time_scale and u ∝ time_scale², exactly.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -15,12 +15,13 @@ import numpy as np
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, threads
 from slipsweep.grid.engine import Array, Problem
-from slipsweep.grid.plans import Plan, Task, aligned, check_options, checked, grid_sizes, record_attributes
+from slipsweep.grid.plans import Plan, Task, about, aligned, check_inputs, check_problem, checked, grid_sizes
 from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Variable
 from slipsweep.kernels.record import RECORD_KERNEL, History
+from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_choices, check_given, check_numbers, shown
-from slipsweep.model.variables import PARAMETERS, RECORD_COUNTS, RECORD_PARAMETERS, RECORD_RESULTS, RESULT_DTYPES
+from slipsweep.model.variables import PARAMETERS, RECORD_COUNTS, RECORD_INPUTS, RECORD_RESULTS, RESULT_DTYPES
 from slipsweep.motion.records import Record
 
 #: What a cell of a record takes, in cells of the cycle solver: some 2 µs against 0.1.
@@ -46,46 +47,41 @@ def history_of(record: Record, polarity: float) -> History:
 
 
 def plan_record(
-    record: Record,
-    *,
-    model: str = "mendez",
-    rise: str = "monotone",
-    recoupling: str = "eq12",
-    g: float = 9.81,
-    variables: Sequence[str] | None = None,
-    **given: Any,
+    *, excitation: Record, model: Any = "mendez", solver: Any = "auto", variables: Any = None, **given: Any
 ) -> Plan:
-    """Plan of the response of every block of a grid to a record.
-
-    Parameters
-    ----------
-    record, model, rise, recoupling, g, given
-        Arguments of `slipsweep.sweep_record`; arrays with dimensions of their own are `Variable`.
-    variables : sequence of str, optional
-        Names from `variables.RECORD_RESULTS`, by default all.
-
-    Raises
-    ------
-    InputError
-        As `slipsweep.sweep_record`.
-    """
-    if not isinstance(record, Record):
-        raise InputError(f"record = {shown(record)}: must be a Record (slipsweep.read_record, slipsweep.Record)")
-    problem = check_options(model=model, rise=rise, recoupling=recoupling, g=g)
+    """Plan of a sweep under a record; as `plans.plan_sweep`."""
+    problem = check_problem(excitation, model, solver)
+    given = {name: values for name, values in given.items() if values is not None}
+    check_inputs(given, RECORD_INPUTS, "a Record")
     check_given(given, ("theta", "mu_s"))
+    if "amplitude" in given and "scale" in given:
+        raise InputError("amplitude, scale: must not both be given; either is the strength of the record")
+    if isinstance(problem.model, Newmark):
+        for name in ("decay_rate", "delta_mu", "minimum_friction"):
+            if name in given:
+                raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
     wanted = tuple(RECORD_RESULTS) if variables is None else check_choices("variables", variables, RECORD_RESULTS)
     polarity = _polarity(given.pop("polarity", 1))
-    known = PARAMETERS | RECORD_PARAMETERS
-    given = {"scale": 1.0, "time_scale": 1.0} | {name: values for name, values in given.items() if values is not None}
-    coords = checked({name: given[name] for name in known if name in given}, known)
-    if model == "newmark":
-        for name in ("decay_rate", "delta_mu", "minimum_friction"):
-            if name in coords:
-                raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
-    coords["polarity"] = polarity
+    defaults = {"time_scale": 1.0} if "amplitude" in given else {"scale": 1.0, "time_scale": 1.0}
+    coords = checked(_ordered(defaults | given)) | {"polarity": polarity}
+    inputs = dict(coords)
+    if "amplitude" in coords:
+        inputs["scale"] = _scale(inputs.pop("amplitude"), excitation)
     sizes = grid_sizes(coords)
-    task = Task(partial(_solve, record), problem, wanted, sizes, aligned(coords, sizes))
-    return Plan(sizes, coords, (task,), wanted, record_attributes(problem, record.name, record.attrs))
+    task = Task(partial(_solve, excitation), problem, wanted, sizes, aligned(inputs, sizes))
+    return Plan(sizes, coords, (task,), wanted, about("Response of a rigid block to a recorded motion", problem))
+
+
+def _ordered(given: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: given[name] for name in PARAMETERS if name in given}
+
+
+def _scale(amplitude: Variable, record: Record) -> Variable:
+    """The factors that scale a record to peak accelerations."""
+    peak = float(np.abs(record.acceleration).max())
+    if not peak > 0.0:
+        raise InputError(f"amplitude: {record.name} has no acceleration to scale; give scale")
+    return Variable(amplitude.dims, amplitude.values / peak)
 
 
 def _solve(
@@ -125,7 +121,7 @@ def _solve(
                 moved = {name: found[name] * factors**power for name, power in _POWERS.items() if name in results}
             for name, values in moved.items():
                 flags = np.broadcast_to(found["validity"], values.shape)
-                check_served(problem.g, engine.cut(arrays, where) | extremes, {name: values}, flags)
+                check_served(problem.model.g, engine.cut(arrays, where) | extremes, {name: values}, flags)
             for name, target in results.items():
                 target[where] = moved.get(name, found[name])
     return results
@@ -170,4 +166,4 @@ def _polarity(given: Any) -> Variable:
     if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
         raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
     dims = ("polarity",) if values.ndim else ()
-    return Variable(dims, values.astype(np.int8), RECORD_PARAMETERS["polarity"])
+    return Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])

@@ -19,15 +19,14 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.files.netcdf import Tally
-from slipsweep.files.spec import quantity, unit_factor
 from slipsweep.grid import engine, threads
 from slipsweep.grid.engine import Problem
 from slipsweep.grid.plans import aligned, check_dimensions, grid_sizes, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.options import MODELS, Newmark
 from slipsweep.model.parameters import (
     BOUNDS,
-    MODELS,
     check_choice,
     check_finite,
     check_list,
@@ -40,7 +39,9 @@ from slipsweep.model.parameters import (
     shown,
 )
 from slipsweep.model.suggest import did_you_mean
+from slipsweep.model.units import quantity, unit_factor
 from slipsweep.model.variables import (
+    DRAWN,
     FRICTION_PARAMETERS,
     PARAMETERS,
     STATISTIC_COORDINATES,
@@ -53,12 +54,6 @@ Floats = NDArray[np.float64]
 
 METHODS = ("sobol", "latin_hypercube", "random")
 KINDS = ("absolute", "factor", "offset")
-
-#: What may be drawn: all that the displacement depends on.
-DRAWN = (
-    "theta", "mu_s", "amplitude", "displacement_amplitude", "frequency",
-    "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
-)  # fmt: skip
 
 #: Parameters that have an estimate where they are not given, in the order in which each needs those before it.
 _ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
@@ -472,7 +467,7 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     for name in ("theta", "mu_s", "frequency"):
         if name not in (*names, *sampling.absolute):
             raise InputError(f"{name}: must be given, or drawn")
-    if check_choice("model", given.get("model", "mendez"), MODELS) == "newmark":
+    if isinstance(MODELS.of(given.get("model", "mendez")), Newmark):
         for name in ("decay_rate", "delta_mu", "minimum_friction"):
             if name in sampling.distributions:
                 raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")

@@ -1,0 +1,110 @@
+"""Options of commands made from what is declared once (`slipsweep.model.choices`)."""
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal
+
+import typer
+
+from slipsweep.errors import InputError
+from slipsweep.model.choices import Family, Option, declared
+from slipsweep.motion.reading import Reading
+
+
+def option_name(text: str) -> str:
+    """An option as it is typed: ``--ramp-in`` for ``ramp_in``; what follows the name stays."""
+    name, *rest = text.split(" ", 1)
+    return " ".join(["--" + name.replace("_", "-"), *rest])
+
+
+def chooses(**families: Family[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the options of families, and hand it the choices made, by the names of its parameters."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        def made(given: dict[str, Any], parameter: str) -> Any:
+            family = families[parameter]
+            name = given.pop(family.attribute)
+            options = _given(given, family.options)
+            return family.made(name, options, lambda text: option_name(text.replace(family.key, family.attribute, 1)))
+
+        return _replaced(command, {name: _family_parameters(family) for name, family in families.items()}, made)
+
+    return decorate
+
+
+def reads_record(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `Reading` in the place of its parameter `reading`, and hand it a mapping."""
+    options = {one.name: one for one in declared(Reading)}
+
+    def made(given: dict[str, Any], parameter: str) -> Any:
+        try:
+            return Reading(**_given(given, options)).options
+        except InputError as error:
+            raise InputError(option_name(str(error))) from None
+
+    return _replaced(command, {"reading": [_parameter(one) for one in options.values()]}, made)
+
+
+def _given(given: dict[str, Any], options: Mapping[str, Option]) -> dict[str, Any]:
+    """Take the options that were typed, lists as lists."""
+    typed = {name: given.pop(name) for name in options}
+    return {
+        name: [_number(name, part) for part in value.split(",")] if options[name].is_list else value
+        for name, value in typed.items()
+        if value is not None
+    }
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{option_name(name)} {text}: must be numbers with commas between") from None
+
+
+def _replaced(
+    command: Callable[..., None],
+    parameters: Mapping[str, list[inspect.Parameter]],
+    made: Callable[[dict[str, Any], str], Any],
+) -> Callable[..., None]:
+    """A command whose parameters of some names are replaced by others, from which theirs are made."""
+    signature = inspect.signature(command)
+
+    @functools.wraps(command)
+    def wrapped(**given: Any) -> None:
+        command(**{name: made(given, name) for name in parameters}, **given)
+
+    taken = [new for old in signature.parameters.values() for new in parameters.get(old.name, [old])]
+    wrapped.__signature__ = signature.replace(parameters=taken)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {one.name: one.annotation for one in taken} | {"return": None}
+    del wrapped.__wrapped__
+    return wrapped
+
+
+def _family_parameters(family: Family[Any]) -> list[inspect.Parameter]:
+    """Which choice, and the options of all."""
+    names = Literal[tuple(family.names)]  # type: ignore[valid-type]
+    about = typer.Option(f"--{family.attribute}", help=f"The {family.keyword}.")
+    first = inspect.Parameter(
+        family.attribute, inspect.Parameter.KEYWORD_ONLY, default=family.default, annotation=Annotated[names, about]
+    )
+    return [first, *(_parameter(one, family) for one in family.options.values())]
+
+
+def _parameter(one: Option, family: Family[Any] | None = None) -> inspect.Parameter:
+    """An option of a command; None where it is not typed."""
+    kind: Any = Literal[one.words] if one.words else str if one.is_list else one.kind
+    notes = []
+    if family is not None:
+        of = [choice.name for choice in family.choices if one.name in {o.name for o in declared(choice)}]
+        if len(of) < len(family.choices):
+            notes.append(f"with {', '.join(of)}")
+    if one.default is not None and not one.is_list:
+        notes.append(f"default: {one.default}")
+    noted = f" ({'; '.join(notes)})" if notes else ""
+    text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
+    about = typer.Option(option_name(one.name), help=text, metavar="A,B,..." if one.is_list else None)
+    return inspect.Parameter(
+        one.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, about]
+    )

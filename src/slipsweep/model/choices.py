@@ -1,0 +1,244 @@
+"""What a user may choose, declared once: a class a choice, a field an option.
+
+From these declarations come Python's arguments (`model=Mendez(rise="literal")`), the keys of a sweep
+file's table (`rise = "literal"`), the options of the command line (`--rise literal`), the attributes
+of a result's file, and what a resumed run must have in common with the one before.  An option added
+to a class appears in all of them.
+"""
+
+import dataclasses
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from slipsweep.errors import InputError
+from slipsweep.model.parameters import (
+    BOUNDS,
+    check_choice,
+    check_finite,
+    check_list,
+    check_single,
+    check_whole,
+    number_text,
+    shown,
+)
+from slipsweep.model.suggest import did_you_mean
+
+
+def option(
+    about: str,
+    default: Any = dataclasses.MISSING,
+    *,
+    least: float | None = None,
+    most: float | None = None,
+    multiple_of: int = 1,
+) -> Any:
+    """A field of a `Choice`: what it is about, in one line, and what it may be.
+
+    The bounds of a number are `least` and `most`, or those of the parameter of its name.
+    """
+    return dataclasses.field(
+        default=default, metadata={"about": about, "least": least, "most": most, "multiple_of": multiple_of}
+    )
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option as its class declares it.
+
+    Attributes
+    ----------
+    name : str
+    about : str
+        One line for people.
+    kind : type
+        `str`, `int` or `float`; of one entry, where it is a list.
+    words : tuple of str
+        What a word may be; empty for numbers.
+    is_list : bool
+    default : object
+        `dataclasses.MISSING` where it must be given.
+    least, most, multiple_of
+        Bounds of a number.
+    """
+
+    name: str
+    about: str
+    kind: type
+    words: tuple[str, ...]
+    is_list: bool
+    default: Any
+    least: float | None
+    most: float | None
+    multiple_of: int
+
+    def checked(self, value: Any) -> Any:
+        """The value, in the option's own type (InputError: what is allowed)."""
+        if value is None and self.default is None:
+            return None
+        if not self.is_list:
+            return self._single(self.name, value)
+        numbers = check_list(self.name, value, "numbers")
+        return tuple(self._single(f"{self.name}[{at}]", one) for at, one in enumerate(numbers))
+
+    def _single(self, name: str, value: Any) -> Any:
+        if self.words:
+            return check_choice(name, value, self.words)
+        if self.kind is int:
+            most = None if self.most is None else int(self.most)
+            return check_whole(name, value, int(self.least or 0), most, self.multiple_of)
+        if self.name in BOUNDS:
+            return check_single(self.name, value, name)
+        number = check_finite(name, value)
+        if self.least is not None and self.most is not None and not self.least <= number <= self.most:
+            low, high = map(number_text, (self.least, float(self.most)))
+            raise InputError(f"{name} = {number_text(number)}: must be {low} to {high}")
+        return number
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several ways, with its options; frozen, comparable, and checked when it is made."""
+
+    #: What names the choice where no object can: in strings, sweep files, commands, attributes.
+    name: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for one in declared(type(self)):
+            object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
+        self.check()
+
+    def check(self) -> None:
+        """Refuse what one option cannot know of another."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options by name; those left out where nothing stands for them are left out."""
+        values = {one.name: getattr(self, one.name) for one in declared(type(self))}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def but(self, **options: Any) -> Self:
+        """The same choice with other options."""
+        return dataclasses.replace(self, **options)
+
+
+def declared(choice: type[Choice]) -> tuple[Option, ...]:
+    """The options of a choice, in the order of its fields."""
+    hints = get_type_hints(choice)
+    return tuple(_option(field, hints[field.name]) for field in dataclasses.fields(choice))
+
+
+def _option(field: "dataclasses.Field[Any]", hint: Any) -> Option:
+    if get_origin(hint) in (Union, types.UnionType):
+        hint = next(part for part in get_args(hint) if part is not type(None))
+    is_list = get_origin(hint) is Sequence
+    kind = get_args(hint)[0] if is_list else hint
+    words = get_args(kind) if get_origin(kind) is Literal else ()
+    return Option(field.name, kind=str if words else kind, words=words, is_list=is_list, default=field.default,
+                  **field.metadata)  # fmt: skip
+
+
+Some = TypeVar("Some", bound=Choice)
+
+
+@dataclass(frozen=True)
+class Family(Generic[Some]):
+    """Choices of which one is taken.
+
+    Attributes
+    ----------
+    keyword : str
+        Python's argument, and the table of a sweep file.
+    key : str
+        What names the choice in that table.
+    choices : tuple of type
+    default : str
+    aliases : dict of str to str
+        Other names of choices.
+    attribute : str
+        What names the choice in the attributes of a result, and on the command line.
+    """
+
+    keyword: str
+    key: str
+    choices: tuple[type[Some], ...]
+    default: str
+    attribute: str
+    aliases: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that a choice may be called by."""
+        return (*self.aliases, *(choice.name for choice in self.choices))
+
+    def of(self, given: Any) -> Some:
+        """The choice that a caller gives: an object, or the name of one with its defaults."""
+        if isinstance(given, self.choices):
+            return given
+        if isinstance(given, str) and given in self.names:
+            return self.made(given, {})
+        objects = ", ".join(f"{choice.__name__}(...)" for choice in self.choices)
+        raise InputError(
+            f"{self.keyword} = {shown(given)}: must be one of {', '.join(map(repr, self.names))}, or {objects}"
+        )
+
+    def called(self, name: str) -> type[Some]:
+        """The class of a choice, by name."""
+        name = self.aliases.get(name, name)
+        return next(choice for choice in self.choices if choice.name == name)
+
+    def made(self, name: Any, options: Mapping[str, Any], key: Callable[[str], str] = str) -> Some:
+        """The choice of a name, with options as a table or a command gives them.
+
+        `key` is what an option's name is called there, in errors.
+        """
+        check_choice(key(self.key), name, self.names)
+        choice = self.called(name)
+        known = {one.name: one for one in declared(choice)}
+        for option_ in options:
+            if option_ not in known:
+                allowed = [repr(other.name) for other in self.choices if option_ in {o.name for o in declared(other)}]
+                if not allowed:
+                    raise InputError(f"{key(option_)}: unknown; {did_you_mean(option_, tuple(known))}")
+                raise InputError(
+                    f"{key(option_)}: not allowed with {key(self.key)} = {name!r}, only with {', '.join(allowed)}"
+                )
+        for one in known.values():
+            if one.default is dataclasses.MISSING and one.name not in options:
+                raise InputError(f"{key(one.name)}: must be given with {key(self.key)} = {name!r}")
+        try:
+            return choice(**options)
+        except InputError as error:
+            # the message begins with the option's name
+            text = str(error)
+            raise InputError(key(text) if text.startswith(tuple(known)) else text) from None
+
+    def attributes(self, choice: Some) -> dict[str, Any]:
+        """What results say of a choice; `from_attributes` gives it again."""
+        return {self.attribute: choice.name} | choice.options
+
+    def from_attributes(self, attributes: Mapping[str, Any]) -> Some:
+        """The choice that the attributes of a result tell of (InputError: they tell of none)."""
+        if self.attribute not in attributes:
+            raise InputError(f"attribute {self.attribute!r}: missing")
+        name = attributes[self.attribute]
+        check_choice(f"attribute {self.attribute}", name, self.names)
+        known = declared(self.called(name))
+        return self.made(
+            name,
+            {one.name: _plain(attributes[one.name], one) for one in known if one.name in attributes},
+            lambda text: f"attribute {text}",
+        )
+
+    @property
+    def options(self) -> dict[str, Option]:
+        """The options of all choices, by name."""
+        return {one.name: one for choice in self.choices for one in declared(choice)}
+
+
+def _plain(value: Any, one: Option) -> Any:
+    """An attribute's value without numpy; a list of one number is read back as a number."""
+    import numpy as np  # here only: `slipsweep --help` imports these declarations
+
+    return np.atleast_1d(value).tolist() if one.is_list else np.asarray(value).item()

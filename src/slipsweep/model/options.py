@@ -1,0 +1,111 @@
+"""The models and the solvers that a user may choose, with their options."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, TypeAlias
+
+from slipsweep.model.choices import Choice, Family, option
+from slipsweep.model.parameters import MOST_STEPS, STEPS_PER_CYCLE
+
+Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
+
+
+@dataclass(frozen=True)
+class Mendez(Choice):
+    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12.
+
+    Parameters
+    ----------
+    rise : {"monotone", "literal"}
+        Stick-slip rise of the block's acceleration: not below the yield value and never falling, or
+        Eq. 4 as printed.
+    recoupling : {"eq12", "integrate"}
+        After the plane's acceleration has reversed: Eq. 12, or integration until the stop.
+    g : float
+        Gravity, m/s².
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    Examples
+    --------
+    >>> Mendez(recoupling="integrate")
+    Mendez(rise='monotone', recoupling='integrate', g=9.81)
+    """
+
+    name: ClassVar[str] = "mendez"
+    rise: Literal["monotone", "literal"] = option("rise of the block's acceleration", "monotone")
+    recoupling: Literal["eq12", "integrate"] = option("how sliding ends after the plane has reversed", "eq12")
+    g: float = option("gravity, m/s²", 9.81)
+
+
+@dataclass(frozen=True)
+class Newmark(Choice):
+    """Newmark's rigid block: its acceleration is Üy while it slides, and the plane's while it does not.
+
+    Parameters
+    ----------
+    g : float
+        Gravity, m/s².
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    Examples
+    --------
+    >>> Newmark()
+    Newmark(g=9.81)
+    """
+
+    name: ClassVar[str] = "newmark"
+    g: float = option("gravity, m/s²", 9.81)
+
+
+@dataclass(frozen=True)
+class Cycle(Choice):
+    """The solver that goes from event to event: exact to rounding for every excitation.
+
+    Examples
+    --------
+    >>> Cycle()
+    Cycle()
+    """
+
+    name: ClassVar[str] = "cycle"
+
+
+@dataclass(frozen=True)
+class Step(Choice):
+    """The solver that takes fixed steps in phase, cut at the events inside them.
+
+    Parameters
+    ----------
+    rule : {"rectangle", "trapezoid", "simpson"}
+        Orders 1, 2 and 4.
+    steps_per_cycle : int
+        A multiple of 4, at least 8.
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    Examples
+    --------
+    >>> Step(rule="simpson")
+    Step(rule='simpson', steps_per_cycle=1024)
+    """
+
+    name: ClassVar[str] = "step"
+    rule: Rule = option("rule of the steps; orders 1, 2 and 4", "trapezoid")
+    steps_per_cycle: int = option("steps in a cycle", STEPS_PER_CYCLE, least=8, most=MOST_STEPS, multiple_of=4)
+
+
+Model = Mendez | Newmark
+Solver = Cycle | Step
+
+MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")
+SOLVERS: Family[Solver] = Family("solver", "method", (Cycle, Step), "auto", "solver", {"auto": "cycle"})

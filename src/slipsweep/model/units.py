@@ -1,0 +1,93 @@
+"""Units of what users give: a factor to the parameter's own unit, and numbers with a unit in one text."""
+
+import json
+import re
+
+from slipsweep.errors import InputError
+from slipsweep.model.variables import PARAMETERS
+
+#: Spellings of each parameter's own unit that need no units library.
+_OWN_UNITS = {
+    "degree": ("degree", "degrees", "deg"),
+    "m s-2": ("m s-2", "m/s2", "m/s^2", "m/s**2"),
+    "Hz": ("Hz",),
+    "m": ("m",),
+    "1": ("1",),
+}
+
+#: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
+_FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
+_UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
+
+
+def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
+    """Return what to multiply a number in `units` by, to have it in the parameter's own unit.
+
+    `key` is what the units are called in errors.
+    "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
+    meant against the gravity that the block feels.
+    """
+    own = PARAMETERS[name]["units"]
+    if units is None or units in _OWN_UNITS[own]:
+        return 1.0
+    if own == "m s-2" and units == "g":
+        return g
+
+    refusal = InputError(f"{key} = {show(units)}: must be a unit that converts to {own}")
+    # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
+    text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
+    if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
+        raise refusal
+
+    import pint  # only here: it takes 0.2 s to import
+
+    registry = pint.get_application_registry()
+    target = "m/s**2" if own == "m s-2" else own
+    try:
+        quantity = registry.Quantity(1.0, text)
+        root = quantity.to_root_units().units
+        # Pint lets radians pass for pure numbers.  Here a slope in percent is no angle, and
+        # 60 rpm or 2 pi rad/s is 1 Hz: one turn a cycle.
+        if own == "Hz" and "radian" in str(root):
+            target = "turn/s"
+        if root != registry.Quantity(1.0, target).to_root_units().units:
+            raise refusal
+        return float(quantity.to(target).magnitude)
+    except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError):
+        raise refusal from None
+
+
+def quantity(key: str, text: str, parameter: str, g: float) -> float:
+    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit.
+
+    Parameters
+    ----------
+    key : str
+        What to call it in errors.
+    text : str
+        A number and, unless it is in the parameter's own unit, a unit as in the axes of sweep files.
+    parameter : str
+        A parameter (`slipsweep.model.variables.PARAMETERS`) of the same unit.
+    g : float
+        What "g" as a unit of acceleration stands for, m/s².
+
+    Raises
+    ------
+    InputError
+        It is not a number, or its unit does not convert.
+    """
+    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
+    own = PARAMETERS[parameter]["units"]
+    refusal = InputError(f"{key} = {show(text)}: must be a number, with a unit that converts to {own} if in another")
+    if found is None:
+        raise refusal
+    try:
+        return float(found[1]) * unit_factor(key, parameter, found[2] or None, g)
+    except InputError:
+        raise refusal from None
+
+
+def show(value: object) -> str:
+    """Write a value as TOML would, on one line of bearable length."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else f"{text[:57]}..."

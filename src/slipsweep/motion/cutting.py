@@ -1,0 +1,344 @@
+"""A waveform cut into the pieces that the solvers go through.
+
+`wave_of` gives a `pieces.Wave`: the shaking cut where w jumps,
+bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece (and further
+where a smooth one would be too long for its polynomial).  `kernels.excitation` evaluates a piece
+(`plane`, `from_top`, `slope`), integrates it (`held_integrals`) and inverts it (`offset_at`); τ, the
+phase on a piece, runs from `BEGIN` to `FINISH` (columns of ``pieces``), and `START` to `END` is the same
+in the table's phases.  Pieces do not depend on the cell.  What happens between two pieces: w
+goes from `LAST` of the one to `FIRST` of the other, whose `JUMPS` tells a jump upwards.  Before piece 0
+and after the last one the plane is at rest.  Cycle c of the table is the pieces ``cycle[c]`` to
+``cycle[c + 1] - 1``; cycle number `lead` comes `repeats` times (there is no such cycle where `repeats` is 0),
+all others once.  Cycles of the same number in ``shape`` have equal pieces.  Pulses happen in the `stretch`es
+with w > 0 whose ``height`` exceeds Üy/A: in each a slide begins, or goes on with b reset, where x
+first comes to Üy or jumps past it.  From there to the same place of the next such stretch the velocity
+carried over is all that one pulse leaves to the next (`kernels.train`).
+"""
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.motion.pieces import ARC, BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP, Wave
+from slipsweep.motion.waveforms import Harmonics, Waveform
+
+#: Longest piece of a smooth wave, in radians of its fastest harmonic: the first term of its Taylor series
+#: beyond `pieces.TERMS` is below 1e-18.
+_LONGEST = 0.5 * math.pi
+
+#: Points of a cycle closer than this, as parts of it, are one.
+_SAME = 1e-12
+
+#: Values of w closer than this are one.
+_ROUNDING = 1e-15
+
+#: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for.
+_INTERVALS = 12
+
+# 80-bit numbers where the machine has them: coefficients then are right to the last digit
+_Extended = np.longdouble
+_TURN = _Extended("6.283185307179586476925286766559005768")
+
+Exact = NDArray[Any]
+
+
+# ------------------------------------------------------------------------------ one period
+
+
+@dataclass(frozen=True)
+class _Period:
+    """One period of a waveform: smooth between `breaks`; phases are parts of a cycle.
+
+    `derivative(i, u, order)` is that of w by phase, in radians, behind break i at places u.
+    """
+
+    breaks: tuple[float, ...]
+    derivative: Callable[[int, Exact, int], Exact]
+    fastest: int  # multiple of the fastest harmonic; 0 where straight lines join the breaks
+
+
+def _sine_of_turns(turns: Exact) -> Exact:
+    """sin 2πt, exact at every quarter."""
+    quarters = np.rint(4 * turns)
+    rest = (turns - quarters / 4) * _TURN
+    sine, cosine = np.sin(rest), np.cos(rest)
+    quadrant = np.mod(quarters, 4)
+    return np.select([quadrant == 0, quadrant == 1, quadrant == 2], [sine, cosine, -sine], -cosine)
+
+
+@functools.lru_cache
+def _trigonometric(waveform: Waveform) -> _Period:
+    """Σ aₖ sin(mₖφ + pₖ), with the peak 1."""
+    if isinstance(waveform, Harmonics):
+        amplitudes: Exact = np.array(waveform.amplitudes, _Extended)
+        multiples = np.array(waveform.multiples, _Extended)
+        shifts = np.array(waveform.phases, _Extended) / 360
+        breaks: tuple[float, ...] = (0.0, 1.0)
+    else:
+        amplitudes, multiples = np.ones(1, _Extended), np.ones(1, _Extended)
+        shifts = np.full(1, 0.25 if waveform.name == "cosine" else 0.0, _Extended)
+        breaks = (0.0, 0.25, 0.5, 0.75, 1.0)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        amplitudes = amplitudes / np.abs(amplitudes).max()
+    fastest = int(multiples.max())
+
+    def sum_of(amplitudes: Exact) -> _Period:
+        def derivative(i: int, u: Exact, order: int) -> Exact:
+            turns = np.mod(multiples[:, None] * np.asarray(u, _Extended), 1) + shifts[:, None] + _Extended(order) / 4
+            return np.asarray(((amplitudes * multiples**order)[:, None] * _sine_of_turns(turns)).sum(axis=0))
+
+        return _Period(breaks, derivative, fastest)
+
+    if isinstance(waveform, Harmonics):
+        crude = sum_of(amplitudes)
+        points = _turning_points(crude, 0, 0.0, 1.0, (_Extended(1), _Extended(0)))[1] if fastest else []
+        peak = np.abs(crude.derivative(0, np.array([0.0, *points]), 0)).max()
+        amplitudes = amplitudes / peak
+    return sum_of(amplitudes)
+
+
+def _straight(breaks: Sequence[float], starts: Sequence[float], slopes: Sequence[float]) -> _Period:
+    """Straight lines behind each break, slopes by cycle."""
+
+    def derivative(i: int, u: Exact, order: int) -> Exact:
+        u = np.asarray(u, _Extended)
+        if order == 0:
+            return starts[i] + slopes[i] * (u - breaks[i])
+        return np.full(u.shape, slopes[i] / _TURN if order == 1 else _Extended(0))
+
+    return _Period(tuple(breaks), derivative, 0)
+
+
+def _period(waveform: Waveform) -> _Period:
+    if waveform.name == "triangle":
+        return _straight((0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 1.0, 0.0, -1.0), (4.0, -4.0, -4.0, 4.0))
+    if waveform.name == "square":
+        return _straight((0.0, 0.5, 1.0), (1.0, -1.0), (0.0, 0.0))
+    return _trigonometric(waveform.plain)
+
+
+def _sign_changes(f: Callable[[Exact], Exact], slope: Callable[[Exact], Exact], edges: Exact) -> list[float]:
+    """Places between the edges where f changes its sign: each bracketed, then bisected to the last digit.
+
+    Two in one interval are found where |f| has a minimum between its ends.
+    """
+
+    def bisect(f: Callable[[Exact], Exact], low: Exact, high: Exact) -> Exact:
+        below = f(low) < 0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            same = (f(middle) < 0) == below
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        return high
+
+    value, rate = f(edges), slope(edges)
+    sign = np.where(value < 0, -1, 1)
+    crosses = sign[:-1] != sign[1:]
+    low, high = [edges[:-1][crosses]], [edges[1:][crosses]]
+    dips = ~crosses & (sign[:-1] * rate[:-1] < 0) & (sign[1:] * rate[1:] > 0)
+    if dips.any():
+        bottom = bisect(slope, edges[:-1][dips], edges[1:][dips])
+        twice = np.where(f(bottom) < 0, -1, 1) != sign[:-1][dips]
+        low += [edges[:-1][dips][twice], bottom[twice]]
+        high += [bottom[twice], edges[1:][dips][twice]]
+    return sorted(bisect(f, np.concatenate(low), np.concatenate(high)).tolist())
+
+
+def _turning_points(
+    period: _Period, i: int, low: float, high: float, envelope: tuple[Any, Any]
+) -> tuple[list[float], list[float]]:
+    """Zeros and turns of the waveform times its envelope (at `low`, and slope by phase), behind break i."""
+    count = max(2, math.ceil(_INTERVALS * max(period.fastest, 1) * (high - low)))
+    edges = np.concatenate([[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]])
+    at, rate = envelope
+
+    def wave(order: int) -> Callable[[Exact], Exact]:
+        return lambda u: period.derivative(i, u, order)
+
+    def ramped(order: int) -> Callable[[Exact], Exact]:
+        def f(u: Exact) -> Exact:
+            scale = at + rate * (np.asarray(u, _Extended) - low) * _TURN
+            return scale * period.derivative(i, u, order) + order * rate * period.derivative(i, u, order - 1)
+
+        return f
+
+    zeros = _sign_changes(wave(0), wave(1), edges) if period.fastest else []
+    turns = _sign_changes(ramped(1), ramped(2), edges) if period.fastest or rate != 0 else []
+    return zeros, turns
+
+
+# --------------------------------------------------------------------------------- pieces
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A piece of one cycle: where it begins and ends (parts of the cycle), and its polynomial."""
+
+    start: float
+    end: float
+    first: float
+    last: float
+    at_end: bool  # the anchor
+    coefficients: tuple[float, ...]
+
+
+def _envelope(waveform: Waveform, n: int) -> list[tuple[float, float, Any, Any]]:
+    """The envelope in cycle n: parts (from, to, value at `from`, slope by phase)."""
+    cycles, rise, fall = waveform.cycles, _Extended(waveform.ramp_in), _Extended(waveform.ramp_out)
+    inner = (float(rise - n), float(cycles - fall - n))
+    cuts = [0.0, *sorted({u for u in inner if 0.0 < u < 1.0}), 1.0]
+    parts: list[tuple[float, float, Any, Any]] = []
+    for low, high in itertools.pairwise(cuts):
+        middle = 0.5 * (low + high)
+        if n + middle < rise:
+            parts.append((low, high, (n + _Extended(low)) / rise, 1 / (rise * _TURN)))
+        elif cycles - n - middle < fall:
+            parts.append((low, high, (cycles - n - _Extended(low)) / fall, -1 / (fall * _TURN)))
+        else:
+            parts.append((low, high, _Extended(1), _Extended(0)))
+    return parts
+
+
+def _pieces(waveform: Waveform, n: int) -> list[_Piece]:
+    """The pieces of cycle n."""
+    period = _period(waveform)
+    pieces: list[_Piece] = []
+    for low, high, at, rate in _envelope(waveform, n):
+        for i, (start, end) in enumerate(itertools.pairwise(period.breaks)):
+            start, end = max(start, low), min(end, high)
+            if end - start > _SAME:
+                pieces += _smooth_pieces(period, i, start, end, (at + rate * (_Extended(start) - low) * _TURN, rate))
+    return pieces
+
+
+def _smooth_pieces(period: _Period, i: int, low: float, high: float, envelope: tuple[Any, Any]) -> list[_Piece]:
+    """The pieces between two places behind break i."""
+    zeros, turns = _turning_points(period, i, low, high, envelope)
+
+    def near(u: float, others: Iterable[float]) -> bool:
+        return any(abs(u - other) <= _SAME for other in others)
+
+    ends = [low]
+    for u in sorted([*zeros, *turns]):
+        if u - ends[-1] > _SAME and high - u > _SAME:
+            ends.append(u)
+    ends.append(high)
+    points = [low]
+    for a, b in itertools.pairwise(ends):
+        parts = max(1, math.ceil(period.fastest * (b - a) * 2.0 * math.pi / _LONGEST - 1e-9))
+        points += [a + (b - a) * part / parts for part in range(1, parts)] + [b]
+
+    at, rate = envelope
+    places = np.array(points)
+    scale = at + rate * (places.astype(_Extended) - low) * _TURN
+    orders = range(TERMS + 1) if period.fastest else range(2)
+    taylor = [period.derivative(i, places, order) / math.factorial(order) for order in orders]
+    # the product with the envelope, a straight line
+    series = np.zeros((TERMS + 1, places.size), _Extended)
+    for order, term in enumerate(taylor):
+        series[order] += scale * term
+        if order < TERMS:
+            series[order + 1] += rate * term
+    for j, point in enumerate(points):
+        if near(point, zeros):
+            series[0, j] = 0
+        if near(point, turns):
+            series[1, j] = 0
+    values = series[0].astype(np.float64)
+    values[np.abs(values) < _ROUNDING] = 0.0
+    pieces = []
+    for j in range(len(points) - 1):
+        at_end = bool(abs(values[j + 1]) > abs(values[j]))
+        coefficients = series[1:, j + at_end].astype(np.float64)
+        pieces.append(
+            _Piece(points[j], points[j + 1], float(values[j]), float(values[j + 1]), at_end, tuple(coefficients))
+        )
+    return pieces
+
+
+# ------------------------------------------------------------------------------ the table
+
+
+@functools.lru_cache(maxsize=32)
+def wave_of(waveform: Waveform) -> Wave:
+    """The table of pieces of a waveform."""
+    cycles, plain = waveform.cycles, _pieces(waveform.plain, 0)
+    wraps = plain[0].first > 0.0 and plain[-1].last > 0.0
+    # a stretch that runs over from one cycle to the next makes the first cycle differ from the others
+    lead = min(math.ceil(waveform.ramp_in) + int(wraps), cycles)
+    # the last plain cycle stands apart, as another does not follow; where stretches run over, so does the one before
+    tail = min(math.ceil(waveform.ramp_out) + 1 + int(wraps), cycles - lead)
+    repeats = cycles - lead - tail
+    numbers = [*range(lead), *([lead] if repeats else []), *range(cycles - tail, cycles)]
+    ramped = [n < waveform.ramp_in or n + 1 > cycles - waveform.ramp_out for n in numbers]
+    rows = [_pieces(waveform, n) if own else plain for n, own in zip(numbers, ramped, strict=True)]
+    shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
+
+    pieces = [piece for row in rows for piece in row]
+    offset = np.repeat(2.0 * math.pi * np.arange(len(rows)), [len(row) for row in rows])
+    first = np.array([piece.first for piece in pieces])
+    last = np.array([piece.last for piece in pieces])
+    at_end = np.array([piece.at_end for piece in pieces])
+    length = 2.0 * math.pi * np.array([piece.end - piece.start for piece in pieces])
+    coefficients = np.array([piece.coefficients for piece in pieces])
+    power = np.arange(1, TERMS + 1)
+    before = np.concatenate([[0.0], last[:-1]])
+    first = np.where(np.abs(first - before) < _ROUNDING, before, first)  # two cycles' roundings are no jump
+    jumps = first > np.maximum(before, 0.0)
+    stretch = _stretches(first, last)
+    top = np.maximum(first, last)
+    named = {
+        START: offset + 2.0 * math.pi * np.array([piece.start for piece in pieces]),
+        END: offset + 2.0 * math.pi * np.array([piece.end for piece in pieces]),
+        BEGIN: np.where(at_end, -length, 0.0),
+        FINISH: np.where(at_end, 0.0, length),
+        FIRST: first,
+        LAST: last,
+        TOP: np.where(at_end, last, first),
+        DEGREE: np.where(coefficients != 0.0, power, 0).max(axis=1),
+        JUMPS: jumps,
+        ARC: np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
+    }
+    series = [coefficients, coefficients / (power + 1), coefficients / ((power + 1) * (power + 2))]
+    return Wave(
+        pieces=np.ascontiguousarray(np.column_stack([*(named[column] for column in range(len(named))), *series])),
+        cycle=np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64),
+        shape=np.array(shape, np.int64),
+        stretch=stretch,
+        height=np.array([top[a:b].max() for a, b in stretch]),
+        rises=_rises(first, last, jumps),
+        lead=lead,
+        repeats=repeats,
+        alike=repeats > 0 and tail == 1 and not wraps and not ramped[-1],
+    )
+
+
+def _stretches(first: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Runs of pieces above zero; one that touches zero ends there."""
+    above = first + last > 0.0
+    starts, ends = [], []
+    for p in range(first.size):
+        if above[p] and (p == 0 or not above[p - 1] or last[p - 1] == first[p] == 0.0):
+            starts.append(p)
+        if above[p] and (p + 1 == first.size or not above[p + 1] or last[p] == first[p + 1] == 0.0):
+            ends.append(p + 1)
+    return np.array([starts, ends], np.int64).T.reshape(-1, 2).copy()
+
+
+def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Ranges of w > 0 passed through or jumped to without falling, joined where they overlap."""
+    above = first + last > 0.0
+    found = sorted((first[p], max(first[p], last[p])) for p in np.flatnonzero(above & ((last >= first) | jumps)))
+    joined: list[list[float]] = []
+    for low, high in found:
+        if joined and low <= joined[-1][1]:
+            joined[-1][1] = max(joined[-1][1], high)
+        else:
+            joined.append([low, high])
+    return np.array(joined, np.float64).reshape(-1, 2)
