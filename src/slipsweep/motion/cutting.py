@@ -29,7 +29,7 @@ from slipsweep.motion.pieces import ARC, BEGIN, DEGREE, END, FINISH, FIRST, JUMP
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
 #: Longest piece of a smooth wave, in radians of its fastest harmonic: the first term of its Taylor series
-#: beyond `pieces.TERMS` is below 1e-18.
+#: beyond `pieces.TERMS` is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
 _LONGEST = 0.5 * math.pi
 
 #: Points of a cycle closer than this, as parts of it, are one.
