@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import MISSING
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +16,11 @@ import pytest
 
 import slipsweep
 from slipsweep.files import spec
+from slipsweep.model.choices import declared
+from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.model.variables import VALIDITY_TEXT, VALUELESS, Validity
+from slipsweep.motion.reading import Reading
+from slipsweep.motion.waveforms import WAVEFORMS
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (
@@ -267,12 +272,18 @@ def test_keys_are_those_of_the_schema(heading: str, table: Any) -> None:
     assert list(keys) == ["key", *table.model_fields] + (["NAME"] if axes else [])
     if axes:
         assert list(axes) == list(spec.Axes.model_fields)
+    # a table of a choice takes the defaults of its options from their declaration
+    families: dict[Any, Any] = {spec.ModelTable: MODELS, spec.ExcitationTable: WAVEFORMS, spec.SolverTable: SOLVERS}
+    options = dict(families[table].options) if table in families else {}
+    if table is spec.ExcitationTable:
+        options |= {one.name: one for one in declared(Reading)}
     for name, field in table.model_fields.items():
-        default = keys[name][2].strip("`")
-        if field.is_required():
-            assert default == "–", name
-        elif field.default is not None:
-            assert default.replace('"', "'") == (repr(field.default)), name
+        stated = keys[name][2].strip("`")
+        default = options[name].default if name in options else field.default
+        if field.is_required() or default is MISSING:
+            assert stated == "–", name
+        elif default is not None:
+            assert stated.replace('"', "'") == repr(default), name
 
 
 def test_the_table_of_contents_of_a_file_names_every_dimension() -> None:

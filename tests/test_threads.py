@@ -163,7 +163,7 @@ LONG = {
     "frequencies": "np.linspace(0, 20, 300), np.linspace(0.2, 0.9, 300), 3.0, np.linspace(0.1, 9, 20_000), "
     "variables=['sliding_mode']",
     "step": "np.linspace(0, 20, 200), np.linspace(0.2, 0.9, 200), np.linspace(0.5, 13, 500), 1.0, "
-    "solver='step', steps_per_cycle=1_000_000, variables=['permanent_displacement']",
+    "solver=slipsweep.Step(steps_per_cycle=1_000_000), variables=['permanent_displacement']",
 }
 
 
@@ -174,7 +174,7 @@ def test_an_interrupt_is_heard_at_once(kind: str, limit: str) -> None:
     program = (
         (
             "import numpy as np, slipsweep\n"
-            "options = dict(solver='step', steps_per_cycle=8) if 'step' in ARGUMENTS else {}\n"
+            "options = dict(solver=slipsweep.Step(steps_per_cycle=8)) if 'Step' in ARGUMENTS else {}\n"
             "slipsweep.sweep(1.0, 0.38, 3.0, 1.0, **options)  # machine code\n"
             "print('ready', flush=True)\n"
             "try: slipsweep.sweep(LONG)\n"

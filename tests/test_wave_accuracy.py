@@ -246,5 +246,6 @@ def test_a_grid_is_its_cells() -> None:
     assert lazy.equals(grid)
     one = displacement(theta=5.0, mu_s=0.3, amplitude=4.0, frequency=2.0, **WAVES["ramped harmonics"], cycles=5)
     assert float(grid.permanent_displacement.sel(theta=5, mu_s=0.3, amplitude=4, frequency=2)) == one
-    assert grid.attrs["harmonics"] == "1:1:0,0.6:2:40,0.35:5:100"
+    terms = {"amplitudes": (1.0, 0.6, 0.35), "multiples": (1, 2, 5), "phases": (0.0, 40.0, 100.0)}
+    assert {name: grid.attrs[name] for name in terms} == terms
     assert grid.attrs["ramp_in"] == 2
