@@ -54,6 +54,7 @@ def test_a_result_has_the_name_that_was_given(tmp_path: Path, stem: bytes, monke
         assert file["permanent_displacement"].shape == (2, 1, 2, 2)
     for command in (
         ["info"],
+        ["explore", "-o", "a.html"],
         ["export", "-o", "a.csv"],
         ["chart", "-o", "a.png", "-k", "contours"],
         ["run", "-o", "b.nc"],
@@ -84,3 +85,19 @@ def test_the_very_longest_name(tmp_path: Path) -> None:
     for length in (300, 255):
         assert "File name too long" in failed(slipsweep(tmp_path, "run", "a.toml", "-o", "y" * length))
     assert len(os.listdir(tmp_path)) == 4
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="its names are UTF-8 whatever the locale")
+def test_where_names_are_ascii(tmp_path: Path) -> None:
+    """Bytes of a command line are served; letters of a sweep file that make no bytes are refused."""
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    (tmp_path / "ü.toml").write_text(CELL)
+    assert slipsweep(tmp_path, "run", "ü.toml", environment=ascii_only).returncode == 0
+    assert slipsweep(tmp_path, "info", "ü.nc", environment=ascii_only).returncode == 0
+    (tmp_path / "a.toml").write_text(CELL + '[output]\npath = "ö.nc"\n', encoding="utf-8")
+    done = slipsweep(tmp_path, "run", "a.toml", environment=ascii_only)
+    assert "no file can have this name where names are ascii" in failed(done)
+    record = '[excitation]\nrecord = "ö.csv"\n[axes.theta]\nvalues = [5]\n[axes.mu_s]\nvalues = [0.4]\n'
+    (tmp_path / "r.toml").write_text(record, encoding="utf-8")
+    assert "cannot be read" in failed(slipsweep(tmp_path, "run", "r.toml", environment=ascii_only))
+    assert {*os.listdir(tmp_path)} == {"ü.toml", "ü.nc", "a.toml", "r.toml"}

@@ -113,7 +113,10 @@ def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
     from slipsweep.files import outputs
 
     columns = {name: table[name] for name in ("time", *HISTORY)}
-    with outputs.complete_or_absent(path, overwrite) as temporary, temporary.open("w", newline="") as file:
+    with (
+        outputs.complete_or_absent(path, overwrite) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(f"{name} ({array.attrs['units']})" for name, array in columns.items())
         writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))

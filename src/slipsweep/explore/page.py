@@ -330,7 +330,8 @@ def write_page(
         if taken <= _CELLS_SHARE * room:
             break
     histories = compute_histories(excerpt, int(min(room - taken, _HISTORIES_BYTES)))
-    text = page(excerpt, histories, path.name, script)
+    name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
+    text = page(excerpt, histories, name, script)
     with outputs.complete_or_absent(output, overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return excerpt

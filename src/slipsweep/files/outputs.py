@@ -74,6 +74,8 @@ def check_outputs(
             _check_output(path, overwrite, folder)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        except UnicodeEncodeError as error:  # a name from a sweep file
+            raise InputError(f"{path}: no file can have this name where names are {error.encoding}") from None
     for path, other in itertools.combinations(paths, 2):
         if path.parent.samefile(other.parent) and _same_name(path, other):
             raise InputError(f"{other}: is given twice as an output of this command; give each another name")
