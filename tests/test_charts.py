@@ -1,6 +1,6 @@
 """Charts: what they show is the model's, and nothing is read that they do not show."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -267,7 +267,7 @@ def test_only_what_is_shown_is_read(grid: Path, monkeypatch: pytest.MonkeyPatch,
     read: dict[str, int] = {}
     original = Result.read
 
-    def counted(self: Result, name: str, where: tuple[Any, ...]) -> Any:
+    def counted(self: Result, name: str, where: Mapping[str, Any]) -> Any:
         values = original(self, name, where)
         read[name] = read.get(name, 0) + values.size
         return values
@@ -393,7 +393,8 @@ def test_cuts_with_units(grid: Path) -> None:
 def test_not_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "text.nc").write_text("no")
     netCDF4.Dataset(tmp_path / "other.nc", "w").close()
-    for name, message in (("text.nc", "not a netCDF"), ("other.nc", "not a result"), ("none.nc", "no such file")):
+    refused = {"text.nc": "not a netCDF", "other.nc": "not written by slipsweep", "none.nc": "no such file"}
+    for name, message in refused.items():
         assert main(["chart", str(tmp_path / name)]) == 2
         assert message in capsys.readouterr().err
 

@@ -11,7 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from slipsweep.files.netcdf import coordinate_names
+from slipsweep.files.results import ResultFile
 
 #: Missing values, every sliding mode and four flags.
 GRID = """
@@ -217,8 +217,9 @@ def test_nco_reads_every_variable(files: Path, name: str) -> None:
 def test_cdo_reads_every_variable(files: Path, name: str) -> None:
     """CDO knows three dimensions beside time; of larger grids NCO cuts slices for it."""
     cdo, ncks, ncwa = program("cdo"), program("ncks"), program("ncwa")
+    with ResultFile(files / f"{name}.nc") as file:
+        coordinates = {*file.coordinates}
     with netCDF4.Dataset(files / f"{name}.nc") as file:
-        coordinates = coordinate_names(file)
         widest = max((variable.dimensions for variable in file.variables.values()), key=len)
         cut = list(widest)[:-3]
         dims = {variable: file[variable].dimensions for variable in file.variables}

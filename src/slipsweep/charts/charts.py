@@ -21,6 +21,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from slipsweep.charts.style import ORANGE, PURPLE, SKY_BLUE, VERMILION, axis_label, caption, plain, unit, value_text
+from slipsweep.errors import InputError
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import RESULTS, SlidingMode, Validity
 
@@ -91,7 +92,9 @@ def contours(table: Table, lines: Boundaries, name: str, x: str, y: str) -> Figu
     values = _grid(table[name], table, y, x)
     entries = _upslope(axes, table, values, x, y)
     levels = _levels(name, values)
-    if levels:
+    if not levels:
+        entries.append(Patch(facecolor="none", label=_without_levels(name, values)))
+    else:
         # contours of the logarithm; what is below the lowest level, or nothing, is a hundredth of it
         with np.errstate(divide="ignore", invalid="ignore"):
             logs = np.maximum(np.log10(values), math.log10(levels[0]) - 2)
@@ -183,6 +186,8 @@ def newmark_ratio(table: Table, baseline: Variable, lines: Boundaries, x: str, y
         bar.ax.set_yticklabels([f"{level:g}" for level in levels])
         bar.ax.minorticks_off()
         bar.set_label("permanent displacement over that of Newmark's block")
+    elif not equal.any():
+        entries.append(Patch(facecolor="none", label="no ratio: no displacement above zero"))
     _finish_map(figure, axes, table, lines, x, y, [*entries, *crossing])
     return figure
 
@@ -204,10 +209,11 @@ def families(table: Table, lines: Boundaries, name: str, x: str, family: str) ->
     accelerations = _grid(table["amplitude"], table, family, x)
     millimetres = RESULTS[name].get("units") == "m"
     members = table[family].values
+    check_positive(RESULTS[name]["long_name"], values)
     for member, colour in zip(range(members.size), curve_colours(members.size), strict=True):
         curve = np.where(values[member] > 0, values[member], np.nan) * (1000 if millimetres else 1)
         xs, curve = _broken(table[x].values, curve, accelerations[member], _along(lines, table, family, x, member))
-        axes.plot(xs, curve, color=colour, label=value_text(family, members[member]))
+        plot_curve(axes, xs, curve, color=colour, label=value_text(family, members[member]))
     axes.set_yscale("log")
     set_scale(axes, "x", table[x].values)
     limit_decades(axes, values * (1000 if millimetres else 1), _LEAST * 1000 if millimetres else None)
@@ -238,6 +244,10 @@ def dimensionless(table: Table, lines: Boundaries, family: str | None) -> Figure
     """
     figure, axes = new_plot()
     curves = dimensionless_curves(table, lines, family)
+    # the paper's axis begins at the yield acceleration
+    check_positive(
+        "displacement beyond the yield acceleration", np.concatenate([ys[xs > 1] for xs, ys in curves.values()])
+    )
     members = table[family].values if family else np.zeros(1)
     markers = ("", "o", "x", "s", "+", "D")
     frequencies = np.atleast_1d(table["frequency"].values)
@@ -249,7 +259,7 @@ def dimensionless(table: Table, lines: Boundaries, family: str | None) -> Figure
             if number == 0:
                 amplitudes = xs * _along(lines, table, family, None, member)["yield_acceleration"]
                 xs, ys = _broken(xs, ys, amplitudes, _along(lines, table, family, None, member))
-                axes.plot(xs, ys, color=colour, label=text)
+                plot_curve(axes, xs, ys, color=colour, label=text)
             else:
                 # a few markers a curve, each frequency's between those of the others
                 every = max(1, xs.size // 12)
@@ -416,11 +426,22 @@ def _levels(name: str, values: Floats) -> list[float]:
     else:
         low = max(low, high * 1e-5)
     decades = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1)
-    every = [digit * 10.0**decade for decade in decades for digit in (1, 3)]
+    every = [float(f"{digit}e{decade}") for decade in decades for digit in (1, 3)]
     inside = [level for level in every if low * (1 - 1e-9) <= level <= high * (1 + 1e-9)]
     if len(inside) < 2:  # values of about one size: levels among them
         return [float(f"{level:.3g}") for level in np.geomspace(low, high, 6)] if high > low * 1.01 else []
     return inside
+
+
+def _without_levels(name: str, values: Floats) -> str:
+    """Why a map has no contours."""
+    there = values[np.isfinite(values)]
+    if not there.size:
+        return "no values"
+    if not (there > 0).any():
+        return "no values above zero"
+    low, high = (_value_label(name, float(value)) for value in (there[there > 0].min(), there.max()))
+    return f"all values above zero: {low}" + (f" to {high}" if high != low else "")
 
 
 def _value_label(name: str, value: float) -> str:
@@ -508,6 +529,23 @@ def second_scale(axes: Axes, table: Table, side: str) -> None:
         else axes.secondary_xaxis("top", functions=convert)
     )
     getattr(other, f"set_{side}label")("A / g")
+
+
+def plot_curve(axes: Axes, xs: Floats, ys: Floats, **look: Any) -> None:
+    """Draw a line, and points where a value has no neighbour to be joined with."""
+    there = np.concatenate([[False], np.isfinite(ys), [False]])
+    alone = there[1:-1] & ~there[:-2] & ~there[2:]
+    if alone.any():
+        look |= {"marker": ".", "markevery": alone.tolist()}
+    axes.plot(xs, ys, **look)
+
+
+def check_positive(name: str, values: Floats) -> None:
+    """Refuse what a logarithmic axis cannot show (InputError)."""
+    there = values[np.isfinite(values)]
+    if not (there > 0).any():
+        reason = "no value" if not there.size else "no value above zero"
+        raise InputError(f"{name}: {reason} in this slice, and the axis is logarithmic; cut it elsewhere (--at)")
 
 
 def limit_decades(axes: Axes, values: Floats, least: float | None) -> None:
@@ -611,4 +649,4 @@ def add_legend(axes: Axes, figure: Figure, handles: Any = None, labels: Any = No
 def add_caption(figure: Figure, table: Table) -> None:
     """Parameters, model and origin, under the figure."""
     case = f"case {plain(table.attrs['case'])}: " if "case" in table.attrs else ""
-    figure.supxlabel(f"{case}{caption(table)}; {table.attrs['source']}", fontsize="small")
+    figure.supxlabel(f"{case}{caption(table)}; {table.attrs.get('source', 'slipsweep')}", fontsize="small")

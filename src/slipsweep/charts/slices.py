@@ -8,6 +8,7 @@ and what Newmark's block does on the same cells.
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -16,16 +17,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.charts.style import drawn_text
 from slipsweep.errors import InputError
-from slipsweep.files.names import open_netcdf
+from slipsweep.files.results import ResultFile, Where, open_result
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.model.options import MODELS
+from slipsweep.model.variables import HISTORY, PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.motion.waveforms import WAVEFORMS
 
 Floats = NDArray[np.float64]
 
 #: What a file may hold along its axes, and on them.
 _COORDINATES = PARAMETERS | STATISTIC_COORDINATES
 _RESULTS = RESULTS | STATISTICS
+
+#: Codes of cells, and what stands for a missing one.
+CODES = {"sliding_mode": -1, "validity": 0}
+
+#: Largest number that is drawn: products of a few of them are still numbers.
+_MOST = 1e75
 
 #: Points of an axis that a figure shows: more than one for every two dots on paper is lost.
 MOST_POINTS = 600
@@ -55,31 +65,29 @@ class Result:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
-        try:
-            self._file = open_netcdf(path)
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
-        try:
-            self.attrs: dict[str, Any] = {name: self._file.getncattr(name) for name in self._file.ncattrs()}
-            if not str(self.attrs.get("source", "")).startswith("slipsweep ") or "sweep" not in self.attrs:
-                raise InputError(f'{path}: not a result of "slipsweep run"')
-            if "record" in self.attrs:
+        with ExitStack() as stack:
+            self._file = stack.enter_context(open_result(path))
+            if "record" in self._file.attrs:
                 raise InputError(
                     f"{path}: is the response to a recorded motion; charts are drawn of harmonic sweeps only "
                     "(slipsweep export makes a table of it)"
                 )
-            self._file.set_auto_mask(False)
-            dims = [dim for dim in self._file.dimensions if dim != "label_length"]
-            self.axes: dict[str, Floats] = {
-                dim: self.read(dim, ()) if dim in self._file.variables else np.arange(1.0, 1 + self._length(dim))
-                for dim in dims
-            }
-            self.labels: list[str] = list(self._file["label"][:]) if "label" in self._file.variables else []
-        except BaseException:
-            self._file.close()
-            raise
+            check_sweep(self._file)
+            self.attrs: dict[str, Any] = self._file.attrs
+            #: Names of the results in the file.
+            self.variables = [name for name in self._file.results if name in _RESULTS]
+            #: Names of the parameters in the file: axes, scalars, and those that lie along other dimensions.
+            self.coordinates = [name for name in _COORDINATES if name in self._file.coordinates]
+            dims = {dim for name in (*self.variables, *self.coordinates) for dim in self._file[name].dims}
+            found = {dim: self._file.axis(dim) for dim in self._file.sizes if dim in dims}
+            for dim, (values, _) in found.items():
+                check_drawable(path, dim, values)
+            self.axes: dict[str, Floats] = {dim: values for dim, (values, _) in found.items()}
+            self._places = {dim: places for dim, (_, places) in found.items()}
+            if not all(values.size for values in self.axes.values()):
+                raise InputError(f"{path}: holds no cells")
+            self.labels: list[str] = self._file.labels
+            self._open = stack.pop_all()
 
     def __enter__(self) -> "Result":
         return self
@@ -87,31 +95,38 @@ class Result:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
-
-    def _length(self, dim: str) -> int:
-        return len(self._file.dimensions[dim])
-
-    @property
-    def variables(self) -> list[str]:
-        """Names of the results in the file."""
-        return [name for name in self._file.variables if name in _RESULTS and name not in self.coordinates]
-
-    @property
-    def coordinates(self) -> list[str]:
-        """Names of the parameters in the file: axes, scalars, and those that lie along other dimensions."""
-        named = " ".join(v.coordinates for v in self._file.variables.values() if "coordinates" in v.ncattrs()).split()
-        return [name for name in _COORDINATES if name in self._file.variables and (name in named or name in self.axes)]
+        self._open.close()
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a variable."""
-        return tuple(self._file[name].dimensions)
+        return self._file[name].dims
 
-    def read(self, name: str, where: tuple[Any, ...]) -> NDArray[Any]:
-        """Read one hyperslab: the only way that values come out of the file."""
-        return np.asarray(self._file[name][where or ...])
+    def read(self, name: str, where: Where) -> NDArray[Any]:
+        """Read one hyperslab along ascending axes: the only way that values come out of the file.
+
+        `where` says for each axis what to read of it, a dimension that is not named as a whole.
+        """
+        variable = self._file[name]
+        there = {dim: self._places[dim][where.get(dim, slice(None))] for dim in variable.dims if dim in self._places}
+        if name in CODES:
+            return variable.read_codes(there, CODES[name])
+        values = variable.read_floats(there)
+        check_drawable(self.path, name, values)
+        return values
 
     # ------------------------------------------------------------------------ what is meant
+
+    @property
+    def wide(self) -> list[str]:
+        """Axes that a chart can be drawn over: those of a parameter that has more than one value."""
+        return [dim for dim, values in self.axes.items() if values.size > 1 and dim in self.coordinates]
+
+    def require(self, *names: str) -> None:
+        """Refuse a file that has lost a parameter (InputError)."""
+        derived = {"amplitude"} if {"displacement_amplitude", "frequency"} <= {*self.coordinates} else set()
+        for name in names:
+            if name not in derived.union(self.coordinates):
+                raise InputError(f"{self.path}: {name}: not in the file, but this chart needs it")
 
     def axis(self, name: str) -> str:
         """`name` if it is an axis with more than one value.
@@ -121,12 +136,13 @@ class Result:
         InputError
             Naming the axes there are.
         """
-        wide = [dim for dim, values in self.axes.items() if values.size > 1 and dim != "case"]
-        if name in wide:
+        if name in self.wide:
             return name
         if name in self.axes or name in self.coordinates:
-            raise InputError(f"{self.path}: {name}: has no more than one value along an axis of its own; {_list(wide)}")
-        raise InputError(f"{self.path}: {name}: no such axis; {_suggest(name, wide)}")
+            raise InputError(
+                f"{self.path}: {name}: has no more than one value along an axis of its own; {_list(self.wide)}"
+            )
+        raise InputError(f"{self.path}: {name}: no such axis; {_suggest(name, self.wide)}")
 
     def result(self, name: str) -> str:
         """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
@@ -162,7 +178,7 @@ class Result:
                 found[name] = self.labels.index(value)
                 continue
             number = self._number(name, value)
-            values = self.axes[name] if name in self.axes else np.atleast_1d(self.read(name, ()))
+            values = self.axes[name] if name in self.axes else np.atleast_1d(self.read(name, {}))
             steps = np.diff(values)
             # an axis of one value takes that value, give or take its rounding
             low, high = (steps[0] / 2, steps[-1] / 2) if steps.size else (1e-6 * abs(values[0]),) * 2
@@ -231,11 +247,10 @@ class Result:
         def variable(name: str) -> Variable:
             dims = self.dims(name)
             attrs = _COORDINATES[name] if name in self.coordinates else _RESULTS[name]
-            parts = tuple(where[dim] for dim in dims)
-            return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, parts), attrs)
+            return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, where), attrs)
 
         coords = {name: variable(name) for name in self.coordinates}
-        if "displacement_amplitude" in coords and "amplitude" not in coords:
+        if {"displacement_amplitude", "frequency"} <= coords.keys() and "amplitude" not in coords:
             coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
         chosen = {"case": self.labels[where["case"]]} if self.labels and "case" not in keep else {}
         attrs = {**self.attrs, **chosen}
@@ -250,6 +265,47 @@ class Result:
         """Indices of `number` values at most, from end to end of an axis."""
         size = self.axes[dim].size
         return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
+
+
+def check_drawable(path: Path, name: str, values: NDArray[Any], most: float = _MOST) -> None:
+    """Refuse numbers that no drawing library can place (InputError)."""
+    beyond = values[np.abs(values) > np.float64(most)]  # np.float64: single precision would make it infinite
+    if beyond.size:
+        raise InputError(f"{path}: {name}: holds {beyond.flat[0]:.4g}; what is drawn must be within +-{most:g}")
+
+
+def check_sweep(file: ResultFile) -> None:
+    """Refuse a file that is no result of a sweep, or does not say any more what was solved.
+
+    Raises
+    ------
+    InputError
+        It holds something else; an attribute is missing or none that slipsweep writes; another program
+        has put values into other units.
+    """
+    others = {"limit_amplitude", *HISTORY}
+    if others & file.variables.keys() or not any(name in _RESULTS for name in file.results):
+        raise InputError(f'{file.path}: not a result of "slipsweep run"')
+    for name, attributes in [*_COORDINATES.items(), *_RESULTS.items()]:
+        found = file[name].attrs.get("units") if name in file else None
+        if found is not None and found != attributes.get("units", found):
+            raise InputError(f'{file.path}: {name}: units = "{found}"; must be "{attributes["units"]}"')
+    options = (
+        "model",
+        "g",
+        "cycles",
+        "waveform",
+        *(("rise", "recoupling") if file.attrs.get("model") == "mendez" else ()),
+    )
+    for name in options:  # none has its default: what has been solved is not known any more
+        if name not in file.attrs:
+            raise InputError(f"{file.path}: attribute {name!r}: missing; it says what was solved")
+    try:
+        MODELS.from_attributes(file.attrs)
+        WAVEFORMS.from_attributes(file.attrs)
+        drawn_text(file.attrs)
+    except (ValueError, TypeError) as error:  # InputError, and what numpy says of arrays
+        raise InputError(f"{file.path}: {error}") from None
 
 
 def _list(names: Sequence[str]) -> str:
@@ -309,7 +365,6 @@ def newmark(table: Table) -> Variable:
     """Permanent displacement of Newmark's block on the cells of a slice, swept anew."""
     from slipsweep.grid.plans import plan_sweep
     from slipsweep.model.options import Newmark
-    from slipsweep.motion.waveforms import WAVEFORMS
 
     drive = "displacement_amplitude" if "displacement_amplitude" in table.coords else "amplitude"
     given = ("theta", "mu_s", drive, "frequency", "yield_acceleration")

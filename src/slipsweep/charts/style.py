@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from slipsweep.errors import InputError
 from slipsweep.grid.tables import Table
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS
@@ -58,7 +59,8 @@ def caption(table: Table) -> str:
     single = [name for name in SYMBOLS if name in table.coords and table[name].values.size == 1]
     parts = [value_text(name, table[name].item()) for name in single]
     attributes = table.attrs
-    uncertain = [f"uncertain: {_drawn_text(attributes)}"] if "uncertain" in attributes else []
+    drawn = drawn_text(attributes)
+    uncertain = [f"uncertain: {drawn}"] if drawn else []
     return "\n".join([", ".join(parts), *uncertain, model_text(attributes)]).strip()
 
 
@@ -69,11 +71,24 @@ def model_text(attributes: Mapping[str, Any]) -> str:
     return f"model: {', '.join(words)}; {WAVEFORMS.from_attributes(attributes)}"
 
 
-def _drawn_text(attributes: Mapping[str, Any]) -> str:
-    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``."""
+def drawn_text(attributes: Mapping[str, Any]) -> str:
+    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``; empty if none.
+
+    Raises
+    ------
+    InputError
+        The attributes are not those that slipsweep writes.
+    """
+    if "uncertain" not in attributes:
+        return ""
     signs = {"absolute": "~", "factor": "×", "offset": "+"}
     texts = []
-    for name, about in json.loads(attributes["uncertain"]).items():
-        numbers = ", ".join(f"{key}={value}" for key, value in about.items() if key not in ("distribution", "kind"))
-        texts.append(f"{SYMBOLS[name]} {signs[about['kind']]} {about['distribution']}({numbers})")
-    return f"{', '.join(texts)}; {attributes['samples']} samples"
+    try:
+        for name, about in json.loads(attributes["uncertain"]).items():
+            numbers = ", ".join(f"{key}={value}" for key, value in about.items() if key not in ("distribution", "kind"))
+            texts.append(f"{SYMBOLS[name]} {signs[about['kind']]} {about['distribution']}({numbers})")
+    except (ValueError, TypeError, LookupError, AttributeError):
+        raise InputError(
+            f"attribute uncertain = {attributes['uncertain']!r}: names no distributions of inputs"
+        ) from None
+    return f"{', '.join(texts)}; {attributes.get('samples', '?')} samples"

@@ -38,7 +38,7 @@ def fragility(table: Table, x: str, family: str | None) -> Figure:
     members = table[family].values if family else np.zeros(1)
     for curve, member, colour in zip(curves, members, charts.curve_colours(members.size), strict=True):
         text = _threshold_text(table["threshold"].item()) if family is None else _member_text(family, member)
-        axes.plot(table[x].values, curve, color=colour, label=text)
+        charts.plot_curve(axes, table[x].values, curve, color=colour, label=text)
     shares = np.atleast_2d(charts.broadcast(table["valueless_share"], table, dims))
     if shares.any():
         axes.plot(table[x].values, shares.max(axis=0), color="0.4", linestyle=":", label="no value (share)")
@@ -62,6 +62,7 @@ def quantile_bands(table: Table, x: str) -> Figure:
     figure, axes = charts.new_plot()
     values = charts.broadcast(table["displacement_quantile"], table, ("quantile", x)) * 1000.0
     quantiles, xs = np.atleast_1d(table["quantile"].values), table[x].values
+    charts.check_positive("permanent displacement", values)
     axes.set_yscale("log")
     charts.limit_decades(axes, values, _LEAST)
     if (values <= 0).any() and axes.get_ylim()[1] > 10 * _LEAST:

@@ -93,7 +93,7 @@ def chart(
         fitting = _STATISTIC_CHARTS if "exceedance_probability" in result.variables else _SWEEP_CHARTS
         wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in kinds or fitting}
         outputs.check_outputs([path for paths in wanted.values() for path in paths], overwrite, reads=[file])
-        if not any(values.size > 1 for dim, values in result.axes.items() if dim != "case"):
+        if not result.wide:
             raise InputError(
                 f"{file}: no chart can be drawn: it has no axis of two values or more (its dimensions: "
                 f"{', '.join(f'{dim}, {values.size}' for dim, values in result.axes.items()) or 'none'})"
@@ -144,15 +144,14 @@ def _axes(result: "Result", wish: _Wish, variable: str, x: tuple[str, ...], y: t
             )
     if wish.x is not None and wish.x == wish.y:
         raise InputError(f"--x {wish.x} --y {wish.y}: must be two different axes")
-    free = [d for d in dims if d != "case" and result.axes[d].size > 1 and d not in named and d not in wish.at]
+    free = [d for d in dims if d in result.wide and d not in named and d not in wish.at]
     chosen = []
     for asked, preferred in ((wish.y, y), (wish.x, x)):
         taken = asked or next((p for p in (*preferred, *free) if p in free), None)
         if taken is None:
-            wide = [d for d, values in result.axes.items() if values.size > 1]
             raise InputError(
                 f"{result.path}: a chart needs two axes of two values or more that --at does not cut; "
-                f"{variable} has {', '.join(wide) or 'none'}"
+                f"{variable} has {', '.join(d for d in dims if d in result.wide) or 'none'}"
             )
         if taken in free:
             free.remove(taken)
@@ -181,6 +180,7 @@ def _contours(result: "Result", wish: _Wish) -> "Figure":
 
     name = _continuous(result, wish.variable)
     x, y = _axes(result, wish, name, ("frequency", "theta", "mu_s"), _DRIVES)
+    result.require("theta", "mu_s", "amplitude")
     table = result.select(_shown(result, name), {x: result.thinned(x), y: result.thinned(y)}, wish.at)
     return charts.contours(table, slices.boundaries(table), name, x, y)
 
@@ -189,6 +189,7 @@ def _modes(result: "Result", wish: _Wish) -> "Figure":
     from slipsweep.charts import charts, slices
 
     x, y = _axes(result, wish, "sliding_mode", ("theta", "mu_s", "frequency"), _DRIVES)
+    result.require("theta", "mu_s", "amplitude")
     table = result.select(_shown(result, "sliding_mode"), {x: result.thinned(x), y: result.thinned(y)}, wish.at)
     return charts.modes(table, slices.boundaries(table), x, y)
 
@@ -198,6 +199,7 @@ def _families(result: "Result", wish: _Wish) -> "Figure":
 
     name = _continuous(result, wish.variable)
     x, family = _axes(result, wish, name, _DRIVES, ("frequency", "mu_s", "theta"))
+    result.require("theta", "mu_s", "amplitude")
     table = result.select([name], {x: result.thinned(x), family: result.spread(family, _CURVES)}, wish.at)
     return charts.families(table, slices.boundaries(table), name, x, family)
 
@@ -218,6 +220,7 @@ def _dimensionless(result: "Result", wish: _Wish) -> "Figure":
         raise InputError(f"{result.path}: --y {family}: must be an axis other than {', '.join(keep)}")
     if family:
         keep[family] = result.spread(family, _CURVES)
+    result.require("theta", "mu_s", "amplitude", "frequency")
     table = result.select([name], keep, wish.at)
     return charts.dimensionless(table, slices.boundaries(table), family)
 
@@ -229,6 +232,7 @@ def _newmark(result: "Result", wish: _Wish) -> "Figure":
     if result.attrs["model"] == "newmark":
         raise InputError(f"{result.path}: is of Newmark's block itself; there is no difference to show")
     x, y = _axes(result, wish, name, ("theta", "mu_s", "frequency"), _DRIVES)
+    result.require("theta", "mu_s", "amplitude", "frequency")
     table = result.select(_shown(result, name), {x: result.thinned(x), y: result.thinned(y)}, wish.at)
     return charts.newmark_ratio(table, slices.newmark(table), slices.boundaries(table), x, y)
 
@@ -240,7 +244,7 @@ def _curves(result: "Result", wish: _Wish, variable: str, family: str | None) ->
         if asked is not None:
             result.axis(asked)
     own = ("quantile", "threshold")
-    free = [d for d in result.dims(variable) if result.axes[d].size > 1 and d not in wish.at and d != "case"]
+    free = [d for d in result.dims(variable) if d in result.wide and d not in wish.at]
     x = wish.x or next((d for d in (*_DRIVES, *free) if d in free and d not in (*own, wish.y)), None)
     if x is None or x not in free or x in own:
         raise InputError(f"{result.path}: {variable} needs an axis of two values or more that --at does not cut")
@@ -253,6 +257,8 @@ def _curves(result: "Result", wish: _Wish, variable: str, family: str | None) ->
 def _fragility(result: "Result", wish: _Wish) -> "Figure":
     from slipsweep.charts import uncertainty_figures
 
+    result.result("valueless_share")
+    result.require("threshold")
     x, family = _curves(result, wish, "exceedance_probability", "threshold")
     keep: dict[str, slice | list[int]] = {x: result.thinned(x)}
     if family:
@@ -266,6 +272,8 @@ def _quantiles(result: "Result", wish: _Wish) -> "Figure":
 
     if wish.y is not None:
         raise InputError(f"{result.path}: --y {wish.y}: not with quantiles, whose bands lie over one axis, --x")
+    result.result("valueless_share")
+    result.require("quantile")
     x, _ = _curves(result, wish, "displacement_quantile", None)
     names = ["displacement_quantile", "valueless_share"]
     table = result.select(names, {x: result.thinned(x), "quantile": slice(None)}, wish.at)

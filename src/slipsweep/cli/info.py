@@ -12,16 +12,19 @@ EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc"
 
 def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:
     """Tell what is in a result, how it was made, and the shares of its modes and flags."""
-    from slipsweep.files import netcdf
+    from slipsweep.files import results
     from slipsweep.grid.resources import size_text
 
-    contents = netcdf.read_contents(file)
+    contents = results.read_contents(file)
     typer.echo(f"{contents.path}  {size_text(contents.nbytes)}")
     for title, entries in (("coordinates", contents.coordinates), ("variables", contents.variables)):
         typer.echo(f"{title}:")
         for name, text in entries.items():
             typer.echo(f"  {name:<24}{text}")
-    echo_tally(contents.tally)
+    if contents.tally is not None:
+        echo_tally(contents.tally)
+    else:
+        typer.echo(f"modes and flags not counted: {contents.untold}")
     for name, text in contents.attributes.items():
         if "\n" in text:
             typer.echo(f"{name}:")

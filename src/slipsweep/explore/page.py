@@ -20,10 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.charts.slices import amplitude_of
+from slipsweep.charts.slices import CODES, amplitude_of, check_drawable, check_sweep
 from slipsweep.charts.style import BLUE, VERMILION, axis_label, caption, unit, value_text
 from slipsweep.errors import InputError
-from slipsweep.files import netcdf, outputs
+from slipsweep.files import outputs
+from slipsweep.files.results import FileVariable, open_result
 from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table, Variable
@@ -129,40 +130,38 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     InputError
         The file cannot be read, or holds no displacement over amplitude and frequency.
     """
-    with netcdf.open_result(path) as file:
-        file.set_auto_mask(False)
-        if "exceedance_probability" in file.variables:
+    with open_result(path) as file:
+        if "exceedance_probability" in file:
             raise InputError(f"{path}: holds statistics of uncertain inputs, which slipsweep chart draws")
-        if "permanent_displacement" not in file.variables:
+        if "permanent_displacement" not in file.results:
             raise InputError(
                 f"{path}: holds no permanent_displacement to draw; add it to output.variables and run the sweep again"
             )
-        shown = file["permanent_displacement"]
-        lengths = dict(zip(shown.dimensions, shown.shape, strict=True))
+        lengths = file["permanent_displacement"].sizes
+        if 0 in lengths.values():
+            raise InputError(f"{path}: holds no cells")
         map_dims = _map_dims(path, lengths)
+        check_sweep(file)
         left = thinned_lengths(lengths, cells, map_dims)
         if math.prod(left.values()) > cells:
             raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
 
-        keep: Indices = {}
-        for dim, length in lengths.items():
-            order = np.argsort(file[dim][:], kind="stable") if dim in file.variables else np.arange(length)
-            keep[dim] = order[evenly(length, left[dim])]
-        names = netcdf.coordinate_names(file) & {*PARAMETERS}
+        keep: Indices = {dim: file.axis(dim)[1][evenly(length, left[dim])] for dim, length in lengths.items()}
         coords = {
-            name: Variable(
-                file[name].dimensions,
-                np.asarray(
-                    np.asarray(file[name][...], np.float64)[np.ix_(*(keep[dim] for dim in file[name].dimensions))]
-                ),
-                PARAMETERS[name],
-            )
+            name: Variable(file[name].dims, file[name].read_floats(keep).astype(np.float64), PARAMETERS[name])
             for name in PARAMETERS
-            if name in names
+            if name in file.coordinates and lengths.keys() >= {*file[name].dims}
         }
-        if "displacement_amplitude" in coords and "amplitude" not in coords:
+        if {"displacement_amplitude", "frequency"} <= coords.keys() and "amplitude" not in coords:
             coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
-        results = {name: np.empty([*left.values()], kind) for name, kind in _SHOWN.items() if name in file.variables}
+        for name in ("theta", "mu_s", "amplitude", "frequency"):
+            if name not in coords:
+                raise InputError(f"{path}: {name}: not in the file, but the page needs it")
+        for name, coord in coords.items():
+            check_drawable(path, name, coord.values)
+            if np.isnan(coord.values).any():
+                raise InputError(f"{path}: {name}: values are missing")
+        results = {name: np.empty([*left.values()], kind) for name, kind in _SHOWN.items() if name in file.results}
         for block in grid_blocks(lengths, BLOCK_CELLS):
             inside = {
                 dim: np.flatnonzero((keep[dim] >= part.start) & (keep[dim] < part.stop)) for dim, part in block.items()
@@ -171,11 +170,29 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
                 continue
             source = np.ix_(*(keep[dim][at] - block[dim].start for dim, at in inside.items()))
             for name, values in results.items():
-                values[np.ix_(*inside.values())] = file[name][tuple(block.values())][source]
-        labels = [str(file["label"][at]) for at in keep["case"]] if "label" in file.variables else []
-        attrs = {name: file.getncattr(name) for name in file.ncattrs()}
+                values[np.ix_(*inside.values())] = _read_block(file[name], block)[source]
+        labels = [file.labels[at] for at in keep["case"]] if file.labels and "case" in keep else []
+        attrs = file.attrs
     table = Table(coords, {name: Variable(tuple(left), values) for name, values in results.items()}, attrs)
     return Excerpt(table, map_dims, lengths, labels)
+
+
+def _read_block(variable: FileVariable, block: Mapping[str, slice]) -> NDArray[Any]:
+    """Read the part of a block along the block's dimensions, in their order."""
+    beyond = [dim for dim in variable.dims if dim not in block]
+    if beyond:
+        raise InputError(
+            f"{variable.path}: {variable.name}: lies along {beyond[0]}, along which permanent_displacement does not"
+        )
+    if variable.name in CODES:
+        values = variable.read_codes(block, CODES[variable.name])
+    else:
+        values = variable.read_floats(block)
+        check_drawable(variable.path, variable.name, values, float(np.finfo(np.float32).max))
+    values = values.transpose([variable.dims.index(dim) for dim in block if dim in variable.dims])
+    sizes = variable.sizes
+    values = values.reshape([part.stop - part.start if dim in sizes else 1 for dim, part in block.items()])
+    return np.broadcast_to(values, [part.stop - part.start for part in block.values()])
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
@@ -387,7 +404,7 @@ def page(excerpt: Excerpt, histories: Histories | None, name: str, script: str) 
         title=escape(str(table.attrs.get("title", name))),
         file=escape(name),
         caption=escape(caption(table)).replace("\n", "<br>"),
-        source=escape(f"{table.attrs['source']}; {table.attrs.get('references', '')}"),
+        source=escape(f"{table.attrs.get('source', 'slipsweep')}; {table.attrs.get('references', '')}"),
         notes="".join(f"<li>{note}</li>" for note in _notes(excerpt, histories)),
         bokeh=script,
         figures=drawn,

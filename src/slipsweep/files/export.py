@@ -10,14 +10,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.files import netcdf, outputs
+from slipsweep.files import outputs
+from slipsweep.files.results import FileVariable, ResultFile, open_result
 from slipsweep.grid.blocks import grid_blocks
 from slipsweep.model.suggest import did_you_mean
+from slipsweep.model.variables import LIMIT_RESULTS, RESULTS
 
 #: Rows made at a time; text of ten columns takes a hundred times as many bytes.
 BLOCK_CELLS = 2**18
@@ -30,52 +31,44 @@ class Column:
 
     Parameters
     ----------
-    variable : netCDF4.Variable
+    variable : FileVariable
     words : bool
         Flags as words of `flag_meanings`; several are put one after the other, with spaces.
     """
 
-    def __init__(self, variable: netCDF4.Variable, words: bool) -> None:
-        variable.set_auto_maskandscale(False)
-        variable.set_auto_chartostring(False)
-        self.variable = variable
-        self.is_text = variable.dtype == "S1"
-        self.dims = tuple(variable.dimensions[: -1 if self.is_text else None])
-        self.attributes = {name: variable.getncattr(name) for name in variable.ncattrs()}
-        units = self.attributes.get("units")
-        self.header = f"{variable.name} ({units})" if units else str(variable.name)
+    def __init__(self, variable: FileVariable, words: bool) -> None:
+        self.variable, self.dims = variable, variable.dims
+        # another program may have left these attributes away
+        self.attributes = {**RESULTS.get(variable.name, LIMIT_RESULTS.get(variable.name, {})), **variable.attrs}
+        units = variable.attrs.get("units")
+        self.header = f"{variable.name} ({units})" if units else variable.name
         self.words = words and "flag_meanings" in self.attributes
-        # codes without a value; a floating-point value is missing as NaN
-        self.fill = self.attributes.get("_FillValue") if variable.dtype.kind == "i" else None
+        self.is_text = variable.is_text or self.words
 
-    def read(self, block: dict[str, slice]) -> NDArray[Any]:
-        """Read the part of a block: an array whose dimensions are `dims`; words are objects, None where missing."""
-        values = self.variable[tuple(block[dim] for dim in self.dims) or ...]
-        if self.is_text:
-            return np.asarray(netCDF4.chartostring(values, "utf-8"), dtype=object)
-        return self.in_words(values) if self.words else np.asarray(values)
+    def read(self, block: dict[str, slice]) -> np.ma.MaskedArray:
+        """Read the part of a block: an array along `dims`, masked where there is no value; texts are objects."""
+        values = self.variable.read(block)
+        if not self.words:
+            return values
+        return np.ma.MaskedArray(self.in_words(self.variable.read_codes(block)), np.ma.getmaskarray(values))
 
     def in_words(self, codes: NDArray[Any]) -> NDArray[Any]:
         """Replace codes by words; the few that occur are spelled out once each."""
         occurring, places = np.unique(codes, return_inverse=True)
-        meanings = self.attributes["flag_meanings"].split()
+        meanings = str(self.attributes["flag_meanings"]).split()
+        key = "flag_masks" if "flag_masks" in self.attributes else "flag_values"
+        numbers = np.atleast_1d(self.attributes.get(key, ())).tolist()
+        if len(numbers) != len(meanings):
+            raise InputError(
+                f"{self.variable.path}: {self.variable.name}: flag_meanings has {len(meanings)} words and {key} "
+                f"{len(numbers)} numbers; must be as many"
+            )
+        known = dict(zip(numbers, meanings, strict=True))
         spelled = np.empty(occurring.size, dtype=object)
         for place, code in enumerate(occurring.tolist()):
-            if "flag_masks" in self.attributes:
-                masks = np.atleast_1d(self.attributes["flag_masks"])
-                spelled[place] = " ".join(w for w, mask in zip(meanings, masks, strict=True) if code & int(mask))
-            else:
-                known = dict(zip(np.atleast_1d(self.attributes["flag_values"]).tolist(), meanings, strict=True))
-                spelled[place] = known.get(code)
+            flags = [word for mask, word in known.items() if code & int(mask)] if key == "flag_masks" else []
+            spelled[place] = " ".join(flags) if key == "flag_masks" else known.get(code, str(code))
         return spelled[places.reshape(codes.shape)]
-
-    def missing(self, values: NDArray[Any]) -> NDArray[np.bool_]:
-        """Tell where there is no value."""
-        if values.dtype.kind == "f":
-            return np.isnan(values)
-        if values.dtype.kind == "O":
-            return np.frompyfunc(lambda word: word is None, 1, 1)(values).astype(bool)
-        return np.zeros(values.shape, bool) if self.fill is None else values == self.fill
 
 
 def export(
@@ -129,14 +122,14 @@ def export(
     if path.suffix == ".parquet":
         _check_pyarrow(path)
     outputs.check_outputs([path], overwrite, reads=[source])
-    with netcdf.open_result(source) as file:
-        columns, shape = _columns(file, source, variables, words)
+    with open_result(source) as file:
+        columns, shape = _columns(file, variables, words)
         make = _csv if path.suffix == ".csv" else _parquet
-        attributes = {name: str(file.getncattr(name)) for name in file.ncattrs()}
+        attributes = {name: str(value) for name, value in file.attrs.items()}
         with outputs.complete_or_absent(path, overwrite) as temporary:
             try:
                 with make(temporary, columns, attributes) as write:
-                    for block in grid_blocks(shape, block_cells) if shape else [{}]:
+                    for block in grid_blocks(shape, block_cells):
                         write(_table(columns, shape, block))
                         if progress is not None:
                             progress(math.prod(part.stop - part.start for part in block.values()))
@@ -147,46 +140,48 @@ def export(
 
 def count_rows(source: Path, variables: Sequence[str] | None = None) -> int:
     """Return the number of rows that `export` makes; arguments and errors are its."""
-    with netcdf.open_result(source) as file:
-        return math.prod(_columns(file, source, variables, False)[1].values())
+    with open_result(source) as file:
+        return math.prod(_columns(file, variables, False)[1].values())
 
 
-def _columns(
-    file: netCDF4.Dataset, source: Path, wanted: Sequence[str] | None, words: bool
-) -> tuple[list[Column], dict[str, int]]:
+def _columns(file: ResultFile, wanted: Sequence[str] | None, words: bool) -> tuple[list[Column], dict[str, int]]:
     """Choose the columns, coordinates first, and the grid they span."""
-    coordinates = netcdf.coordinate_names(file)
-    results = [name for name in file.variables if name not in coordinates]
-    # the samples of a record are no cells: they are exported if asked for
-    cells = [name for name in results if netcdf.RECORD_DIM not in file[name].dimensions]
-    chosen = list(dict.fromkeys(cells if wanted is None else wanted))
+    chosen = list(dict.fromkeys(file.cells if wanted is None else wanted))
     for name in chosen:
-        if name not in results:
-            raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, results)}')
-    dims = {dim for name in chosen for dim in file[name].dimensions}
-    shape = {dim: len(file.dimensions[dim]) for dim in file.dimensions if dim in dims}
-    beside = [Column(file[name], words) for name in file.variables if name in coordinates]
-    return [c for c in beside if {*c.dims} <= dims] + [Column(file[name], words) for name in chosen], shape
+        if name in file.unread:
+            raise InputError(f"{file.path}: {name}: is of type {file.unread[name]}; must be numbers or text")
+        if name not in file.results:
+            raise InputError(f'{file.path}: no variable "{name}"; {did_you_mean(name, file.results)}')
+    if not chosen:
+        raise InputError(f"{file.path}: holds no results")
+    dims = {dim for name in chosen for dim in file[name].dims}
+    shape = {dim: length for dim, length in file.sizes.items() if dim in dims}
+    beside = [name for name in file.coordinates if dims.issuperset(file[name].dims)]
+    return [Column(file[name], words) for name in (*beside, *chosen)], shape
 
 
-def _table(columns: list[Column], shape: dict[str, int], block: dict[str, slice]) -> list[tuple[Column, NDArray[Any]]]:
+Cells = list[tuple[Column, np.ma.MaskedArray]]
+
+
+def _table(columns: list[Column], shape: dict[str, int], block: dict[str, slice]) -> Cells:
     """Read a block of every column, each of them as broadcastable to the block."""
     table = []
     for column in columns:
         values = column.read(block)
-        lengths = dict(zip(column.dims, values.shape, strict=True))
-        # the dimensions of a variable of slipsweep are in the order of the file
-        table.append((column, values.reshape([lengths.get(dim, 1) for dim in shape])))
+        # another program may have put the dimensions of a variable into another order
+        values = values.transpose([column.dims.index(dim) for dim in shape if dim in column.dims])
+        lengths = [block[dim].stop - block[dim].start if dim in column.dims else 1 for dim in shape]
+        table.append((column, values.reshape(lengths)))
     return table
 
 
-def _block_shape(table: list[tuple[Column, NDArray[Any]]]) -> tuple[int, ...]:
+def _block_shape(table: Cells) -> tuple[int, ...]:
     return np.broadcast_shapes(*(values.shape for _, values in table))
 
 
 # --------------------------------------------------------------------------------- formats
 
-Writer = Callable[[list[tuple[Column, NDArray[Any]]]], None]
+Writer = Callable[[Cells], None]
 
 
 @contextmanager
@@ -196,22 +191,22 @@ def _csv(path: Path, columns: list[Column], attributes: dict[str, str]) -> Itera
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(column.header for column in columns)
 
-        def write(table: list[tuple[Column, NDArray[Any]]]) -> None:
+        def write(table: Cells) -> None:
             shape = _block_shape(table)
             # a coordinate is put into text once a value, and then repeated
-            texts = (np.broadcast_to(_text(column, values), shape).ravel().tolist() for column, values in table)
+            texts = (np.broadcast_to(_text(values), shape).ravel().tolist() for _, values in table)
             writer.writerows(zip(*texts, strict=True))
 
         yield write
 
 
-def _text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
+def _text(values: np.ma.MaskedArray) -> NDArray[Any]:
     """Write numbers with as few digits as bring them back exactly, missing ones as nothing."""
     # str() of a float has the digits of a double, those of a float32 are fewer
-    exact = values.dtype != np.float32
-    text = np.array(list(map(str, values.ravel().tolist() if exact else values.ravel())), dtype=object)
+    numbers = values.data.ravel()
+    text = np.array(list(map(str, numbers if values.dtype == np.float32 else numbers.tolist())), dtype=object)
     text = text.reshape(values.shape)
-    text[column.missing(values)] = ""
+    text[np.ma.getmaskarray(values)] = ""
     return text
 
 
@@ -231,7 +226,7 @@ def _parquet(path: Path, columns: list[Column], attributes: dict[str, str]) -> I
     from pyarrow import parquet
 
     def kind(column: Column) -> Any:
-        if column.is_text or column.words:
+        if column.is_text:
             return pyarrow.dictionary(pyarrow.int32(), pyarrow.string())
         return pyarrow.from_numpy_dtype(column.variable.dtype)
 
@@ -239,7 +234,7 @@ def _parquet(path: Path, columns: list[Column], attributes: dict[str, str]) -> I
     schema = pyarrow.schema(
         [
             pyarrow.field(
-                c.header, kind(c), metadata={name: c.attributes[name] for name in about if name in c.attributes}
+                c.header, kind(c), metadata={name: str(c.attributes[name]) for name in about if name in c.attributes}
             )
             for c in columns
         ],
@@ -247,16 +242,17 @@ def _parquet(path: Path, columns: list[Column], attributes: dict[str, str]) -> I
     )
     with parquet.ParquetWriter(path, schema) as writer:
 
-        def write(table: list[tuple[Column, NDArray[Any]]]) -> None:
+        def write(table: Cells) -> None:
             shape = _block_shape(table)
             arrays = []
             for (column, values), field in zip(table, schema, strict=True):
                 flat, missing = (
-                    np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in (values, column.missing(values))
+                    np.ascontiguousarray(np.broadcast_to(part, shape)).ravel()
+                    for part in (values.data, np.ma.getmaskarray(values))
                 )
-                plain = field.type.value_type if values.dtype.kind == "O" else field.type
+                plain = field.type.value_type if column.is_text else field.type
                 array = pyarrow.array(flat, type=plain, mask=missing)
-                arrays.append(array.dictionary_encode() if values.dtype.kind == "O" else array)
+                arrays.append(array.dictionary_encode() if column.is_text else array)
             writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
 
         yield write

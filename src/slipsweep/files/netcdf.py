@@ -1,6 +1,5 @@
 """netCDF files of results: made by the CF conventions, and read."""
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -16,7 +15,6 @@ from slipsweep.errors import InputError
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import complete_or_absent, writing
 from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode, Validity
 from slipsweep.motion.records import Record
@@ -208,7 +206,7 @@ def without_time_axis(table: Table) -> Table:
     return Table(coords, data_vars, table.attrs)
 
 
-# --------------------------------------------------------------------------- reading a file
+# --------------------------------------------------------------------------- counting cells
 
 
 @dataclass
@@ -239,103 +237,3 @@ class Tally:
             self.modes = {mode: (self.modes or {}).get(mode, 0) + count for mode, count in other.modes.items()}
         if other.flags is not None:
             self.flags = {flag: (self.flags or {}).get(flag, 0) + count for flag, count in other.flags.items()}
-
-
-@dataclass
-class Contents:
-    """What a file of slipsweep holds and how it was made; coordinates and variables in words."""
-
-    path: Path
-    nbytes: int
-    attributes: dict[str, str]
-    coordinates: dict[str, str]
-    variables: dict[str, str]
-    tally: Tally
-
-
-@contextmanager
-def open_result(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Open a file of slipsweep to read from.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, is not netCDF, or was not written by slipsweep.
-    """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    try:
-        file = open_netcdf(path)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
-    with file:
-        if not str(getattr(file, "source", "")).startswith("slipsweep "):
-            raise InputError(f"{path}: not written by slipsweep")
-        yield file
-
-
-def coordinate_names(file: netCDF4.Dataset) -> set[str]:
-    """Names of a file's coordinate variables, auxiliary and scalar ones among them."""
-    named = (
-        variable.coordinates.split() for variable in file.variables.values() if "coordinates" in variable.ncattrs()
-    )
-    return {*file.dimensions, *itertools.chain.from_iterable(named)}
-
-
-def read_contents(path: Path) -> Contents:
-    """Describe a file of slipsweep; memory stays small whatever its size.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, is not netCDF, or was not written by slipsweep.
-    """
-    with open_result(path) as file:
-        try:
-            coordinates = coordinate_names(file)
-            return Contents(
-                path,
-                path.stat().st_size,
-                {name: str(file.getncattr(name)) for name in file.ncattrs()},
-                {name: _values_text(file[name]) for name in file.variables if name in coordinates},
-                {name: _variable_text(file[name]) for name in file.variables if name not in coordinates},
-                _count(file),
-            )
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{path}: not a netCDF file, or a damaged one ({error})") from None
-
-
-def _count(file: netCDF4.Dataset) -> Tally:
-    tally = Tally()
-    for name in ("sliding_mode", "validity"):
-        if name in file.variables:
-            variable = file[name]
-            variable.set_auto_mask(False)
-            tally.cells = variable.size
-            for block in grid_blocks(dict(zip(variable.dimensions, variable.shape, strict=True)), BLOCK_CELLS):
-                tally.add({name: variable[tuple(block.values())]})
-    return tally
-
-
-def stored_tally(path: Path) -> Tally:
-    """Count what is in a file, or in the files of a folder."""
-    tally = Tally()
-    for name in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with open_netcdf(name) as file:
-            tally.merge(_count(file))
-    return tally
-
-
-def _values_text(variable: netCDF4.Variable) -> str:
-    values = variable[...]
-    if variable.dtype == "S1":
-        return ", ".join(values)
-    units = "" if variable.units == "1" else f" {variable.units}"
-    if values.size == 1:
-        return f"{values.item():.6g}{units}"
-    return f"{values.size} values, {values.min():.6g} to {values.max():.6g}{units}"
-
-
-def _variable_text(variable: netCDF4.Variable) -> str:
-    units = f", {variable.units}" if "units" in variable.ncattrs() and variable.units != "1" else ""
-    return f"{variable.long_name}{units} ({variable.dtype})"

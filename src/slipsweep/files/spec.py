@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from slipsweep.errors import InputError
-from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import Read
 from slipsweep.grid.tables import Variable
 from slipsweep.model.choices import Family, declared
@@ -305,6 +304,10 @@ class SweepSpec:
         }
 
 
+#: How netCDF files begin: netCDF-4, and the classic formats.
+_NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
+
+
 def load(path: str | Path) -> SweepSpec:
     """Read and check a sweep.
 
@@ -331,7 +334,7 @@ def load(path: str | Path) -> SweepSpec:
         read: Read = 0 if path == _STANDARD_INPUT else path
         with open(read, "rb", closefd=read != 0) as file:
             content = file.read(4)
-            is_netcdf = content == b"\x89HDF" or (path.suffix == ".nc" and not stream)
+            is_netcdf = content.startswith(_NETCDF) or (path.suffix == ".nc" and not stream)
             if is_netcdf and stream:
                 raise InputError(f"{path}: is a netCDF file, which cannot be read from a pipe; give it by name")
             if not is_netcdf:
@@ -357,22 +360,24 @@ def is_stream(path: Path) -> bool:
 
 
 def _load_result(path: Path) -> SweepSpec:
-    try:
-        with open_netcdf(path) as file:
-            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-            kept = RECORD_SAMPLES.keys() <= file.variables.keys()
-            times, acceleration = (np.asarray(file[name][...]) if kept else None for name in RECORD_SAMPLES)
-    except OSError:
-        raise InputError(f"{path}: not a netCDF file") from None
+    from slipsweep.files.results import open_result  # brings along the netCDF library
+
+    with open_result(path) as file:
+        attributes = file.attrs
+        samples = {name: file[name].read_floats({}) for name in RECORD_SAMPLES if name in file}
     if "sweep" not in attributes:
         raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
     about = {name: str(text) for name, text in attributes.items() if name == "baseline" or name.startswith("record")}
     record = None
-    if times is not None and acceleration is not None:
+    if len(samples) == len(RECORD_SAMPLES):
+        times, acceleration = samples.values()
         record = Record(times, acceleration, about.get("record", str(path)), about)
     spec = parse(str(attributes["sweep"]), str(path), path.parent, record)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
-    return spec.with_solver(SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
+    try:
+        return spec.with_solver(SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
+    except (ValueError, TypeError) as error:  # InputError, and what numpy says of an array
+        raise InputError(f"{path}: {error}") from None
 
 
 def parse(text: str, source: str, folder: Path | None = None, record: Record | None = None) -> SweepSpec:

@@ -117,7 +117,9 @@ def _cell_memory(spec: SweepSpec, blocks: int = 2) -> int:
 
 
 def grid_blocks(shape: Mapping[str, int], most: int) -> Iterator[Block]:
-    """Cut a grid into blocks, in the order of the file."""
+    """Cut a grid into blocks, in the order of the file; a grid without cells has none."""
+    if 0 in shape.values():
+        return
     lengths = block_lengths(shape, most)
     starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
     for corner in itertools.product(*starts):

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import Tally, TooLarge, history_of, rounded, stored_tally
+from slipsweep.files.netcdf import Tally, TooLarge, history_of, rounded
 from slipsweep.files.outputs import appear, check_outputs, sync, writing
+from slipsweep.files.results import stored_tally
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.blocks import (
     Block,
