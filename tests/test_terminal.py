@@ -53,6 +53,22 @@ def test_progress_has_no_colour_when_none_is_wanted(tmp_path: Path) -> None:
     assert not re.search(colour, plain)
 
 
+def test_compilation_is_said_and_told_apart(tmp_path: Path) -> None:
+    """A first run has to be waited for: a terminal says why, and its speed is that of solving."""
+    (tmp_path / "a.toml").write_text(SWEEP + '[output]\nvariables = ["delta_mu"]\n')
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    first = on_a_terminal(tmp_path, "run", "a.toml", "-o", "a.nc", environment=cache)
+    assert "compiling for this processor, once: 1 of 1" in first
+    found = re.search(r"1 cells .* in ([\d.]+) s \(([\d.]+) s to compile, once\), (\S+) cells/s", first)
+    assert found
+    total, compiling, speed = map(float, found.groups())
+    assert 0.0 < compiling <= total
+    assert speed > 1.01 / total
+    again = on_a_terminal(tmp_path, "run", "a.toml", "-o", "b.nc", environment=cache)
+    assert "compil" not in again
+    assert re.search(r"1 cells .* in [\d.]+ s, \S+ cells/s", again)
+
+
 def test_errors_are_plain(tmp_path: Path) -> None:
     for text in (on_a_terminal(tmp_path, "info"), slipsweep(tmp_path, "info", environment={"FORCE_COLOR": "1"}).stderr):
         assert text.strip() == "slipsweep: error: Missing argument 'OUT.nc'."

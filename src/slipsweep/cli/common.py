@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
@@ -45,16 +46,52 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        ProgressColumn,
+        Task,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from slipsweep.jit import compiling
+
+    before = compiling.seconds()
 
     class Speed(ProgressColumn):
         def render(self, task: Task) -> str:
-            return f"{task.completed / task.elapsed:.3g} {unit}/s" if task.completed and task.elapsed else ""
+            seconds = (task.elapsed or 0.0) - (compiling.seconds() - before)
+            if not task.completed or seconds <= 0.0 or task.description:
+                return ""
+            return f"{task.completed / seconds:.3g} {unit}/s"
 
-    columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    def compiled(kernels: tuple[int, int] | None) -> None:
+        text = f"compiling for this processor, once: {kernels[0]} of {kernels[1]}" if kernels else ""
+        bar.update(task, description=text)
+
+    columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar, compiling.watched(compiled):
         task = bar.add_task("", total=cells)
         yield lambda done: bar.advance(task, done)
+
+
+class Watch:
+    """Wall-clock time, and how much of it kernels took to be compiled."""
+
+    def __init__(self) -> None:
+        from slipsweep.jit import compiling
+
+        self._compiling = compiling.seconds
+        self._started, self._before = time.perf_counter(), compiling.seconds()
+
+    def text(self, count: int, unit: str, seconds: float | None = None) -> str:
+        """The time, `seconds` if given, and what was solved in it a second, compilation apart."""
+        total = time.perf_counter() - self._started if seconds is None else seconds
+        compiling = min(self._compiling() - self._before, total)
+        apart = f" ({compiling:.2f} s to compile, once)" if compiling > 0.0 else ""
+        return f"{total:.2f} s{apart}, {count / max(total - compiling, 1e-9):.3g} {unit}/s"
 
 
 def typed_command() -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, echo_tally, examples, progress_bar, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, Watch, echo_tally, examples, progress_bar, typed_command
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
 
@@ -93,6 +93,7 @@ def run(
         _run_samples(checked, path, overwrite, quiet)
         return
     cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked, workers or 0)
+    watch = Watch()
     with ExitStack() as stack:
         solved: blocks.Solved = blocks.solve_here
         shared = None
@@ -116,24 +117,21 @@ def run(
         )
     if quiet:
         return
-    rate = report.tally.cells / max(report.seconds, 1e-9)
     grid = " x ".join(f"{length} {dim}" for dim, length in report.shape.items())
-    typer.echo(f"{report.tally.cells} cells ({grid}) in {report.seconds:.2f} s, {rate:.3g} cells/s")
+    typer.echo(f"{report.tally.cells} cells ({grid}) in {watch.text(report.tally.cells, 'cells', report.seconds)}")
     echo_tally(report.tally)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")
 
 
 def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -> None:
     """Sample the uncertain inputs of a sweep, and write the statistics."""
-    import time
-
     from slipsweep.files import netcdf, outputs
     from slipsweep.grid.resources import size_text
     from slipsweep.studies.uncertainty import plan_samples, tally
 
     assert sweep.sampling is not None
     outputs.check_outputs([path], overwrite, reads=sweep.files)
-    started = time.perf_counter()
+    watch = Watch()
     try:
         given = {name: value for name, value in sweep.arguments().items() if name != "variables"}
         plan = plan_samples(sweep.sampling, **given)
@@ -144,9 +142,8 @@ def _run_samples(sweep: "SweepSpec", path: Path, overwrite: bool, quiet: bool) -
     netcdf.write_statistics(sweep, table, path, command=typed_command(), overwrite=overwrite)
     if quiet:
         return
-    seconds = max(time.perf_counter() - started, 1e-9)
     grid = " x ".join(f"{length} {dim}" for dim, length in sweep.shape.items()) or "no axes"
     typer.echo(f"{sweep.cells} grid points ({grid}), {sweep.sampling.samples} samples each")
-    typer.echo(f"{plan.cells} samples solved in {seconds:.2f} s, {plan.cells / seconds:.3g} samples/s")
+    typer.echo(f"{plan.cells} samples solved in {watch.text(plan.cells, 'samples')}")
     echo_tally(tally(table, sweep.sampling.samples))
     typer.echo(f"{path}  {size_text(path.stat().st_size)}")

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validi
 from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
+
+if TYPE_CHECKING:
+    from slipsweep.jit.cache import Kernel
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -159,6 +162,11 @@ def _amplitudes(arrays: Mapping[str, Array]) -> int:
     return math.prod(np.broadcast_shapes(arrays["displacement_amplitude"].shape, arrays["frequency"].shape))
 
 
+def _is_plain_sine(motion: Waveform | Record) -> bool:
+    """Whether a motion is a sine without ramps, for which there are shorter ways."""
+    return isinstance(motion, Sine) and motion == Sine(motion.cycles)
+
+
 def _solve_into(
     results: Mapping[str, NDArray[Any]],
     problem: Problem,
@@ -194,7 +202,7 @@ def _solve_into(
             kernel(grid, first, last, rows, periods, options, steps, targets)
         else:
             stretches = np.array([[first, last]])
-            if motion == Sine(motion.cycles):  # without ramps: shorter ways
+            if _is_plain_sine(motion):
                 rest = np.empty(((last - first + 1) // 2, 2), np.int64)
                 stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
             if stretches.size:
@@ -297,6 +305,17 @@ def estimates(
     # the kernel gives all parameters: slab by slab, those not wanted take no room
     threads.spread(len(parts), work, _FRICTION_CELLS)
     return results
+
+
+def kernels_of(solver: Callable[..., Any], problem: Problem) -> "list[Kernel]":
+    """The kernels that one of the functions above takes for any grid (a sine may need the waves' one besides)."""
+    if solver is friction_parameters:
+        return [parameter_grid]
+    if solver is not solve:
+        return []
+    if isinstance(problem.solver, Step):
+        return [STEP_KERNELS[RULES[problem.solver.rule]]]
+    return [CYCLE_KERNEL if _is_plain_sine(problem.excitation) else WAVE_KERNEL]
 
 
 def mark_flexible_blocks(validity: NDArray[np.int16], frequency: Array, structure_frequency: Array) -> None:

@@ -122,6 +122,9 @@ class Plan:
             (task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()), default={}
         )
         check_memory(sizes, sum(task.nbytes for task in self.tasks))
+        for task in self.tasks:
+            for kernel in engine.kernels_of(task.solver, task.problem):
+                kernel.expect()
         # all tasks cover the same cells: one of them counts
         return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
 

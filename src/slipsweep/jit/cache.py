@@ -23,7 +23,7 @@ from typing import Any
 
 import numba
 
-from slipsweep.jit import folders, form, plain, sources
+from slipsweep.jit import compiling, folders, form, plain, sources
 
 #: Versions whose kernels are kept.
 _KEPT_FOLDERS = 4
@@ -85,6 +85,13 @@ class Kernel:
                     self._dispatcher = self._ready(args)
         return self._dispatcher(*args)
 
+    def expect(self) -> None:
+        """Say that the kernel is about to be called: if it is not kept, it counts among those to be compiled."""
+        if self._dispatcher is None and not numba.config.DISABLE_JIT:
+            folder = cache_folder()
+            if folder is None or not folders.has(folder, self._function):
+                compiling.expect(self)
+
     def _ready(self, args: tuple[Any, ...]) -> Callable[..., Any]:
         if numba.config.DISABLE_JIT:
             return self._function
@@ -94,7 +101,7 @@ class Kernel:
             # numba's advice is for us, not for those who run a sweep
             warnings.simplefilter("ignore", numba.NumbaWarning)
             try:
-                jitted: Any = form.compiled(self._function, signature, folder)
+                jitted: Any = form.compiled(self._function, signature, folder, compiling.compiling(self))
             except Exception as error:
                 if form.compiled is not plain.compiled:
                     error.add_note("SLIPSWEEP_PLAIN_NUMBA=1 in the environment compiles by what numba documents alone")

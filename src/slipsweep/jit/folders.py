@@ -5,7 +5,7 @@ import functools
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import filelock  # here: imported in the middle of a fork, its own fork handlers would fail
@@ -41,6 +41,11 @@ def _temporary_folder() -> Path:
         if status.st_uid == os.getuid() and not status.st_mode & 0o022:
             return folder
     return Path(os.devnull)
+
+
+def has(folder: Path, function: Callable[..., object]) -> bool:
+    """Whether a folder holds a kernel of this function's name."""
+    return any(path.suffix != ".lock" for path in folder.glob(f"**/*{function.__name__.strip('_')}*"))
 
 
 def write(path: Path, content: bytes) -> None:

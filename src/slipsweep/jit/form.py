@@ -30,6 +30,7 @@ def _chosen() -> tuple[Any, Any]:
 
 #: Decorates a function that kernels are made of, with options of `numba.njit`.
 part: Any
-#: Compiles a kernel, or loads it: from its function, the types of its arguments and the folder it is kept in.
+#: Compiles a kernel, or loads it: from its function, the types of its arguments, the folder it is kept in, and what
+#: to be within while it compiles.
 compiled: Any
 part, compiled = _chosen()

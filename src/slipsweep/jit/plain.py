@@ -5,14 +5,14 @@ those that load it; but it takes nothing of numba that a new version may lack (`
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba import njit
 
-from slipsweep.jit.folders import alone
+from slipsweep.jit import folders
 
 
 def part(function: Callable[..., Any], **options: Any) -> Any:
@@ -20,19 +20,25 @@ def part(function: Callable[..., Any], **options: Any) -> Any:
     return njit(error_model="numpy", **options)(function)
 
 
-def compiled(function: Callable[..., Any], signature: tuple[Any, ...], folder: Path | None) -> Any:
+def compiled(
+    function: Callable[..., Any],
+    signature: tuple[Any, ...],
+    folder: Path | None,
+    compiling: AbstractContextManager[None],
+) -> Any:
     """A kernel compiled for a signature, or loaded from numba's own cache in a folder."""
     options = {"nogil": True, "error_model": "numpy"}
     jitted = None
-    if folder is not None:
-        # no source file, a damaged cache, a full disk: whatever is wrong with the cache, a kernel can do without.
-        # Only one process at a time, for numba's own cache stands no more
-        with suppress(Exception), alone(folder / function.__name__), _cache_in(folder):
-            jitted = njit(cache=True, **options)(function)
+    with compiling if folder is None or not folders.has(folder, function) else nullcontext():
+        if folder is not None:
+            # no source file, a damaged cache, a full disk: whatever is wrong with the cache, a kernel can do without.
+            # Only one process at a time, for numba's own cache stands no more
+            with suppress(Exception), folders.alone(folder / function.__name__), _cache_in(folder):
+                jitted = njit(cache=True, **options)(function)
+                jitted.compile(signature)
+        if jitted is None or not jitted.signatures:
+            jitted = njit(**options)(function)
             jitted.compile(signature)
-    if jitted is None or not jitted.signatures:
-        jitted = njit(**options)(function)
-        jitted.compile(signature)
     return jitted
 
 

@@ -1,7 +1,7 @@
 """Kernels: sealed, and kept on disk."""
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,22 @@ from slipsweep.jit.inner.disk import Disk, digest_of
 from slipsweep.jit.inner.sealed import sealed
 
 
-def compiled(function: Callable[..., Any], signature: tuple[Any, ...], folder: Path | None) -> Any:
+def compiled(
+    function: Callable[..., Any],
+    signature: tuple[Any, ...],
+    folder: Path | None,
+    compiling: AbstractContextManager[None],
+) -> Any:
     """A kernel compiled for a signature, or loaded from a folder; the first process to need it compiles it."""
     jitted = sealed(function)
-    if folder is None:
-        jitted.compile(signature)
-        return jitted
-    path = folder / f"{function.__name__.strip('_')}-{digest_of(function, jitted, signature)}"
-    jitted._cache = Disk(path)
-    with nullcontext() if path.exists() else alone(path):
+    with ExitStack() as stack:
+        if folder is None:
+            stack.enter_context(compiling)
+        else:
+            path = folder / f"{function.__name__.strip('_')}-{digest_of(function, jitted, signature)}"
+            jitted._cache = Disk(path)
+            if not path.exists():
+                stack.enter_context(compiling)
+                stack.enter_context(alone(path))
         jitted.compile(signature)
     return jitted
