@@ -23,8 +23,7 @@ import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.files import spec
-from slipsweep.grid import blocks
-from slipsweep.runs import store
+from slipsweep.runs import solving, store
 
 SWEEP = """
 [axes.theta]
@@ -62,8 +61,9 @@ Fault: TypeAlias = Callable[[Path, random.Random, Values], int]
 _COMMAND = """
 import sys
 from slipsweep.grid import blocks
+from slipsweep.runs import solving
 blocks.BLOCK_CELLS = int(sys.argv[1])
-blocks.cells_shared = lambda *arguments: int(sys.argv[1])
+solving.cells_shared = lambda *arguments: int(sys.argv[1])
 from slipsweep.cli import main
 sys.exit(main(["run", "a.toml", "-q", *sys.argv[2:]]))
 """
@@ -94,7 +94,7 @@ def stopped(path: Path, after: int = 30, **options: Any) -> Path:
     """Stop a run in this process after some blocks; return its work folder."""
 
     def solved(*arguments: Any) -> Iterator[Any]:
-        for count, item in enumerate(blocks.solve_here(*arguments)):
+        for count, item in enumerate(solving.solve_here(*arguments)):
             if count == after:
                 raise Stop
             yield item

@@ -20,8 +20,7 @@ from fault_rounds import SWEEP, run, stopped, values
 from slipsweep import Step
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs, spec
-from slipsweep.grid import blocks
-from slipsweep.runs import parts, store
+from slipsweep.runs import parts, solving, store
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +35,7 @@ def solved_on_resume(path: Path, **options: Any) -> list[int]:
     numbers = []
 
     def solved(*arguments: object) -> object:
-        for item in blocks.solve_here(*arguments):  # type: ignore[arg-type]
+        for item in solving.solve_here(*arguments):  # type: ignore[arg-type]
             numbers.append(item[0])
             yield item
 

@@ -19,7 +19,7 @@ from slipsweep.files import export, spec
 from slipsweep.grid import blocks
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import RECORD_RESULTS
-from slipsweep.runs import parts, store
+from slipsweep.runs import parts, solving, store
 
 SWEEPS = Path(__file__).parents[1] / "sweeps"
 
@@ -178,7 +178,7 @@ def test_blocks_and_folders_give_what_one_piece_gives(folder: Path) -> None:
 
 def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) -> None:
     def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
-        for number, table in blocks.solve_here(*arguments):
+        for number, table in solving.solve_here(*arguments):
             if number == 3:
                 raise RunError("the power went")
             yield number, table
@@ -197,7 +197,7 @@ def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) ->
 
 def test_blocks_of_a_record_are_seconds_of_work(folder: Path) -> None:
     checked = spec.load(folder / "a.toml")
-    assert blocks.default_cells(checked) < blocks.BLOCK_CELLS // 10
+    assert solving.default_cells(checked) < blocks.BLOCK_CELLS // 10
     assert "record" in parts.identity(checked, False)
 
 

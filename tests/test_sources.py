@@ -68,7 +68,7 @@ def package(tmp_path: Path) -> Path:
 def test_what_solving_loads_is_found(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("".join(f"{0.1 * i:.1f},{i % 7 - 3}\n" for i in range(30)))
     needed = {name for name in loaded(SOLVING, tmp_path) if not name.startswith(APART)}
-    assert "grid/blocks.py" in needed
+    assert "grid/plans.py" in needed
     assert needed <= set(reached(known_sources(sources.PACKAGE), sources.RESULTS))
 
 

@@ -23,7 +23,7 @@ from slipsweep.files import netcdf, results, spec
 from slipsweep.grid import blocks, plans
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model import variables
-from slipsweep.runs import placed, store
+from slipsweep.runs import placed, solving, store
 
 GRID = """
 # θ in degrees
@@ -127,10 +127,10 @@ def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> Non
     names = ", ".join(f'"{name}"' for name in variables.RESULTS if name != "amplitude")
     checked = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml")
     cut = dict(enumerate(blocks.grid_blocks(checked.shape, most)))
-    whole = blocks.plan_of(checked.arguments()).solve()
+    whole = checked.plan().solve()
     places: list[set[int]] = []
     previous: tuple[int, Table] | None = None
-    for found in blocks.solve_here(checked, cut):
+    for found in solving.solve_here(checked, cut):
         # a block is as it was solved until the next but one is asked for, whatever their sizes
         for number, table in filter(None, (previous, found)):
             for name, result in table.data_vars.items():
@@ -145,16 +145,16 @@ def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> Non
 
 def test_workers_share_a_sweep_evenly_within_the_memory() -> None:
     night = spec.parse(GRID.replace("num = 40", "num = 1000000"), "a.toml")  # 60 million cells, 19 bytes each
-    assert blocks.cells_within(2 * 10**9, night) == (2 * 10**9 - 400 * 10**6) // (2 * 19 + 8)
-    assert blocks.cells_within(2 * 10**9, night, 4) == (2 * 10**9 - 1400 * 10**6) // (14 * 19 + 8)
+    assert solving.cells_within(2 * 10**9, night) == (2 * 10**9 - 400 * 10**6) // (2 * 19 + 8)
+    assert solving.cells_within(2 * 10**9, night, 4) == (2 * 10**9 - 1400 * 10**6) // (14 * 19 + 8)
     with pytest.raises(InputError, match=r"--memory = 1 GB: must be 1\.41 GB at least with --workers 4"):
-        blocks.cells_within(10**9, night, 4)
+        solving.cells_within(10**9, night, 4)
     stepping = night.with_solver(slipsweep.Step())
-    assert blocks.cells_shared(stepping, 2) == 60_000_000 // 32
-    assert blocks.cells_shared(stepping, None) == 60_000_000 // 1024
-    assert blocks.cells_shared(stepping, 1000) == 10_000
-    assert blocks.cells_shared(night, None) == 500_000  # each but a few times what sending it takes
-    assert blocks.cells_shared(night, 1) == 60_000_000 // 16
+    assert solving.cells_shared(stepping, 2) == 60_000_000 // 32
+    assert solving.cells_shared(stepping, None) == 60_000_000 // 1024
+    assert solving.cells_shared(stepping, 1000) == 10_000
+    assert solving.cells_shared(night, None) == 500_000  # each but a few times what sending it takes
+    assert solving.cells_shared(night, 1) == 60_000_000 // 16
 
 
 # ------------------------------------------------------------------------- bytes of results
@@ -452,7 +452,7 @@ def test_a_failed_run_leaves_nothing_but_finished_blocks(
     solved: list[int] = []
 
     def counting(*arguments: Any) -> Iterator[tuple[int, Table]]:
-        for number, table in blocks.solve_here(*arguments):
+        for number, table in solving.solve_here(*arguments):
             solved.append(number)
             yield number, table
 

@@ -15,6 +15,7 @@ import slipsweep
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans
+from slipsweep.grid.blocks import slabs
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -336,11 +337,11 @@ def test_parts_of_a_task_are_the_whole() -> None:
     shape = (7, 1, 300, 40)
     for most in (1, 13, 300, 12_000, 10**9):
         seen = np.zeros(shape, int)
-        for slab in engine.slabs(shape, most):
+        for slab in slabs(shape, most):
             seen[slab] += 1
             assert seen[slab].size <= most
         assert (seen == 1).all()
-    assert list(engine.slabs((), 5)) == [()]
+    assert list(slabs((), 5)) == [()]
 
 
 # ------------------------------------------------------------------------------ attributes

@@ -12,7 +12,7 @@ import typer
 from slipsweep.model.variables import VALIDITY_TEXT
 
 if TYPE_CHECKING:
-    from slipsweep.files.netcdf import Tally
+    from slipsweep.grid.tally import Tally
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]

@@ -63,6 +63,7 @@ def record(
 
     from slipsweep.files import netcdf, outputs
     from slipsweep.grid.resources import size_text
+    from slipsweep.grid.tally import Tally
     from slipsweep.motion.records import read_record
 
     motion = read_record(file, **reading)
@@ -109,7 +110,7 @@ def record(
         if (values >= 0).any():
             low, high = values[values >= 0].min(), values.max()
             typer.echo(f"{name.replace('_', ' '):<24}{low}" + (f" to {high}" if high > low else ""))
-    tally = netcdf.Tally(count)
+    tally = Tally(count)
     tally.add({"validity": validity})
     echo_tally(tally)
     if output is not None:

@@ -62,9 +62,8 @@ def run(
 ) -> None:
     """Compute a sweep and write it to a netCDF file."""
     from slipsweep.files import spec
-    from slipsweep.grid import blocks
     from slipsweep.grid.resources import parse_size, size_text
-    from slipsweep.runs import store
+    from slipsweep.runs import solving, store
 
     if resume and overwrite:
         raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
@@ -92,16 +91,16 @@ def run(
                 raise InputError(f"{option}: not with [uncertainty], whose statistics are one small file")
         _run_samples(checked, path, overwrite, quiet)
         return
-    cells = None if memory is None else blocks.cells_within(parse_size("--memory", memory), checked, workers or 0)
+    cells = None if memory is None else solving.cells_within(parse_size("--memory", memory), checked, workers or 0)
     watch = Watch()
     with ExitStack() as stack:
-        solved: blocks.Solved = blocks.solve_here
+        solved: solving.Solved = solving.solve_here
         shared = None
         if workers is not None or scheduler is not None:
             from slipsweep.runs.cluster import cluster
 
             solved = stack.enter_context(cluster(workers=workers, scheduler=scheduler))
-            shared = blocks.cells_shared(checked, workers)
+            shared = solving.cells_shared(checked, workers)
         progress = stack.enter_context(progress_bar(checked.cells, quiet))
         report = store.run(
             checked,

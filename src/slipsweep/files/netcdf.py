@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import complete_or_absent, writing
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode, Validity
+from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode
 from slipsweep.motion.records import Record
 
 #: Results that are whole numbers, -1 where there is no value.
@@ -204,36 +203,3 @@ def without_time_axis(table: Table) -> Table:
         for arrays in (table.coords, table.data_vars)
     )
     return Table(coords, data_vars, table.attrs)
-
-
-# --------------------------------------------------------------------------- counting cells
-
-
-@dataclass
-class Tally:
-    """Counts of cells, and among them of each sliding mode and each flag (None: not stored)."""
-
-    cells: int = 0
-    modes: dict[SlidingMode, int] | None = None
-    flags: dict[Validity, int] | None = None
-
-    def add(self, results: Mapping[str, NDArray[Any]]) -> None:
-        """Count one block; `results` holds its arrays by variable name."""
-        if "sliding_mode" in results:
-            self.modes = self.modes or dict.fromkeys(SlidingMode, 0)
-            for mode in SlidingMode:
-                # int(): numpy would take a member of an enumeration for 64 bits, and all cells with it
-                self.modes[mode] += int(np.count_nonzero(results["sliding_mode"] == int(mode)))
-        if "validity" in results:
-            self.flags = self.flags or dict.fromkeys(Validity, 0)
-            seen = int(np.bitwise_or.reduce(results["validity"], axis=None))
-            for flag in Validity(seen & 255):
-                self.flags[flag] += int(np.count_nonzero(results["validity"] & int(flag)))
-
-    def merge(self, other: "Tally") -> None:
-        """Add the counts of other cells."""
-        self.cells += other.cells
-        if other.modes is not None:
-            self.modes = {mode: (self.modes or {}).get(mode, 0) + count for mode, count in other.modes.items()}
-        if other.flags is not None:
-            self.flags = {flag: (self.flags or {}).get(flag, 0) + count for flag, count in other.flags.items()}

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.files import guard
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import RECORD_DIM, Tally
+from slipsweep.files.netcdf import RECORD_DIM
 from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.tally import Tally
 from slipsweep.model.variables import (
     HISTORY,
     LIMIT_RESULTS,

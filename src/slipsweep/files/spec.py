@@ -41,6 +41,7 @@ from slipsweep.motion.records import Record, read_record
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
+    from slipsweep.grid.plans import Plan
     from slipsweep.studies.uncertainty import Sampling
 
 Floats = NDArray[np.float64]
@@ -278,6 +279,12 @@ class SweepSpec:
     def with_solver(self, solver: Solver) -> "SweepSpec":
         """Return the same sweep under another solver."""
         return replace(self, solver=solver)
+
+    def plan(self, block: Mapping[str, slice] | None = None) -> "Plan":
+        """Return what is to be solved for a part of the grid (as in `arguments`) or for all of it."""
+        from slipsweep.studies.sweeps import plan_of  # imports numba: not for sweeps that are only looked at
+
+        return plan_of(**self.arguments(block))
 
     def arguments(self, block: Mapping[str, slice] | None = None) -> dict[str, Any]:
         """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.grid.plans.plan_sweep`).

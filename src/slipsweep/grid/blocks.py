@@ -1,67 +1,28 @@
-"""Blocks of a grid: how a sweep is cut, and how its blocks are solved in this process."""
+"""How a grid is cut into blocks."""
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
-
-from slipsweep.errors import InputError
-from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.resources import size_text
-from slipsweep.grid.tables import Table
-from slipsweep.model.variables import RESULT_DTYPES
-from slipsweep.motion.records import Record
-
-if TYPE_CHECKING:
-    from slipsweep.grid.plans import Plan
+from collections.abc import Collection, Hashable, Iterator, Mapping
+from typing import TypeAlias, TypeVar
 
 #: A part of a grid: where it lies along each dimension.
 Block: TypeAlias = dict[str, slice]
 
-#: Called with a number of cells just solved, from any thread.
-Progress: TypeAlias = Callable[[int], None]
-
-#: What solves blocks, given with their numbers: yields each with its number, in any order.
-#: A block's results are let go of before the next is asked for, but for one: whose memory may be
-#: used for those of the next but one.
-Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
-
-#: Cells solved and written at a time: 80 MB of results, yet enough to keep the kernels busy.
+#: Cells read, solved or written at a time: 80 MB of results, yet enough to keep the kernels busy.
 BLOCK_CELLS = 4_000_000
 
-#: The same of a record: a cell takes some thousands of times as long, and no more than seconds
-#: of work are to be lost with a block.
-RECORD_BLOCK_CELLS = 20_000
-
-#: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
-#: 469 MB, of which 96 MB were its blocks.
-_BASE_MEMORY = 400_000_000
-
-#: Resident memory of a worker process on this machine beside its blocks (220 MB seen).
-_WORKER_MEMORY = 250_000_000
-
-#: Blocks for each worker process of a cluster, so that all end at about the same time, where
-#: that leaves blocks of this many cells at least: tens of milliseconds of work, against the
-#: two that a block takes on its way.
-_BLOCKS_A_WORKER = 16
-_LEAST_CELLS = {"record": 1_000, "step": 10_000, "cycle": 500_000}
-
-#: Processes reckoned with where a scheduler has them.
-_UNKNOWN_WORKERS = 64
+Dim = TypeVar("Dim", bound=Hashable)
 
 
-def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
+def block_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> dict[Dim, int]:
     """Return the block of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
 
     Its cells then follow one another in the file.  Among the last dimensions is the frequency, of which a
-    whole axis costs `sweep` hardly more than one value.
+    whole axis costs `sweep` hardly more than one value.  Dimensions `together` are cut only where no other is left.
     """
-    lengths: dict[str, int] = {}
+    lengths: dict[Dim, int] = {}
     cells = 1
-    for dim in reversed(list(shape)):
+    for dim in reversed([*(dim for dim in shape if dim not in together), *(dim for dim in shape if dim in together)]):
         # equal shares rather than full blocks and a remnant
         pieces = math.ceil(shape[dim] / max(1, most // cells))
         lengths[dim] = math.ceil(shape[dim] / pieces)
@@ -69,58 +30,11 @@ def block_lengths(shape: Mapping[str, int], most: int) -> dict[str, int]:
     return {dim: lengths[dim] for dim in shape}
 
 
-def default_cells(spec: SweepSpec) -> int:
-    """Return how many cells of a sweep are solved and written at a time if nothing else is asked for."""
-    return BLOCK_CELLS if spec.record is None else RECORD_BLOCK_CELLS
-
-
-def block_memory(spec: SweepSpec, most: int) -> int:
-    """Return the memory that blocks of at most `most` cells take, in bytes.
-
-    Two are there at a time, one being solved and one being written, with 8 bytes a cell
-    for conversion and counting.
-    """
-    return math.prod(block_lengths(spec.shape, most).values()) * _cell_memory(spec)
-
-
-def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
-    """Return how many cells a block may have for a run to stay within `memory` bytes.
-
-    With `workers` processes beside this one, of which each has a block being solved and two
-    waiting or on their way, that is the memory of all together.
-
-    Raises
-    ------
-    InputError
-        Not even a small block fits.
-    """
-    base, cell = _BASE_MEMORY + workers * _WORKER_MEMORY, _cell_memory(spec, 2 + 3 * workers)
-    cells = (memory - base) // cell
-    if cells < 1000:
-        least = base + 1000 * cell
-        digits = 10 ** (math.floor(math.log10(least)) - 2)  # three are shown: what is shown must be enough
-        shown = size_text(math.ceil(least / digits) * digits)
-        with_workers = f" with --workers {workers}" if workers else ""
-        raise InputError(f"--memory = {size_text(memory)}: must be {shown} at least{with_workers}")
-    return cells
-
-
-def cells_shared(spec: SweepSpec, workers: int | None) -> int:
-    """Return how many cells a block should have for workers to share a sweep evenly (None: a number unknown)."""
-    solver = "record" if spec.record is not None else spec.solver.name
-    share = spec.cells // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
-    return min(default_cells(spec), max(_LEAST_CELLS[solver], share))
-
-
-def _cell_memory(spec: SweepSpec, blocks: int = 2) -> int:
-    return blocks * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
-
-
-def grid_blocks(shape: Mapping[str, int], most: int) -> Iterator[Block]:
-    """Cut a grid into blocks, in the order of the file; a grid without cells has none."""
+def grid_blocks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> Iterator[dict[Dim, slice]]:
+    """Cut a grid into blocks as `block_lengths` says, in the order of the file; a grid without cells has none."""
     if 0 in shape.values():
         return
-    lengths = block_lengths(shape, most)
+    lengths = block_lengths(shape, most, together)
     starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
     for corner in itertools.product(*starts):
         yield {
@@ -128,59 +42,12 @@ def grid_blocks(shape: Mapping[str, int], most: int) -> Iterator[Block]:
         }
 
 
-def solve_here(
-    spec: SweepSpec, blocks: Mapping[int, Block], progress: Progress | None = None
-) -> Iterator[tuple[int, Table]]:
-    """Solve blocks one after the other in this process.
-
-    Parameters
-    ----------
-    spec : SweepSpec
-    blocks : mapping of int to Block
-        The blocks to solve, by their numbers.
-    progress : callable, optional
-
-    Yields
-    ------
-    int, Table
-        The number of a block, and its results with their coordinates: its own until the next but
-        one is asked for, whose arrays take their memory.
-    """
-    # one set of arrays is being written while the other is solved into
-    for (number, block), memory in zip(blocks.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
-        yield number, plan_of(spec.arguments(block)).solve(progress, memory.rewound().empty)
+def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
+    """Cut a grid whose dimensions have no names."""
+    for block in grid_blocks(dict(enumerate(shape)), most):
+        yield tuple(block.values())
 
 
-class _Memory:
-    """Memory that is used again for each block: the system takes 0.2 to 1 µs for every 4 KB that are new."""
-
-    def __init__(self) -> None:
-        self.pieces: list[NDArray[np.uint8]] = []
-        self.used = 0
-
-    def rewound(self) -> "_Memory":
-        """Itself, with nothing of it in use."""
-        self.used = 0
-        return self
-
-    def empty(self, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
-        """As `np.empty`; what an earlier block had at this place is overwritten."""
-        nbytes = math.prod(shape) * np.dtype(dtype).itemsize
-        if self.used == len(self.pieces):
-            self.pieces.append(np.empty(nbytes, np.uint8))
-        elif self.pieces[self.used].nbytes < nbytes:
-            self.pieces[self.used] = np.empty(nbytes, np.uint8)
-        self.used += 1
-        return self.pieces[self.used - 1][:nbytes].view(dtype).reshape(shape)
-
-
-def plan_of(arguments: Mapping[str, Any]) -> "Plan":
-    """Return the plan of a sweep, harmonic or under a record, from `SweepSpec.arguments`."""
-    # both import numba: not for `info`, and not to be counted as computing time
-    if isinstance(arguments.get("excitation"), Record):
-        from slipsweep.studies.record_sweeps import plan_record
-
-        return plan_record(**arguments)
-    from slipsweep.grid.plans import plan_sweep
-
-    return plan_sweep(**arguments)
+def places(block: Mapping[str, slice], sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Where a block lies in what has these dimensions: in all of those that are none of the grid's."""
+    return {dim: block.get(dim, slice(0, length)) for dim, length in sizes.items()}

@@ -5,9 +5,8 @@ to the shape of the result; a dimension along which only the frequency varies is
 by the scaling law and costs no kernel call.
 """
 
-import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import RunError
 from slipsweep.grid import threads
+from slipsweep.grid.blocks import slabs
 from slipsweep.grid.served import check_served, is_ordinary
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
@@ -337,20 +337,6 @@ def cut(arrays: Mapping[str, Array], slices: tuple[slice, ...]) -> dict[str, Arr
         where: Any = (part if size > 1 else slice(None) for part, size in zip(slices, values.shape, strict=True))
         parts[name] = values[(*where, ...)]  # the dots keep an array without dimensions an array
     return parts
-
-
-def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
-    """Cut a grid into slabs of at most `most` cells, whole along its last dimensions."""
-    axis, row = 0, math.prod(shape[1:])
-    while row > most:
-        axis += 1
-        row //= shape[axis]
-    lengths = [1] * axis + [max(1, most // max(row, 1))] + list(shape[axis + 1 :])
-    starts = (range(0, size, length) for size, length in zip(shape, lengths, strict=False))
-    for corner in itertools.product(*starts):
-        yield tuple(
-            slice(start, min(start + length, size)) for start, length, size in zip(corner, lengths, shape, strict=False)
-        )
 
 
 def flat(values: Array) -> Array:

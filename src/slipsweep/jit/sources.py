@@ -22,7 +22,7 @@ from slipsweep.jit import folders
 PACKAGE = Path(__file__).parents[1]
 
 #: How the sources begin that results come from, and those that machine code comes from.
-RESULTS = "grid/blocks.py"
+RESULTS = "files/spec.py"
 MACHINE_CODE = "kernels/"
 
 #: Versions of the sources whose parts are kept.

@@ -20,9 +20,11 @@ from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.blocks import Block, Progress, Solved, plan_of
+from slipsweep.grid.blocks import Block
 from slipsweep.grid.tables import Table
 from slipsweep.runs.parts import installation
+from slipsweep.runs.solving import Progress, Solved
+from slipsweep.studies.sweeps import plan_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -163,7 +165,7 @@ def _solve(client: dict[str, str], arguments: dict[str, Any]) -> Table:
         from distributed import get_worker
 
         raise RunError(_mismatch(get_worker().address, installation(), client))
-    return plan_of(arguments).solve()
+    return plan_of(**arguments).solve()
 
 
 def _mismatch(worker: str, found: dict[str, str] | None, client: dict[str, str]) -> str:
@@ -284,13 +286,13 @@ class _Run:
 
         def installed() -> dict[str, str] | None:  # defined here, it is sent as code: workers need not have this module
             try:
-                import slipsweep
+                from slipsweep._version import __version__
             except ImportError:
                 return None
             try:
                 from slipsweep.runs.parts import installation
             except ImportError:  # of a version before there were clusters
-                return {"slipsweep version": slipsweep.__version__}
+                return {"slipsweep version": __version__}
             return installation()
 
         try:

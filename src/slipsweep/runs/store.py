@@ -26,25 +26,17 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import Tally, TooLarge, history_of, rounded
+from slipsweep.files.netcdf import TooLarge, history_of, rounded
 from slipsweep.files.outputs import appear, check_outputs, sync, writing
 from slipsweep.files.results import stored_tally
 from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.blocks import (
-    Block,
-    Progress,
-    Solved,
-    block_lengths,
-    block_memory,
-    default_cells,
-    grid_blocks,
-    plan_of,
-    solve_here,
-)
+from slipsweep.grid.blocks import Block, block_lengths, grid_blocks
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tally import Tally
 from slipsweep.runs import parts
 from slipsweep.runs.placed import PlacedFile, file_checksum, make_file, run_of
+from slipsweep.runs.solving import Progress, Solved, block_memory, default_cells, solve_here
 
 #: Seconds after which what is written is brought to the disk itself.
 _SYNC_SECONDS = 1.0
@@ -94,14 +86,14 @@ def run(
         Write a folder with a netCDF file for each block.
     block_cells : int, optional
         Most cells to solve and write at a time; two such blocks are in memory.  By default
-        `blocks.default_cells`, or what an interrupted run had.
+        `solving.default_cells`, or what an interrupted run had.
     shared_cells : int, optional
         As many cells or fewer, so that those who solve blocks share them evenly; but what an
         interrupted run had goes before.
     progress : callable
         Called with a number of cells just solved, from any thread.
     solved : callable
-        What solves the blocks, in any order (`blocks.Solved`).
+        What solves the blocks, in any order (`solving.Solved`).
 
     Returns
     -------
@@ -272,7 +264,7 @@ class _OneFile:
 
     def __init__(self, spec: SweepSpec, data: Path, manifest: parts.Manifest) -> None:
         self.spec, self.data, self.manifest = spec, data, manifest
-        self.table = plan_of(spec.arguments()).empty()
+        self.table = spec.plan().empty()
         self.file: PlacedFile | None = None
 
     def close(self) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
+from slipsweep.grid.blocks import slabs
 from slipsweep.grid.engine import Problem
 from slipsweep.grid.plans import check_dimensions, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
@@ -145,7 +146,7 @@ def solve(
         name: np.empty(table, RESULT_DTYPES.get(name, "float64"))
         for name in ("limit_amplitude", "limit_status", "permanent_displacement", "sliding_mode", "validity")
     }
-    for slab in engine.slabs(table, max(1, _SCANNED // steps)):
+    for slab in slabs(table, max(1, _SCANNED // steps)):
         part = engine.cut(rows, slab)
         cells = tuple(cut.stop - cut.start for cut in slab)
         for name, values in _solve_slab(problem, cells, part, maximum_amplitude, steps).items():

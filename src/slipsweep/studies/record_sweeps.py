@@ -14,6 +14,7 @@ import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, threads
+from slipsweep.grid.blocks import slabs
 from slipsweep.grid.engine import Array, Problem
 from slipsweep.grid.plans import Plan, Task, about, aligned, check_inputs, check_problem, checked, grid_sizes
 from slipsweep.grid.served import check_served
@@ -107,7 +108,7 @@ def _solve(
     for side in np.ndindex(polarity.shape):
         history = history_of(record, float(polarity[side]))
         sided = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
-        for slab in engine.slabs(own, _SOLVED_CELLS):
+        for slab in slabs(own, _SOLVED_CELLS):
             # what of the results the slab's cells give
             where = tuple(part if n > 1 else one for part, n, one in zip(slab, own, sided, strict=True))
             cells = tuple(part.stop - part.start for part in slab)

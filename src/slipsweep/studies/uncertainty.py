@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.files.netcdf import Tally
 from slipsweep.grid import engine, threads
+from slipsweep.grid.blocks import slabs
 from slipsweep.grid.engine import Problem
 from slipsweep.grid.plans import aligned, check_dimensions, grid_sizes, plan_sweep
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tally import Tally
 from slipsweep.model.options import MODELS, Newmark
 from slipsweep.model.parameters import (
     BOUNDS,
@@ -549,7 +550,7 @@ class SamplePlan:
         points = max(_CELLS // self.sampling.samples, 1)
         self._check_memory(8 * sum(map(math.prod, shapes.values())), points)
         found = {name: np.empty(lengths) for name, lengths in shapes.items()}
-        for slab in engine.slabs(shape, points):
+        for slab in slabs(shape, points):
             where: Any = (*slab, ...)
             reduced = self._reduce(self._solve(slab, progress), self.frequency[where].reshape(-1, frequencies))
             for name, values in reduced.items():

@@ -1,0 +1,138 @@
+"""How large the blocks of a sweep are, and how they are solved in this process."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.files.spec import SweepSpec
+from slipsweep.grid import blocks as grid
+from slipsweep.grid.blocks import Block, block_lengths
+from slipsweep.grid.resources import size_text
+from slipsweep.grid.tables import Table
+from slipsweep.model.variables import RESULT_DTYPES
+
+#: Called with a number of cells just solved, from any thread.
+Progress: TypeAlias = Callable[[int], None]
+
+#: What solves blocks, given with their numbers: yields each with its number, in any order.
+#: A block's results are let go of before the next is asked for, but for one: whose memory may be
+#: used for those of the next but one.
+Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
+
+#: As `blocks.BLOCK_CELLS`, of a record: a cell takes some hundreds of times as long, and no more than seconds
+#: of work are to be lost with a block.
+RECORD_BLOCK_CELLS = 20_000
+
+#: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
+#: 469 MB, of which 96 MB were its blocks.
+_BASE_MEMORY = 400_000_000
+
+#: Resident memory of a worker process on this machine beside its blocks (220 MB seen).
+_WORKER_MEMORY = 250_000_000
+
+#: Blocks for each worker process of a cluster, so that all end at about the same time, where
+#: that leaves blocks of this many cells at least: tens of milliseconds of work, against the
+#: two that a block takes on its way.
+_BLOCKS_A_WORKER = 16
+_LEAST_CELLS = {"record": 1_000, "step": 10_000, "cycle": 500_000}
+
+#: Processes reckoned with where a scheduler has them.
+_UNKNOWN_WORKERS = 64
+
+
+def default_cells(spec: SweepSpec) -> int:
+    """Return how many cells of a sweep are solved and written at a time if nothing else is asked for."""
+    return grid.BLOCK_CELLS if spec.record is None else RECORD_BLOCK_CELLS
+
+
+def block_memory(spec: SweepSpec, most: int) -> int:
+    """Return the memory that blocks of at most `most` cells take, in bytes.
+
+    Two are there at a time, one being solved and one being written, with 8 bytes a cell
+    for conversion and counting.
+    """
+    return math.prod(block_lengths(spec.shape, most).values()) * _cell_memory(spec)
+
+
+def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
+    """Return how many cells a block may have for a run to stay within `memory` bytes.
+
+    With `workers` processes beside this one, of which each has a block being solved and two
+    waiting or on their way, that is the memory of all together.
+
+    Raises
+    ------
+    InputError
+        Not even a small block fits.
+    """
+    base, cell = _BASE_MEMORY + workers * _WORKER_MEMORY, _cell_memory(spec, 2 + 3 * workers)
+    cells = (memory - base) // cell
+    if cells < 1000:
+        least = base + 1000 * cell
+        digits = 10 ** (math.floor(math.log10(least)) - 2)  # three are shown: what is shown must be enough
+        shown = size_text(math.ceil(least / digits) * digits)
+        with_workers = f" with --workers {workers}" if workers else ""
+        raise InputError(f"--memory = {size_text(memory)}: must be {shown} at least{with_workers}")
+    return cells
+
+
+def cells_shared(spec: SweepSpec, workers: int | None) -> int:
+    """Return how many cells a block should have for workers to share a sweep evenly (None: a number unknown)."""
+    solver = "record" if spec.record is not None else spec.solver.name
+    share = spec.cells // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
+    return min(default_cells(spec), max(_LEAST_CELLS[solver], share))
+
+
+def _cell_memory(spec: SweepSpec, blocks: int = 2) -> int:
+    return blocks * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
+
+
+def solve_here(
+    spec: SweepSpec, blocks: Mapping[int, Block], progress: Progress | None = None
+) -> Iterator[tuple[int, Table]]:
+    """Solve blocks one after the other in this process.
+
+    Parameters
+    ----------
+    spec : SweepSpec
+    blocks : mapping of int to Block
+        The blocks to solve, by their numbers.
+    progress : callable, optional
+
+    Yields
+    ------
+    int, Table
+        The number of a block, and its results with their coordinates: its own until the next but
+        one is asked for, whose arrays take their memory.
+    """
+    # one set of arrays is being written while the other is solved into
+    for (number, block), memory in zip(blocks.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
+        yield number, spec.plan(block).solve(progress, memory.rewound().empty)
+
+
+class _Memory:
+    """Memory that is used again for each block: the system takes 0.2 to 1 µs for every 4 KB that are new."""
+
+    def __init__(self) -> None:
+        self.pieces: list[NDArray[np.uint8]] = []
+        self.used = 0
+
+    def rewound(self) -> "_Memory":
+        """Itself, with nothing of it in use."""
+        self.used = 0
+        return self
+
+    def empty(self, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+        """As `np.empty`; what an earlier block had at this place is overwritten."""
+        nbytes = math.prod(shape) * np.dtype(dtype).itemsize
+        if self.used == len(self.pieces):
+            self.pieces.append(np.empty(nbytes, np.uint8))
+        elif self.pieces[self.used].nbytes < nbytes:
+            self.pieces[self.used] = np.empty(nbytes, np.uint8)
+        self.used += 1
+        return self.pieces[self.used - 1][:nbytes].view(dtype).reshape(shape)
