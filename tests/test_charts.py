@@ -18,6 +18,7 @@ from slipsweep.charts import charts
 from slipsweep.charts.slices import Result, boundaries, newmark
 from slipsweep.cli import main
 from slipsweep.errors import InputError
+from slipsweep.explore import page as explore
 from slipsweep.files import spec
 from slipsweep.model.variables import Validity
 from slipsweep.runs import store
@@ -419,3 +420,79 @@ def test_a_case_is_chosen_by_its_name(folder: Path) -> None:
     np.testing.assert_allclose(table["permanent_displacement"].values, direct.permanent_displacement, rtol=1e-13)
     figure = charts.contours(table, boundaries(table), "permanent_displacement", "frequency", "amplitude")
     assert figure.get_supxlabel().startswith("case steep: θ = 12°")
+
+
+# ------------------------------------------------------------- results with little to draw
+
+SMALL = """
+[axes.theta]
+values = [0, 5, 30]
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.amplitude]
+values = [1, 2, 4, 7]
+[axes.frequency]
+values = [1, 2, 4]
+"""
+
+
+@pytest.fixture(scope="module")
+def small(folder: Path) -> Path:
+    return made(folder, "small", SMALL)
+
+
+def one_value(values: Any) -> Any:
+    values = np.zeros_like(values)
+    values[1, 0, 3, 1] = 0.05
+    return values
+
+
+@pytest.mark.parametrize(
+    ("fill", "undrawn"),
+    [
+        (np.zeros_like, {"families", "dimensionless"}),
+        (lambda values: np.full_like(values, np.nan), {"families", "dimensionless"}),
+        (lambda values: np.full_like(values, -0.2), {"families", "dimensionless"}),
+        (one_value, set()),
+        (lambda values: np.full_like(values, 5e-324), set()),
+        (lambda values: np.geomspace(1e-300, 1e30, values.size).reshape(values.shape), set()),
+        (lambda values: np.full_like(values, np.inf), {"contours", "families", "dimensionless", "newmark"}),
+    ],
+)
+def test_what_can_be_drawn_is_drawn_and_the_rest_named(
+    small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    fill: Any, undrawn: set[str],
+) -> None:  # fmt: skip
+    path = tmp_path / "a.nc"
+    path.write_bytes(small.read_bytes())
+    with netCDF4.Dataset(path, "a") as file:
+        file.set_auto_mask(False)
+        file["permanent_displacement"][:] = fill(file["permanent_displacement"][:])
+    monkeypatch.chdir(tmp_path)
+    assert main(["chart", "a.nc"]) == 0
+    output = capsys.readouterr().out
+    kinds = {"contours", "modes", "families", "dimensionless", "newmark"}
+    assert {kind for kind in kinds if (tmp_path / f"a-{kind}.png").exists()} == kinds - undrawn
+    assert {line.split(":")[0] for line in output.splitlines() if ".png" not in line} == {f"no {k}" for k in undrawn}
+    for kind in undrawn:
+        assert main(["chart", "a.nc", "--kind", kind, "-o", "b.png"]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    if "newmark" in undrawn:
+        with pytest.raises(InputError, match="displacement: holds inf; what is drawn must be within"):
+            explore.read_excerpt(path, 1000)
+    else:
+        explore.page(explore.read_excerpt(path, 1000), None, "a.nc", "")
+
+
+def test_a_single_value_is_seen(small: Path) -> None:
+    """A line through one point is none: it has a marker."""
+    with Result(small) as opened:
+        table = opened.select(
+            ["permanent_displacement"], {"amplitude": slice(None), "frequency": [0, 1]}, {"theta": 0, "mu_s": 0.5}
+        )
+    table.data_vars["permanent_displacement"].values[:-1] = 0.0
+    figure = charts.families(table, boundaries(table), "permanent_displacement", "amplitude", "frequency")
+    for line in figure.axes[0].get_lines()[:2]:
+        marked = np.asarray(line.get_markevery())
+        assert line.get_marker() == "."
+        assert np.isfinite(np.asarray(line.get_ydata())[marked]).tolist() == [True]

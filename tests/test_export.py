@@ -228,3 +228,33 @@ def test_flags_go_by_the_words_of_the_file() -> None:
 def test_what_has_no_flags(data: xr.Dataset | xr.DataArray, message: str) -> None:
     with pytest.raises(InputError, match=message):
         slipsweep.flags(data)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_packed_numbers_are_unpacked(folder: Path, tmp_path: Path, suffix: str) -> None:
+    """By scale_factor and add_offset, as programs that pack leave them."""
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    packed, path = tmp_path / "packed.nc", tmp_path / f"t{suffix}"
+    with xr.open_dataset(folder / "cases.nc") as data:
+        encoding = {"dtype": ">i2", "scale_factor": 0.001, "add_offset": -1.0, "_FillValue": -32768}
+        expected = data.permanent_displacement.values.ravel()
+        data.drop_encoding().to_netcdf(packed, encoding={"permanent_displacement": encoding})
+    export.export(packed, path, words=True)
+    table = bare(read(path))
+    np.testing.assert_allclose(table["permanent_displacement"], expected, atol=0.0005)
+    assert np.isnan(expected).any()
+    assert set(table["sliding_mode"].dropna()) <= {"stuck", "stick_slip", "continuous"}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_words_of_one_cell(folder: Path, tmp_path: Path, suffix: str) -> None:
+    """A file without dimensions is a table of one row."""
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    cell, path = tmp_path / "cell.nc", tmp_path / f"t{suffix}"
+    with xr.open_dataset(folder / "cases.nc", mask_and_scale=False) as data:
+        data.isel(case=0, frequency=1).to_netcdf(cell)
+    assert export.export(cell, path, words=True) == 1
+    row = bare(read(path)).iloc[0]
+    assert (row.label, row.sliding_mode, row.frequency) == ("mild ± slope, wet", "stick_slip", 2.0)

@@ -535,7 +535,7 @@ def plot_curve(axes: Axes, xs: Floats, ys: Floats, **look: Any) -> None:
     """Draw a line, and points where a value has no neighbour to be joined with."""
     there = np.concatenate([[False], np.isfinite(ys), [False]])
     alone = there[1:-1] & ~there[:-2] & ~there[2:]
-    if alone.any():
+    if alone.any() and "marker" not in look:
         look |= {"marker": ".", "markevery": alone.tolist()}
     axes.plot(xs, ys, **look)
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from slipsweep.charts.charts import set_scale
+from slipsweep.charts.charts import plot_curve, set_scale
 from slipsweep.charts.style import SYMBOLS, axis_label, model_text, plain, value_text
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
@@ -71,7 +71,8 @@ def limit_chart(table: Table, labels: Sequence[str] = ()) -> Figure:
             where: Any = tuple(chosen.get(dim, slice(None)) for dim in limits.dims)
             y = np.atleast_1d(limits.values[where]) / g
             label = _label(table, curves, at_curve, labels) if curves else None
-            panel.plot(x, y, color=colour, label=label, marker="." if x.size <= 12 else None)
+            points = {"marker": "."} if x.size <= 12 else {}
+            plot_curve(panel, x, y, color=colour, label=label, **points)
             states = np.atleast_1d(status[where])
             abrupt = (states >= LimitStatus.AT_MODE_JUMP) & (states <= LimitStatus.AFTER_GAP)
             panel.plot(
@@ -140,6 +141,7 @@ def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], l
     lines = [
         ", ".join(single),
         f"{model_text(attributes)}; circles: reached in a jump or behind a gap",
+        "" if np.isfinite(table["limit_amplitude"].values).any() else "no limits to draw: limit_status says why",
         f"shown: {', '.join(thinned)}" if thinned else "",
     ]
     return "\n".join(line for line in lines if line)
