@@ -9,7 +9,7 @@ from mpmath import mp, mpf
 
 from slipsweep import Cosine, Harmonics, InputError, Sine, Square, Triangle
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TERM, TOP
 from slipsweep.motion.waveforms import MOST_RAMP, WAVEFORMS, Waveform
 
 CYCLES = 4
@@ -84,9 +84,7 @@ def test_pieces_are_the_wave(name: str) -> None:
         phase = wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])
         if wave.repeats and p >= wave.cycle[wave.lead + 1]:
             phase += 2 * pi * (wave.repeats - 1)  # the table has the plain cycle once
-        found = wave.pieces[p, TOP] + sum(
-            c * tau ** (k + 1) for k, c in enumerate(wave.pieces[p, COEFFICIENTS : COEFFICIENTS + TERMS])
-        )
+        found = wave.pieces[p, TOP] + sum(c * tau ** (k + 1) for k, c in enumerate(wave.pieces[p, COEFFICIENTS::TERM]))
         error = np.abs(found - defined(waveform, phase) / scale).max()
         assert error < 1e-14 + 4e-16 * fastest * 8 * pi, f"piece {p}: off by {error:.1e}"
         assert np.all(np.diff(found) * (wave.pieces[p, LAST] - wave.pieces[p, FIRST]) >= 0), f"piece {p}: not monotone"

@@ -20,10 +20,11 @@ from slipsweep.grid.served import check_served, is_ordinary
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.grid import CYCLE_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
+from slipsweep.kernels.grid import CYCLE_KERNEL, RECORD_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
 from slipsweep.model.options import Mendez, Model, Solver, Step
-from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, Validity
-from slipsweep.motion.cutting import wave_of
+from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, Validity
+from slipsweep.motion.cutting import wave_of, wave_of_record
+from slipsweep.motion.pieces import Wave
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
 
@@ -43,8 +44,10 @@ RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": st
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
-#: Results that come out of a kernel, in the order of `grid.Results`.
-MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
+#: Results that come out of a kernel; the codes in the order of its rows, and those of a record.
+MOTION_CODES = ("sliding_mode", "validity")
+MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", *MOTION_CODES)
+RECORD_CODES = (*RECORD_COUNTS, "validity")
 
 Array = NDArray[np.float64]
 
@@ -176,46 +179,34 @@ def _solve_into(
 ) -> None:
     """Solve a grid, or a slab of one; `results` lie without gaps."""
     inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
-    scaled = scaled_dimension(shape, inputs, frequency)
     # what is out of the ordinary is looked at, for which flags are wanted in any case
     ordinary = all(map(is_ordinary, (np.array(problem.model.g), *inputs[1:], frequency)))
-    flags = results.get("validity", np.empty(0 if ordinary else shape, RESULT_DTYPES["validity"]))
-    grid = layout(shape, scaled, [*inputs, frequency])
-    displacement, velocity, mode = (
-        results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1) for name in MOTION_RESULTS[:3]
-    )
-    targets = Results(displacement, velocity, mode, flags.reshape(-1), unsolved=np.full(1, -1))
-    periods = flat(1.0 / (2.0 * math.pi * frequency))
-    rows = tuple(flat(values) for values in inputs)
+    filled = dict(results) if ordinary else {"validity": np.empty(shape, RESULT_DTYPES["validity"]), **results}
     options = problem.options("peak_relative_velocity" in results)
     motion = problem.excitation
     assert isinstance(motion, Waveform)
     wave = wave_of(motion)
-    # a result costs about 1/32 of a cell of the cycle solver, a step about 1/16
-    work_per_cell = 1 + grid.frequencies // 32
+    work = 1
     if isinstance(problem.solver, Step):
-        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle)
-        work_per_cell += options.steps_per_cycle // 16
+        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle, options.rule)
+        work += options.steps_per_cycle // 16  # a step takes about 1/16 of a cell of the cycle solver
 
-    def work(first: int, last: int) -> None:
+    def call(grid: Grid, first: int, last: int, rows: tuple[Array, ...], periods: Array, targets: Results) -> None:
         if isinstance(problem.solver, Step):
             kernel(grid, first, last, rows, periods, options, steps, targets)
-        else:
-            stretches = np.array([[first, last]])
-            if _is_plain_sine(motion):
-                rest = np.empty(((last - first + 1) // 2, 2), np.int64)
-                stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
-            if stretches.size:
-                WAVE_KERNEL(grid, stretches, rows, periods, options, wave, targets)
-        if progress is not None:
-            progress((last - first) * grid.frequencies)
+            return
+        stretches = np.array([[first, last]])
+        if _is_plain_sine(motion):
+            rest = np.empty(((last - first + 1) // 2, 2), np.int64)
+            stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
+        if stretches.size:
+            WAVE_KERNEL(grid, stretches, rows, periods, options, wave, targets)
 
-    if math.prod(shape):
-        threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell)
+    periods = 1.0 / (2.0 * math.pi * frequency)
+    unsolved = _fill(filled, MOTION_CODES, shape, shape, 0, inputs, periods, call, work, progress)
     if not ordinary:
-        check_served(problem.model.g, arrays, results, flags)
-    if targets.unsolved[0] >= 0:
-        raise RunError(_unsolved(int(targets.unsolved[0]), grid, scaled, shape, arrays))
+        check_served(problem.model.g, arrays, results, filled["validity"])
+    _refuse_unsolved(unsolved, shape, arrays)
     if "structure_frequency" in arrays and "validity" in results:
         mark_flexible_blocks(results["validity"], frequency, arrays["structure_frequency"])
 
@@ -237,15 +228,114 @@ def amplitudes(
     return results
 
 
-def _unsolved(cell: int, grid: Grid, scaled: int | None, shape: tuple[int, ...], arrays: Mapping[str, Array]) -> str:
-    """What is said of a cell that a kernel could not solve."""
-    at = [int(i) for i in np.unravel_index(cell, tuple(grid.shape))]
-    place = [at.pop(0) if axis != scaled else 0 for axis in range(len(shape))]
-    parameters = ", ".join(
-        f"{name} = {float(values[tuple(i if n > 1 else 0 for i, n in zip(place, values.shape, strict=True))])}"
-        for name, values in arrays.items()
+def solve_record(
+    problem: Problem,
+    shape: tuple[int, ...],
+    arrays: Mapping[str, Array],
+    wanted: tuple[str, ...],
+    progress: Callable[[int], None] | None = None,
+    empty: Empty = np.empty,
+) -> dict[str, NDArray[Any]]:
+    """Solve a grid of responses to a record.
+
+    Parameters and results as in `solve`, but for the names: results are of `variables.RECORD_RESULTS`, and
+    in place of `amplitude` and `frequency` there are `scale`, `time_scale`, by which the scaling laws go as by
+    1/ω, and `polarity`.
+    """
+    record, options = problem.excitation, problem.options("peak_relative_velocity" in wanted)
+    assert isinstance(record, Record)
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    extremes = {
+        "acceleration of the record": np.abs(record.acceleration).max(),
+        "time of the record": np.abs(record.times).max(),
+    }
+    inputs = cell_inputs({**arrays, "amplitude": arrays["scale"]}, len(shape))
+    ordinary = all(map(is_ordinary, (np.array(problem.model.g), *inputs[1:], arrays["time_scale"], *extremes.values())))
+    filled = results if ordinary else {"validity": np.empty(shape, RESULT_DTYPES["validity"]), **results}
+    polarity = arrays["polarity"]
+    for side in np.ndindex(polarity.shape):
+        # the part of the grid that has this polarity, and where its results begin
+        part = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
+        sizes = tuple(1 if n > 1 else size for n, size in zip(polarity.shape, shape, strict=True))
+        begin = sum(at * stride for at, stride in zip(side, _strides(shape), strict=True))
+        own, wave = cut(arrays, part), wave_of_record(record, float(polarity[side]))
+
+        def call(
+            grid: Grid,
+            first: int,
+            last: int,
+            rows: tuple[Array, ...],
+            periods: Array,
+            targets: Results,
+            wave: Wave = wave,
+        ) -> None:
+            RECORD_KERNEL(grid, first, last, rows, periods, options, wave, targets)
+
+        # some 2 µs against 0.1, and more for a long record
+        work = max(32, wave.pieces.shape[0] // 64)
+        rows = cell_inputs({**own, "amplitude": own["scale"]}, len(shape))
+        unsolved = _fill(filled, RECORD_CODES, sizes, shape, begin, rows, own["time_scale"], call, work, progress)
+        if not ordinary:
+            served = {name: values[part] for name, values in results.items()}
+            check_served(problem.model.g, own | extremes, served, filled["validity"][part])
+        _refuse_unsolved(unsolved, sizes, own)
+    return results
+
+
+def _fill(
+    results: Mapping[str, NDArray[Any]],
+    codes: tuple[str, ...],
+    sizes: tuple[int, ...],
+    shape: tuple[int, ...],
+    begin: int,
+    inputs: list[Array],
+    periods: Array,
+    call: Callable[[Grid, int, int, tuple[Array, ...], Array, Results], None],
+    work_per_cell: int,
+    progress: Callable[[int], None] | None,
+) -> tuple[int, ...] | None:
+    """Fill in a part, of these `sizes`, of results of a `shape`, from place `begin` on, by `call` of a kernel.
+
+    u and v go as the squares of `periods` and as `periods`; `codes` are the names of the kernel's rows of codes.
+    Returns a cell of the part that was not solved, if there is one.
+    """
+    scaled = scaled_dimension(sizes, inputs, periods)
+    grid = layout(sizes, scaled, [*inputs, periods], shape)
+
+    def target(name: str) -> NDArray[Any]:
+        values = results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64")))
+        return values.reshape(-1)[begin:]
+
+    targets = Results(
+        target("permanent_displacement"),
+        target("peak_relative_velocity"),
+        tuple(map(target, codes)),
+        unsolved=np.full(1, -1),
     )
-    return f"{parameters}: an event of the motion was not found; please report this cell, with the options of the run"
+    rows, flat_periods = tuple(flat(values) for values in inputs), flat(periods)
+
+    def work(first: int, last: int) -> None:
+        call(grid, first, last, rows, flat_periods, targets)
+        if progress is not None:
+            progress((last - first) * grid.frequencies)
+
+    if math.prod(sizes):
+        # a result takes about 1/32 of a cell of the cycle solver
+        threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell + grid.frequencies // 32)
+    if targets.unsolved[0] < 0:
+        return None
+    at = [int(i) for i in np.unravel_index(int(targets.unsolved[0]), tuple(grid.shape))]
+    return tuple(at.pop(0) if axis != scaled else 0 for axis in range(len(sizes)))
+
+
+def _refuse_unsolved(cell: tuple[int, ...] | None, shape: tuple[int, ...], arrays: Mapping[str, Array]) -> None:
+    """Say which cell a kernel could not solve."""
+    if cell is None:
+        return
+    parameters = ", ".join(f"{name} = {float(np.broadcast_to(values, shape)[cell])}" for name, values in arrays.items())
+    raise RunError(
+        f"{parameters}: an event of the motion was not found; please report this cell, with the options of the run"
+    )
 
 
 def friction_parameters(
@@ -344,10 +434,15 @@ def flat(values: Array) -> Array:
     return np.require(values, np.float64, ["C", "ALIGNED", "WRITEABLE"]).reshape(-1)
 
 
-def layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:
-    """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart."""
+def layout(
+    shape: tuple[int, ...], scaled: int | None, arrays: list[Array], whole: tuple[int, ...] | None = None
+) -> Grid:
+    """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart.
+
+    The results are a part of ones of the shape `whole`, if that is given.
+    """
     dimensions = [axis for axis in range(len(shape)) if axis != scaled]
-    rows = [_strides(values.shape) for values in arrays] + [_strides(shape)]
+    rows = [_strides(values.shape) for values in arrays] + [_strides(whole or shape)]
     return Grid(
         # a grid without dimensions is one cell along one
         shape=np.array([shape[axis] for axis in dimensions] or [1], np.int64),

@@ -11,55 +11,73 @@ evaluated by its shorter closed forms.  Times the amplitude A it is the plane's 
 
 import math
 
+import numpy as np
+
 from slipsweep.jit.decorators import scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
 from slipsweep.kernels.events import root_of
-from slipsweep.motion.pieces import ARC, BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, LAST, ONCE, START, TOP, TWICE, Wave
+from slipsweep.motion.pieces import (
+    ARC,
+    BEGIN,
+    COEFFICIENTS,
+    DEGREE,
+    FINISH,
+    FIRST,
+    LAST,
+    ONCE,
+    START,
+    TERM,
+    TOP,
+    TWICE,
+)
 
 
 @scalar
-def from_top(wave: Wave, p: int, tau: float) -> float:
+def from_top(pieces: np.ndarray, p: int, tau: float) -> float:
     """w − top on piece p, τ from its anchor."""
-    if wave.pieces[p, ARC] > 0.0:
-        return -wave.pieces[p, TOP] * versine(tau)
+    if pieces[p, ARC] > 0.0:
+        return -pieces[p, TOP] * versine(tau)
     sum_ = 0.0
-    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
-        sum_ = (sum_ + wave.pieces[p, COEFFICIENTS + k]) * tau
+    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
+        sum_ = (sum_ + pieces[p, COEFFICIENTS + TERM * k]) * tau
     return sum_
 
 
 @scalar
-def slope(wave: Wave, p: int, tau: float) -> float:
+def slope(pieces: np.ndarray, p: int, tau: float) -> float:
     """dw/dτ on piece p."""
-    if wave.pieces[p, ARC] > 0.0:
-        return -wave.pieces[p, TOP] * math.sin(tau)
+    if pieces[p, ARC] > 0.0:
+        return -pieces[p, TOP] * math.sin(tau)
     sum_ = 0.0
-    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
-        sum_ = sum_ * tau + (k + 1.0) * wave.pieces[p, COEFFICIENTS + k]
+    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
+        sum_ = sum_ * tau + (k + 1.0) * pieces[p, COEFFICIENTS + TERM * k]
     return sum_
 
 
 @scalar
-def integral(wave: Wave, p: int, start: float, end: float) -> float:
+def integral(pieces: np.ndarray, p: int, start: float, end: float) -> float:
     """∫ (w − top) dτ over a part of piece p."""
-    if wave.pieces[p, ARC] > 0.0:
-        return -wave.pieces[p, TOP] * (angle_minus_sine(end) - angle_minus_sine(start))
+    if pieces[p, ARC] > 0.0:
+        return -pieces[p, TOP] * (angle_minus_sine(end) - angle_minus_sine(start))
     sum_start, sum_end = 0.0, 0.0
-    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
-        sum_start, sum_end = (sum_start + wave.pieces[p, ONCE + k]) * start, (sum_end + wave.pieces[p, ONCE + k]) * end
+    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
+        sum_start, sum_end = (
+            (sum_start + pieces[p, ONCE + TERM * k]) * start,
+            (sum_end + pieces[p, ONCE + TERM * k]) * end,
+        )
     return sum_end * end - sum_start * start
 
 
 @scalar
-def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, float]:
+def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
-    if wave.pieces[p, ARC] > 0.0:
+    if pieces[p, ARC] > 0.0:
         sine_part = angle_minus_sine(start)
         rest = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
-        return -wave.pieces[p, TOP] * (angle_minus_sine(end) - sine_part), -wave.pieces[p, TOP] * rest
+        return -pieces[p, TOP] * (angle_minus_sine(end) - sine_part), -pieces[p, TOP] * rest
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
-    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
-        once, twice = wave.pieces[p, ONCE + k], wave.pieces[p, TWICE + k]
+    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
+        once, twice = pieces[p, ONCE + TERM * k], pieces[p, TWICE + TERM * k]
         once_start, once_end = (once_start + once) * start, (once_end + once) * end
         twice_start, twice_end = (twice_start + twice) * start, (twice_end + twice) * end
     once_start *= start
@@ -67,30 +85,32 @@ def integrals(wave: Wave, p: int, start: float, end: float) -> tuple[float, floa
 
 
 @scalar
-def plane(wave: Wave, p: int, amplitude: float, tau: float) -> float:
+def plane(pieces: np.ndarray, p: int, amplitude: float, tau: float) -> float:
     """The plane's acceleration on piece p, τ from its anchor."""
-    return amplitude * (wave.pieces[p, TOP] + from_top(wave, p, tau))
+    return amplitude * (pieces[p, TOP] + from_top(pieces, p, tau))
 
 
 @scalar
-def held_gain(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> float:
+def held_gain(pieces: np.ndarray, p: int, amplitude: float, held: float, start: float, end: float) -> float:
     """∫ (x − b) dτ for a held b on piece p: the gain of V."""
-    return (amplitude * wave.pieces[p, TOP] - held) * (end - start) + amplitude * integral(wave, p, start, end)
+    return (amplitude * pieces[p, TOP] - held) * (end - start) + amplitude * integral(pieces, p, start, end)
 
 
 @scalar
-def held_integrals(wave: Wave, p: int, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+def held_integrals(
+    pieces: np.ndarray, p: int, amplitude: float, held: float, start: float, end: float
+) -> tuple[float, float]:
     """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on piece p: gains of V and W from rest."""
     width = end - start
-    excess = amplitude * wave.pieces[p, TOP] - held
-    first, second = integrals(wave, p, start, end)
+    excess = amplitude * pieces[p, TOP] - held
+    first, second = integrals(pieces, p, start, end)
     return excess * width + amplitude * first, 0.5 * excess * width * width + amplitude * second
 
 
 @scalar
-def _beyond(where: tuple[Wave, int, float], tau: float) -> tuple[float, float]:
-    wave, p, wanted = where
-    return from_top(wave, p, tau) - wanted, slope(wave, p, tau)
+def _beyond(where: tuple[np.ndarray, int, float], tau: float) -> tuple[float, float]:
+    pieces, p, wanted = where
+    return from_top(pieces, p, tau) - wanted, slope(pieces, p, tau)
 
 
 #: τ on a piece between two places, from a third on, at which w − top is `wanted`.
@@ -98,27 +118,27 @@ offset_root = root_of(_beyond)
 
 
 @scalar
-def offset_at(wave: Wave, p: int, amplitude: float, x: float) -> float:
+def offset_at(pieces: np.ndarray, p: int, amplitude: float, x: float) -> float:
     """τ at which the plane's acceleration is x on piece p (the nearer end, if x lies beyond)."""
-    far = wave.pieces[p, BEGIN] + wave.pieces[p, FINISH]  # one of them is 0
-    wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
-    farthest = wave.pieces[p, FIRST] + wave.pieces[p, LAST] - 2.0 * wave.pieces[p, TOP]
+    far = pieces[p, BEGIN] + pieces[p, FINISH]  # one of them is 0
+    wanted = (x - amplitude * pieces[p, TOP]) / amplitude
+    farthest = pieces[p, FIRST] + pieces[p, LAST] - 2.0 * pieces[p, TOP]
     share = wanted / farthest if farthest != 0.0 else 0.0
     if not share > 0.0:
         return 0.0
     if share >= 1.0:
         return far
-    if int(wave.pieces[p, DEGREE]) == 1:
+    if int(pieces[p, DEGREE]) == 1:
         return far * share
-    if wave.pieces[p, ARC] > 0.0:
+    if pieces[p, ARC] > 0.0:
         return math.copysign(inverse_versine(abs(wanted)), far)
-    tau = far * (math.sqrt(share) if wave.pieces[p, COEFFICIENTS + 0] == 0.0 else share)
+    tau = far * (math.sqrt(share) if pieces[p, COEFFICIENTS] == 0.0 else share)
     if wanted < 0.0:
-        return offset_root((wave, p, wanted), far, 0.0, tau, 0.0)
-    return offset_root((wave, p, wanted), 0.0, far, tau, 0.0)
+        return offset_root((pieces, p, wanted), far, 0.0, tau, 0.0)
+    return offset_root((pieces, p, wanted), 0.0, far, tau, 0.0)
 
 
 @scalar
-def phase_at(wave: Wave, p: int, tau: float) -> float:
+def phase_at(pieces: np.ndarray, p: int, tau: float) -> float:
     """The phase of τ on piece p, in the table's count."""
-    return wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])
+    return pieces[p, START] + (tau - pieces[p, BEGIN])

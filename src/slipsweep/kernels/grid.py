@@ -12,7 +12,7 @@ import numpy as np
 
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels import cycle, sine, step
+from slipsweep.kernels import cycle, record, sine, step
 from slipsweep.kernels.block import TILE, UNSOLVED, Options, block_of, cell_of
 from slipsweep.kernels.lanes import LANES_SIZE
 from slipsweep.motion.pieces import Wave
@@ -33,12 +33,14 @@ class Grid(NamedTuple):
 
 
 class Results(NamedTuple):
-    """Flat result arrays; one of size 0 is not wanted.  `unsolved` has one number, of a cell that was not solved."""
+    """Flat result arrays; one of size 0 is not wanted.  `unsolved` has one number, of a cell that was not solved.
+
+    `codes` are those of rows of codes: sliding mode and validity, or the counts of a record and validity.
+    """
 
     displacement: np.ndarray
     velocity: np.ndarray
-    mode: np.ndarray
-    validity: np.ndarray
+    codes: tuple[np.ndarray, ...]
     unsolved: np.ndarray
 
 
@@ -119,10 +121,11 @@ def place_of(grid: Grid, runs: Runs, run: int, j: int) -> int:
 
 
 @scalar
-def scatter(
-    grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.ndarray, codes: np.ndarray, results: Results
-) -> None:
-    """Spread the solved cells of `count` runs over their frequencies: u = W/ω², v = V/ω (the scaling law)."""
+def scatter(grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.ndarray, results: Results) -> None:
+    """Spread the solved cells of `count` runs over their frequencies: u = W/ω², v = V/ω (the scaling law).
+
+    Rows of codes are spread one by one (`spread_codes`), as the arrays they go to have types of their own.
+    """
     frequencies, step, stride = grid.frequencies, grid.frequency_stride, grid.result_stride
     period_stride, cell_stride = grid.strides[7, -1], grid.strides[8, -1]
     for run in range(count):
@@ -145,21 +148,24 @@ def scatter(
                 v, from_, to = motion[1, begin + j], period + j * period_stride, result + j * cell_stride
                 for k in range(frequencies):
                     results.velocity[to + k * stride] = v * periods[from_ + k * step]
-        if results.mode.size:
-            for j in range(end - begin):
-                for k in range(frequencies):
-                    results.mode[result + j * cell_stride + k * stride] = codes[0, begin + j]
-        if results.validity.size:
-            for j in range(end - begin):
-                for k in range(frequencies):
-                    results.validity[result + j * cell_stride + k * stride] = codes[1, begin + j]
 
 
 @scalar
-def note_unsolved(begin: int, count: int, codes: np.ndarray, results: Results) -> None:
+def spread_codes(grid: Grid, runs: Runs, count: int, codes: np.ndarray, target: np.ndarray) -> None:
+    """Spread a row of codes of `count` runs over their frequencies."""
+    cell_stride = grid.strides[8, -1]
+    for run in range(count if target.size else 0):
+        begin, end, result = runs.first[run], runs.first[run + 1], runs.result[run]
+        for j in range(end - begin):
+            for k in range(grid.frequencies):
+                target[result + j * cell_stride + k * grid.result_stride] = codes[begin + j]
+
+
+@scalar
+def note_unsolved(begin: int, count: int, validity: np.ndarray, results: Results) -> None:
     """Note a cell in which an event was not found (`events`), if there is one."""
     for j in range(count):
-        if codes[1, j] & UNSOLVED:
+        if validity[j] & UNSOLVED:
             results.unsolved[0] = begin + j
 
 
@@ -178,7 +184,9 @@ def _sine_grid(
         count = min(TILE, last - begin)
         found = gather(grid, begin, count, inputs, cells, runs)
         others = sine.solve_cells(cells, count, options, room, motion, codes)
-        scatter(grid, runs, found, periods, motion, codes, results)
+        scatter(grid, runs, found, periods, motion, results)
+        spread_codes(grid, runs, found, codes[0], results.codes[0])
+        spread_codes(grid, runs, found, codes[1], results.codes[1])
         for j in range(count if others > 0 else 0):
             if room.left[j] and stretches > 0 and rest[stretches - 1, 1] == begin + j:
                 rest[stretches - 1, 1] += 1
@@ -194,14 +202,36 @@ def _wave_grid(
 ) -> None:  # fmt: skip
     cells, runs = np.empty(7 * TILE), empty_runs(grid)
     motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
+    room = cycle.room_for(0)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
         for begin in range(stretches[stretch, 0], last, TILE):
             count = min(TILE, last - begin)
             found = gather(grid, begin, count, inputs, cells, runs)
-            cycle.solve_cells(cells, count, options, wave, motion, codes)
-            note_unsolved(begin, count, codes, results)
-            scatter(grid, runs, found, periods, motion, codes, results)
+            cycle.solve_cells(cells, count, options, wave, room, motion, codes)
+            note_unsolved(begin, count, codes[1], results)
+            scatter(grid, runs, found, periods, motion, results)
+            spread_codes(grid, runs, found, codes[0], results.codes[0])
+            spread_codes(grid, runs, found, codes[1], results.codes[1])
+
+
+def _record_grid(
+    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    wave: Wave, results: Results,
+) -> None:  # fmt: skip
+    cells, runs = np.empty(7 * TILE), empty_runs(grid)
+    motion, codes = np.empty((2, TILE)), np.empty((4, TILE), np.int64)
+    room = cycle.room_for(0)
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
+        found = gather(grid, begin, count, inputs, cells, runs)
+        record.solve_cells(cells, count, options, wave, room, motion, codes)
+        scatter(grid, runs, found, periods, motion, results)
+        spread_codes(grid, runs, found, codes[0], results.codes[0])
+        spread_codes(grid, runs, found, codes[1], results.codes[1])
+        spread_codes(grid, runs, found, codes[2], results.codes[2])
+        spread_codes(grid, runs, found, codes[3], results.codes[3])
+        note_unsolved(begin, count, codes[3], results)
 
 
 def _step_grid_of(rule: int) -> Kernel:
@@ -216,8 +246,10 @@ def _step_grid_of(rule: int) -> Kernel:
             count = min(TILE, last - begin)
             found = gather(grid, begin, count, inputs, cells, runs)
             step.solve_cells(cells, count, rule, options, steps, motion, codes)
-            note_unsolved(begin, count, codes, results)
-            scatter(grid, runs, found, periods, motion, codes, results)
+            note_unsolved(begin, count, codes[1], results)
+            scatter(grid, runs, found, periods, motion, results)
+            spread_codes(grid, runs, found, codes[0], results.codes[0])
+            spread_codes(grid, runs, found, codes[1], results.codes[1])
 
     return Kernel(step_grid)
 
@@ -229,6 +261,9 @@ def _step_grid_of(rule: int) -> Kernel:
 STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (step.RECTANGLE, step.TRAPEZOID, step.SIMPSON)}
 WAVE_KERNEL = Kernel(_wave_grid)
 CYCLE_KERNEL = Kernel(_sine_grid)
+
+#: Of records: each pulse with its own peak, and counts of slips and pulses in place of the sliding mode.
+RECORD_KERNEL = Kernel(_record_grid)
 
 
 def _parameter_grid(

@@ -12,9 +12,9 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle
 from slipsweep.kernels.block import Block, Options, block_at, response
-from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS
+from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, Room
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
-from slipsweep.kernels.train import beginning, first_pulse
+from slipsweep.kernels.pulse import STATE_ROWS, beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP
 from slipsweep.motion.pieces import BEGIN, END, FINISH, START, Wave
@@ -47,7 +47,7 @@ def ground_history(block: Block, options: Options, wave: Wave, phases: np.ndarra
                 max(wave.pieces[p, BEGIN] + (phi - wave.pieces[p, START]), wave.pieces[p, BEGIN]),
                 wave.pieces[p, FINISH],
             )
-            history[at, GROUND] = plane(wave, p, block.amplitude, tau)
+            history[at, GROUND] = plane(wave.pieces, p, block.amplitude, tau)
 
 
 @scalar
@@ -62,10 +62,10 @@ def sample_leg(
         gained, gained_way = -b * since, -0.5 * b * since * since
     elif kind == FOLLOW:
         sample[BLOCK] = response(block, sample[GROUND])
-        gained, gained_way = cycle.eq4_integrals(block, wave, p, tau, tau + since)
+        gained, gained_way = cycle.eq4_integrals(block, wave.pieces, p, tau, tau + since)
     else:
         sample[BLOCK] = b
-        gained, gained_way = held_integrals(wave, p, block.amplitude, b, tau, tau + since)
+        gained, gained_way = held_integrals(wave.pieces, p, block.amplitude, b, tau, tau + since)
     sample[VELOCITY] = max(velocity + gained, 0.0)
     sample[DISPLACEMENT] = displacement + moved + velocity * since + gained_way
 
@@ -77,6 +77,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
     legs = np.zeros((longest * MOST_LEGS + wave.pieces.shape[0] + 2, LEG_COLUMNS))
+    room = Room(np.zeros(STATE_ROWS), legs, np.zeros((2, 0)))
     at, velocity, displacement = 0, 0.0, 0.0
     k, repeat = first_pulse(block, wave, 0), 0
     stretches = wave.height.size
@@ -86,12 +87,12 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         offset = 2.0 * math.pi * repeat
         legs[0, 0] = 0.0
         p, tau = beginning(block, wave, k)
-        start = phase_at(wave, p, tau) + offset
-        now = cycle.follow_pulse(block, options, wave, legs, k, again, velocity)
+        start = phase_at(wave.pieces, p, tau) + offset
+        now = cycle.follow_pulse(block, options, wave, room, k, again, velocity)
         until = math.inf
         if again < stretches:
             p, tau = beginning(block, wave, again)
-            until = phase_at(wave, p, tau) + offset
+            until = phase_at(wave.pieces, p, tau) + offset
         row = 1
         while at < phases.size and phases[at] < until:
             phi = phases[at] - offset
@@ -122,22 +123,24 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
         return
     first, began = beginning(block, wave, k)
     at, velocity, displacement = 0, 0.0, 0.0
-    while at < phases.size and phases[at] < phase_at(wave, first, began):
+    while at < phases.size and phases[at] < phase_at(wave.pieces, first, began):
         at += 1
     for n in range(options.cycles):
         c = table_cycle(wave, n)
         offset = 2.0 * math.pi * (n - c)
         for p in range(max(wave.cycle[c], first), wave.cycle[c + 1]):
             start = began if p == first and n == c else wave.pieces[p, BEGIN]
-            start_phase = phase_at(wave, p, start) + offset
+            start_phase = phase_at(wave.pieces, p, start) + offset
             while at < phases.size and phases[at] < wave.pieces[p, END] + offset:
                 since = max(phases[at] - start_phase, 0.0)
-                gained, moved = cycle.eq4_integrals(block, wave, p, start, min(start + since, wave.pieces[p, FINISH]))
+                gained, moved = cycle.eq4_integrals(
+                    block, wave.pieces, p, start, min(start + since, wave.pieces[p, FINISH])
+                )
                 history[at, BLOCK] = response(block, history[at, GROUND])
                 history[at, VELOCITY] = velocity + gained
                 history[at, DISPLACEMENT] = displacement + velocity * since + moved
                 at += 1
-            gained, moved = cycle.eq4_integrals(block, wave, p, start, wave.pieces[p, FINISH])
+            gained, moved = cycle.eq4_integrals(block, wave.pieces, p, start, wave.pieces[p, FINISH])
             displacement += velocity * (wave.pieces[p, FINISH] - start) + moved
             velocity += gained
         if c == wave.lead:

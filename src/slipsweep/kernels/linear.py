@@ -43,9 +43,8 @@ def exponential_moments(z: float) -> tuple[float, float, float, float]:
 
 
 @scalar
-def held_integrals(x: float, slope: float, held: float, duration: float) -> tuple[float, float]:
-    """Gains of velocity and displacement with the block's acceleration held, from plane acceleration x on."""
-    rate = x - held
+def held_integrals(rate: float, slope: float, duration: float) -> tuple[float, float]:
+    """Gains of velocity and displacement with b held: `rate` is x − b at the beginning, `slope` its own rate."""
     return (
         (rate + 0.5 * slope * duration) * duration,
         (0.5 * rate + slope * duration / 6.0) * duration * duration,

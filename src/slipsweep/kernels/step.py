@@ -30,7 +30,6 @@ from slipsweep.kernels.block import (
     AMPLITUDE,
     EQ4_BELOW_YIELD,
     INTEGRATE,
-    KD_NOT_POSITIVE,
     LANE_ROWS,
     LITERAL,
     MONOTONE,
@@ -58,9 +57,27 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import offset_at, offset_root, phase_at, plane
-from slipsweep.kernels.train import Pulse, attenuate, beginning, train_of, yield_governs
+from slipsweep.kernels.pulse import (
+    BEGAN_AT,
+    DISPLACEMENT,
+    FOLLOWS,
+    HELD,
+    LEAST,
+    PEAK,
+    RESTED,
+    SLIDES,
+    STATE_ROWS,
+    VELOCITY,
+    Pulse,
+    arrive,
+    asks_anew,
+    begin_slide,
+    pulse_of,
+)
+from slipsweep.kernels.train import train_of, yield_governs
+from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TERM, TOP, Wave
 
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
@@ -100,10 +117,12 @@ class Steps(NamedTuple):
     counts: np.ndarray
     length: np.ndarray
     mirrored: bool
+    per_cycle: int
+    rule: int
 
 
-def steps_of(wave: Wave, steps_per_cycle: int) -> Steps:
-    """Steps of all pieces of a wave, `steps_per_cycle` at least in a cycle."""
+def steps_of(wave: Wave, steps_per_cycle: int, rule: int) -> Steps:
+    """Steps of all pieces of a wave, `steps_per_cycle` at least in a cycle, and the rule by which they are taken."""
     pieces = wave.pieces.shape[0]
     length = wave.pieces[:, FINISH] - wave.pieces[:, BEGIN]
     count = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
@@ -122,7 +141,8 @@ def steps_of(wave: Wave, steps_per_cycle: int) -> Steps:
             parts.append(_nodes(wave, p, int(count[p])))
             size += parts[-1].size
     nodes = np.concatenate(parts)
-    return Steps(wave, nodes, offset, count, length / count, _mirrored(wave, nodes, offset, count))
+    mirrored = _mirrored(wave, nodes, offset, count)
+    return Steps(wave, nodes, offset, count, length / count, mirrored, steps_per_cycle, rule)
 
 
 def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
@@ -132,7 +152,7 @@ def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
     tau = -tau[::-1] if wave.pieces[p, FINISH] == 0.0 else tau
     nodes = np.zeros(tau.size)
     for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
-        nodes = (nodes + wave.pieces[p, COEFFICIENTS + k]) * tau
+        nodes = (nodes + wave.pieces[p, COEFFICIENTS + TERM * k]) * tau
     nodes += wave.pieces[p, TOP]
     nodes[0], nodes[-1] = wave.pieces[p, FIRST], wave.pieces[p, LAST]
     side = math.copysign(1.0, wave.pieces[p, TOP])
@@ -168,14 +188,11 @@ def kind_of(wave: Wave, p: int) -> int:
     return RISES if wave.pieces[p, LAST] >= wave.pieces[p, FIRST] else FALLS
 
 
-#: A state: V, W, the block's acceleration b, the largest and the least V; whether (1.0 or 0.0) the block
-#: slides and b follows Eq. 4; the phase at which it had come to rest; the phases at which the last
-#: slide began and up to which it needs steps of its own, and how long its rate grows; the plane's acceleration
-#: where D has its maximum on the way up, and that up to which friction is a layer thinner than steps.
-(
-    VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS, RESTED, ONSET, REACH, LENGTH, TOUCH, LAYER,
-) = range(13)  # fmt: skip
-_STATE_SIZE = 13
+#: Rows of a state beside those of every solver's: the phase up to which the last slide needs steps of its own,
+#: and how long its rate grows; the plane's acceleration where D has its maximum on the way up, and that up to
+#: which friction is a layer thinner than steps.
+REACH, LENGTH, TOUCH, LAYER = range(STATE_ROWS, STATE_ROWS + 4)
+_STATE_SIZE = STATE_ROWS + 4
 
 
 @in_lanes
@@ -245,7 +262,7 @@ def take(c0: float, c1: float, c2: float, h: float, stops: bool, state: np.ndarr
 def rest(block: Block, state: np.ndarray) -> None:
     """Fill the state of a block at rest that has not moved yet."""
     state[:] = 0.0
-    state[REACH], state[TOUCH] = -math.inf, math.inf
+    state[BEGAN_AT], state[REACH], state[TOUCH] = -math.inf, -math.inf, math.inf
     if block.rise == NEWMARK:
         return
     if block.decay_rate * block.amplitude * _SHORTEST > _FOLDINGS * block.g:
@@ -260,40 +277,49 @@ def rest(block: Block, state: np.ndarray) -> None:
 
 
 @scalar
-def layer_of(block: Block, wave: Wave, p: int, state: np.ndarray) -> tuple[float, float]:
+def layer_of(block: Block, pieces: np.ndarray, p: int, state: np.ndarray) -> tuple[float, float]:
     """τ at which the layer of friction on piece p ends (or begins, where |Üg| falls), and its length."""
-    outwards = wave.pieces[p, FINISH] == 0.0
-    near = wave.pieces[p, BEGIN] if outwards else wave.pieces[p, FINISH]
-    if state[LAYER] <= block.amplitude * min(abs(wave.pieces[p, FIRST]), abs(wave.pieces[p, LAST])):
+    outwards = pieces[p, FINISH] == 0.0
+    near = pieces[p, BEGIN] if outwards else pieces[p, FINISH]
+    if state[LAYER] <= block.amplitude * min(abs(pieces[p, FIRST]), abs(pieces[p, LAST])):
         return near, 0.0
-    end = offset_at(wave, p, block.amplitude, math.copysign(state[LAYER], wave.pieces[p, TOP]))
+    end = offset_at(pieces, p, block.amplitude, math.copysign(state[LAYER], pieces[p, TOP]))
     return end, abs(end - near)
 
 
 @scalar
-def longest_step(block: Block, options: Options, wave: Wave, p: int, tau: float, x: float, state: np.ndarray) -> float:
+def longest_step(
+    block: Block, steps: Steps, pieces: np.ndarray, p: int, tau: float, x: float, state: np.ndarray
+) -> float:
     """The longest step from τ on that resolves a slide just begun and a layer of friction on the rise.
 
     It grows with the time since the slide's onset, but not before the short slides end that stop soon after
     the peak: over steps of one length the rectangle's errors on the way up and down cancel.
     """
-    share, longest = _SHARE_OF_CYCLE / options.steps_per_cycle, math.inf
-    phi = phase_at(wave, p, tau)
+    share, longest = _SHARE_OF_CYCLE / steps.per_cycle, math.inf
+    phi = phase_at(pieces, p, tau)
     if phi < state[REACH]:
-        longest = share * max(state[LENGTH], 0.25 * (phi - state[ONSET]))
+        longest = share * max(state[LENGTH], 0.25 * (phi - state[BEGAN_AT]))
     if x < state[LAYER]:
-        longest = min(longest, share * layer_of(block, wave, p, state)[1])
+        longest = min(longest, share * layer_of(block, pieces, p, state)[1])
     return max(longest, _LEAST_STEP)
 
 
 @scalar
-def begin_slide(wave: Wave, p: int, tau: float, x: float, held: float, turn: float, state: np.ndarray) -> None:
-    """The block begins to slide at τ on piece p, where Üg = x; its rate grows up to τ = `turn`."""
-    state[HELD] = min(held, x)  # equal at an onset, but for rounding
-    state[SLIDES] = 1.0
-    phi, length = phase_at(wave, p, tau), turn - tau
-    state[ONSET], state[LENGTH] = phi, length
+def resolve_slide(pieces: np.ndarray, p: int, tau: float, turn: float, state: np.ndarray) -> None:
+    """A slide begins at τ on piece p; its rate grows up to τ = `turn`."""
+    phi, length = phase_at(pieces, p, tau), turn - tau
+    state[LENGTH] = length
     state[REACH] = phi + 4.0 * _SHORTEST if length < _SHORTEST else -math.inf
+
+
+@scalar
+def resolve_fall(block: Block, pieces: np.ndarray, p: int, state: np.ndarray) -> None:
+    """Along a piece on which Üg does not rise: if a slide begins with it, it grows up to where Üg = b."""
+    if state[BEGAN_AT] == pieces[p, START]:
+        level = pieces[p, FIRST] == pieces[p, LAST]
+        turn = pieces[p, FINISH] if level else offset_at(pieces, p, block.amplitude, state[HELD])
+        resolve_slide(pieces, p, pieces[p, BEGIN], turn, state)
 
 
 @scalar
@@ -306,19 +332,19 @@ def tau_within(steps: Steps, p: int, k: int, amplitude: float, x: float) -> floa
     wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
     tau = low + (high - low) * min(max((x / amplitude - w_low) / (w_high - w_low), 0.0), 1.0)
     if w_high > w_low:
-        return offset_root((wave, p, wanted), low, high, tau, 0.0)
-    return offset_root((wave, p, wanted), high, low, tau, 0.0)
+        return offset_root((wave.pieces, p, wanted), low, high, tau, 0.0)
+    return offset_root((wave.pieces, p, wanted), high, low, tau, 0.0)
 
 
 @scalar
-def hold_step(block: Block, rule: int, wave: Wave, p: int, start: float, end: float, state: np.ndarray) -> None:
+def hold_step(block: Block, rule: int, pieces: np.ndarray, p: int, start: float, end: float, state: np.ndarray) -> None:
     """From τ = start to end on piece p with b held, cut at the stop."""
     held, h, amplitude = state[HELD], end - start, block.amplitude
     c0, c1, c2 = coefficients(
         rule,
-        plane(wave, p, amplitude, start) - held,
-        plane(wave, p, amplitude, start + 0.5 * h) - held,
-        plane(wave, p, amplitude, end) - held,
+        plane(pieces, p, amplitude, start) - held,
+        plane(pieces, p, amplitude, start + 0.5 * h) - held,
+        plane(pieces, p, amplitude, end) - held,
     )
     take(c0, c1, c2, h, True, state)
 
@@ -345,25 +371,30 @@ def hold_steps(
 
 
 @scalar
-def fall_steps(block: Block, rule: int, options: Options, steps: Steps, p: int, state: np.ndarray) -> None:
-    """Along piece p with b held, in finer steps as long as a slide just begun asks for them."""
-    wave, first, at = steps.wave, 0, steps.offset[p]
-    while first < steps.counts[p] and phase_at(wave, p, node(steps, p, first)) < state[REACH]:
-        tau, end = node(steps, p, first), node(steps, p, first + 1)
-        while tau < end and state[SLIDES] > 0.0:
-            cut = min(end, tau + longest_step(block, options, wave, p, tau, math.inf, state))
-            hold_step(block, rule, wave, p, tau, cut, state)
+def fall_steps(
+    block: Block, pieces: np.ndarray, steps: Steps, p: int, start: float, end: float, state: np.ndarray
+) -> None:
+    """From the beginning of piece p (τ = `start`) to `end` with b held, finer while a slide just begun asks for it."""
+    rule, first, at = steps.rule, 0, steps.offset[p]
+    whole = steps.counts[p] if end == pieces[p, FINISH] else int((end - start) / steps.length[p])
+    resolve_fall(block, pieces, p, state)
+    while first < whole and phase_at(pieces, p, node(steps, p, first)) < state[REACH]:
+        tau, until = node(steps, p, first), node(steps, p, first + 1)
+        while tau < until and state[SLIDES] > 0.0:
+            cut = min(until, tau + longest_step(block, steps, pieces, p, tau, math.inf, state))
+            hold_step(block, rule, pieces, p, tau, cut, state)
             tau = cut
-        if state[SLIDES] == 0.0:
-            return
         first += 1
-    hold_steps(rule, block.amplitude, steps.nodes, at + 2 * first, steps.counts[p] - first, steps.length[p], state)
+    if state[SLIDES] > 0.0:
+        hold_steps(rule, block.amplitude, steps.nodes, at + 2 * first, whole - first, steps.length[p], state)
+    if state[SLIDES] > 0.0 and whole < steps.counts[p] and end > node(steps, p, whole):
+        hold_step(block, rule, pieces, p, node(steps, p, whole), end, state)
+    if state[SLIDES] == 0.0:
+        state[RESTED] = pieces[p, END]
 
 
 @scalar
-def rise_step(
-    block: Block, rule: int, options: Options, steps: Steps, p: int, k: int, tau: float, x: float, state: np.ndarray
-) -> None:
+def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float, x: float, state: np.ndarray) -> None:
     """From τ on piece p, where Üg = x rises, to the end of step k.
 
     Cut at Üg = Üy, at t1, at switches to and from the hold, and at the stop.
@@ -371,7 +402,7 @@ def rise_step(
     wave, amplitude, literal = steps.wave, block.amplitude, block.rise == LITERAL
     begin, end, at = node(steps, p, k), node(steps, p, k + 1), steps.offset[p] + 2 * k
     x_end, located = amplitude * steps.nodes[at + 2], True
-    for _ in range(_MOST_EVENTS + options.steps_per_cycle):
+    for _ in range(_MOST_EVENTS + steps.per_cycle):
         if state[SLIDES] == 0.0:
             if x < block.yield_acceleration:
                 if x_end <= block.yield_acceleration:
@@ -393,14 +424,15 @@ def rise_step(
             state[FOLLOWS] = 1.0 if follows else 0.0
             turn = wave.pieces[p, FINISH]
             if x < state[TOUCH] < amplitude * wave.pieces[p, LAST]:
-                turn = offset_at(wave, p, amplitude, state[TOUCH])
-            begin_slide(wave, p, tau, x, held, turn, state)
+                turn = offset_at(wave.pieces, p, amplitude, state[TOUCH])
+            begin_slide(min(held, x), phase_at(wave.pieces, p, tau), state)  # equal at an onset, but for rounding
+            resolve_slide(wave.pieces, p, tau, turn, state)
         cut, x_cut, switches = end, x_end, False
         if state[REACH] > -math.inf or state[LAYER] > 0.0:
-            longest = longest_step(block, options, wave, p, tau, x, state)
+            longest = longest_step(block, steps, wave.pieces, p, tau, x, state)
             if longest < end - tau:
                 cut = tau + longest
-                x_cut = plane(wave, p, amplitude, cut)
+                x_cut = plane(wave.pieces, p, amplitude, cut)
         asked, asked_cut = 0.0, 0.0
         if block.rise != NEWMARK:
             asked, slope = response_and_slope(block, x)
@@ -425,7 +457,7 @@ def rise_step(
         if rule == SIMPSON:
             x_middle = amplitude * steps.nodes[at + 1]
             if tau != begin or cut != end:
-                x_middle = plane(wave, p, amplitude, tau + 0.5 * h)
+                x_middle = plane(wave.pieces, p, amplitude, tau + 0.5 * h)
             middle = relative_acceleration(block, x_middle) if follows else x_middle - held
         c0, c1, c2 = coefficients(
             rule,
@@ -436,7 +468,7 @@ def rise_step(
         fraction = take(c0, c1, c2, h, True, state)
         if state[SLIDES] == 0.0:
             cut = tau + fraction * h
-            x_cut = plane(wave, p, amplitude, cut)
+            x_cut = plane(wave.pieces, p, amplitude, cut)
         elif follows:
             state[HELD] = asked_cut
         if switches:
@@ -449,11 +481,11 @@ def rise_step(
 
 
 @scalar
-def rise_steps(
-    block: Block, rule: int, options: Options, steps: Steps, p: int, first: int, tau: float, x: float, state: np.ndarray
-) -> None:
-    """Along piece p, on which Üg > 0 does not fall, from τ within its step `first`, where Üg = x."""
-    nodes, at, h = steps.nodes, steps.offset[p], steps.length[p]
+def rise_steps(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, x: float, state: np.ndarray) -> None:
+    """Along piece p, on which Üg > 0 does not fall, from τ on, where Üg = x."""
+    rule, nodes, at, h = steps.rule, steps.nodes, steps.offset[p], steps.length[p]
+    share = (tau - pieces[p, BEGIN]) / (pieces[p, FINISH] - pieces[p, BEGIN])
+    first = min(max(int(share * steps.counts[p]), 0), steps.counts[p] - 1)
     newmark, asked = block.rise == NEWMARK, math.nan
     for i in range(first, steps.counts[p]):
         x_end = block.amplitude * nodes[at + 2 * i + 2]
@@ -483,110 +515,24 @@ def rise_steps(
                 continue
         if i > first:
             tau, x = node(steps, p, i), block.amplitude * nodes[at + 2 * i]
-        rise_step(block, rule, options, steps, p, i, tau, x, state)
+        rise_step(block, rule, steps, p, i, tau, x, state)
         asked = asked_end
 
 
 @scalar
-def arrive(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
-    """What the beginning of piece p, after a jump upwards or a fall, asks of the block."""
-    x = block.amplitude * wave.pieces[p, FIRST]
-    rises = kind_of(wave, p) == RISES
-    if state[SLIDES] > 0.0:
-        if block.rise == LITERAL:
-            state[HELD] = response(block, x)
-        elif block.rise == MONOTONE:
-            state[HELD] = max(state[HELD], response(block, x))
-            state[FOLLOWS] = 0.0
-    elif not rises and x >= block.yield_acceleration:
-        held = starting_acceleration(block, x)
-        if held < x:
-            state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
-            begin_slide(wave, p, wave.pieces[p, BEGIN], x, held, offset_at(wave, p, block.amplitude, held), state)
+def note_nothing(steps: Steps, start: float, end: float, state: np.ndarray) -> None:
+    """Steps are not sampled later."""
 
 
-@scalar
-def asks_anew(wave: Wave, p: int) -> bool:
-    """Whether piece p, of Üg > 0, begins by a jump upwards or rises after a fall."""
-    if wave.pieces[p, JUMPS] > 0.0:
-        return True
-    return kind_of(wave, p) == RISES and p > 0 and kind_of(wave, p - 1) == FALLS and wave.pieces[p, FIRST] > 0.0
-
-
-@scalar
-def through_stretch(
-    block: Block, rule: int, options: Options, steps: Steps, k: int, p: int, tau: float, state: np.ndarray
-) -> int:
-    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of stretch k; flags, if there is no value."""
-    wave = steps.wave
-    for q in range(p, wave.stretch[k, 1]):
-        x = block.amplitude * wave.pieces[q, FIRST]
-        first = 0
-        if q > p or x >= block.yield_acceleration:
-            tau = wave.pieces[q, BEGIN]
-            if asks_anew(wave, q):
-                arrive(block, wave, q, state)
-        else:
-            x = block.yield_acceleration
-            share = (tau - wave.pieces[q, BEGIN]) / (wave.pieces[q, FINISH] - wave.pieces[q, BEGIN])
-            first = min(max(int(share * steps.counts[q]), 0), steps.counts[q] - 1)
-        if kind_of(wave, q) == RISES:
-            rise_steps(block, rule, options, steps, q, first, tau, x, state)
-        elif state[SLIDES] > 0.0:
-            if state[HELD] <= 0.0:
-                return KD_NOT_POSITIVE
-            fall_steps(block, rule, options, steps, q, state)
-    return KD_NOT_POSITIVE if state[SLIDES] > 0.0 and state[HELD] <= 0.0 else 0
-
-
-@scalar
-def recouple(block: Block, rule: int, steps: Steps, q: int, p: int, tau: float, state: np.ndarray) -> None:
-    """From the beginning of piece q (t5) to τ on piece p, integrating on."""
-    wave = steps.wave
-    state[RESTED] = math.inf
-    for piece in range(q, min(p + 1, wave.pieces.shape[0])):
-        h, whole = steps.length[piece], steps.counts[piece]
-        if piece == p:
-            whole = int((tau - wave.pieces[piece, BEGIN]) / h)
-        hold_steps(rule, block.amplitude, steps.nodes, steps.offset[piece], whole, h, state)
-        if piece == p and state[SLIDES] > 0.0 and tau > node(steps, piece, whole):
-            hold_step(block, rule, wave, piece, node(steps, piece, whole), tau, state)
-        if state[SLIDES] == 0.0:
-            state[RESTED] = wave.pieces[piece, END]
-            return
+pulse_by_steps = pulse_of(rise_steps, fall_steps, note_nothing)
 
 
 @scalar
 def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
-    """One pulse, step by step, from Üg = Üy in stretch k to that in the `following` one (see `train.Pulse`)."""
-    rule, state = options.rule, np.empty((_STATE_SIZE, 1))[:, 0]
+    """A pulse of a train (see `train`)."""
+    state = np.empty((_STATE_SIZE, 1))[:, 0]  # spaced as a column of the lanes' states: functions serve both
     rest(block, state)
-    p, tau = beginning(block, wave, k)
-    if velocity > 0.0:
-        state[VELOCITY] = state[PEAK] = state[LEAST] = velocity
-        state[HELD] = starting_acceleration(
-            block, max(block.amplitude * wave.pieces[p, FIRST], block.yield_acceleration)
-        )
-        state[SLIDES], state[FOLLOWS] = 1.0, 1.0 if block.rise == LITERAL else 0.0
-    validity = through_stretch(block, rule, options, steps, k, p, tau, state)
-    if validity:
-        return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, validity)
-    if state[SLIDES] > 0.0:
-        q, last = wave.stretch[k, 1], following >= wave.height.size
-        p, tau = wave.pieces.shape[0], 0.0
-        if not last:
-            p, tau = beginning(block, wave, following)
-        started = wave.pieces[q, START] if q < wave.pieces.shape[0] else wave.pieces[q - 1, END]
-        if options.recoupling == INTEGRATE:
-            recouple(block, rule, steps, q, p, tau, state)
-        else:
-            state[RESTED] = started  # Eq. 12 goes on beyond the shaking just the same
-        if state[SLIDES] > 0.0 and (last or options.recoupling != INTEGRATE):
-            duration = math.inf if last else phase_at(wave, p, tau) - started
-            state[VELOCITY], slid = attenuate(state[HELD], state[VELOCITY], duration)
-            state[DISPLACEMENT] += slid
-    least = min(state[LEAST], state[VELOCITY])
-    return Pulse(state[VELOCITY], state[DISPLACEMENT], state[PEAK], least, state[RESTED], 0)
+    return pulse_by_steps(block, options, wave, steps, k, following, velocity, state)
 
 
 train = train_of(pulse)
@@ -594,42 +540,47 @@ train = train_of(pulse)
 
 @scalar
 def continuous_step(
-    block: Block, rule: int, options: Options, wave: Wave, p: int, start: float, end: float, state: np.ndarray
+    block: Block, rule: int, steps: Steps, pieces: np.ndarray, p: int, start: float, end: float, state: np.ndarray
 ) -> None:
     """From τ = start to end on piece p with Eq. 4 throughout, finer in a layer of friction."""
-    layer, length = layer_of(block, wave, p, state)
+    layer, length = layer_of(block, pieces, p, state)
     edge = min(max(layer, start), end)
-    outwards = wave.pieces[p, FINISH] == 0.0
-    finest = max(_SHARE_OF_CYCLE / options.steps_per_cycle * length, _LEAST_STEP)
+    outwards = pieces[p, FINISH] == 0.0
+    finest = max(_SHARE_OF_CYCLE / steps.per_cycle * length, _LEAST_STEP)
     for first, last, within in ((start, edge, outwards), (edge, end, not outwards)):
         parts = 1 if last > first else 0
         if parts and within and length > 0.0:
             # rounding may not make the two sides of a zero differ
-            parts = max(1, math.ceil(min((last - first) / finest, float(options.steps_per_cycle)) - 1e-6))
+            parts = max(1, math.ceil(min((last - first) / finest, float(steps.per_cycle)) - 1e-6))
         h = (last - first) / max(parts, 1)
         for part in range(parts):
             tau = first + part * h
-            x, x_middle = plane(wave, p, block.amplitude, tau), plane(wave, p, block.amplitude, tau + 0.5 * h)
-            x_end = plane(wave, p, block.amplitude, tau + h)
+            x, x_middle = (
+                plane(pieces, p, block.amplitude, tau),
+                plane(pieces, p, block.amplitude, tau + 0.5 * h),
+            )
+            x_end = plane(pieces, p, block.amplitude, tau + h)
             c0, c1, c2 = coefficients(
                 rule,
-                sided_relative_acceleration(block, wave, p, x),
-                sided_relative_acceleration(block, wave, p, x_middle),
-                sided_relative_acceleration(block, wave, p, x_end),
+                sided_relative_acceleration(block, pieces, p, x),
+                sided_relative_acceleration(block, pieces, p, x_middle),
+                sided_relative_acceleration(block, pieces, p, x_end),
             )
             take(c0, c1, c2, h, False, state)
 
 
 @scalar
-def sided_relative_acceleration(block: Block, wave: Wave, p: int, x: float) -> float:
+def sided_relative_acceleration(block: Block, pieces: np.ndarray, p: int, x: float) -> float:
     """D at Üg = x on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
-    return relative_acceleration(block, math.copysign(x, wave.pieces[p, TOP]))
+    return relative_acceleration(block, math.copysign(x, pieces[p, TOP]))
 
 
 #: The first rows of the lanes' states, and the rows of the lanes beside the block's: D (or E) at the last node,
 #: whether something happens in the step, whether the cell goes on without the lanes, |w| up to which
 #: friction is a layer thinner than steps, W, V, b and the largest V before the cycle.  Row + j is cell j.
-_VELOCITY, _DISPLACEMENT, _HELD, _PEAK, _LEAST, _SLIDES, _FOLLOWS = range(0, 7 * TILE, TILE)
+_VELOCITY, _DISPLACEMENT, _HELD, _PEAK, _LEAST, _SLIDES, _FOLLOWS = (
+    row * TILE for row in (VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS)
+)
 _ASKED, _HAPPENS, _ALONE, _THIN, _BEFORE, _BEFORE_V, _BEFORE_HELD, _BEFORE_PEAK, _GAIN = range(
     LANE_ROWS * TILE, (LANE_ROWS + 9) * TILE, TILE
 )
@@ -700,7 +651,7 @@ def lockstep_rise(
             for j in range(count):
                 if lanes[_HAPPENS + j] > 0.0:
                     block, state = block_at(cells, where[j], options), columns[:, j]
-                    rise_step(block, rule, options, steps, p, i, node(steps, p, i), block.amplitude * w_start, state)
+                    rise_step(block, rule, steps, p, i, node(steps, p, i), block.amplitude * w_start, state)
                     if state[REACH] > -math.inf:
                         set_aside(lanes, states, j)
 
@@ -750,9 +701,19 @@ def until_next(block: Block, wave: Wave, p: int) -> float:
         if block.amplitude * max(wave.pieces[q, FIRST], wave.pieces[q, LAST]) > block.yield_acceleration:
             if block.amplitude * wave.pieces[q, FIRST] >= block.yield_acceleration:
                 return waited
-            return waited + (offset_at(wave, q, block.amplitude, block.yield_acceleration) - wave.pieces[q, BEGIN])
+            return waited + (
+                offset_at(wave.pieces, q, block.amplitude, block.yield_acceleration) - wave.pieces[q, BEGIN]
+            )
         waited += wave.pieces[q, FINISH] - wave.pieces[q, BEGIN]
     return math.inf
+
+
+@scalar
+def arrive_in_lane(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
+    """What the beginning of piece p, after a jump upwards or a fall, asks of a lane; its rise begins a slide itself."""
+    if state[SLIDES] > 0.0 or wave.pieces[p, FIRST] > wave.pieces[p, LAST]:
+        arrive(block, wave.pieces, p, block.amplitude * wave.pieces[p, FIRST], state)
+        resolve_fall(block, wave.pieces, p, state)
 
 
 @scalar
@@ -768,10 +729,11 @@ def stick_slip_cycle(
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
         kind = kind_of(wave, p)
         before = BELOW if p == 0 else kind_of(wave, p - 1)
-        if kind != BELOW and asks_anew(wave, p):
+        rises_on = kind == RISES and before == RISES and wave.pieces[p, JUMPS] == 0.0
+        if kind != BELOW and not rises_on and asks_anew(wave.pieces, p):
             for j in range(count):
                 if lanes[_ALONE + j] == 0.0:
-                    arrive(block_at(cells, where[j], options), wave, p, columns[:, j])
+                    arrive_in_lane(block_at(cells, where[j], options), wave, p, columns[:, j])
                     if columns[REACH, j] > -math.inf:
                         set_aside(lanes, states, j)
         if options.rise == LITERAL and kind != RISES and before != kind:
@@ -793,10 +755,9 @@ def stick_slip_cycle(
                     wait = math.inf
                     if velocity > held * pause:  # else it stops before Üg > 0
                         wait = until_next(block_at(cells, where[j], options), wave, p)
-                    left, slid = attenuate(held, velocity, wait)
-                    states[_DISPLACEMENT + j] += slid
+                    states[_DISPLACEMENT + j] += eq.attenuated_displacement(velocity, held, wait)
                     states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
-                    if left > 0.0:
+                    if eq.attenuated_velocity(velocity, held, wait) > 0.0:
                         set_aside(lanes, states, j)
         if kind == BELOW and p + 1 < pieces and wave.pieces[p + 1, TOP] > 0.0:
             for j in range(count):
@@ -846,7 +807,7 @@ def stick_slip_lanes(
         else:
             moved = states[_DISPLACEMENT + j]
             if states[_SLIDES + j] > 0.0:
-                moved += attenuate(states[_HELD + j], states[_VELOCITY + j], math.inf)[1]
+                moved += eq.attenuated_displacement(states[_VELOCITY + j], states[_HELD + j], math.inf)
             slides = block.amplitude * highest > block.yield_acceleration
             validity = EQ4_BELOW_YIELD if slides and yield_governs(block, wave) else 0
             found = Motion(moved, states[_PEAK + j], validity)
@@ -903,9 +864,9 @@ def continuous_cycle(
                         block, state = block_at(cells, where[j], options), columns[:, j]
                         start = node(steps, p, i)
                         if state[SLIDES] == 0.0 and block.amplitude * w_start < block.yield_acceleration:
-                            start = offset_at(wave, p, block.amplitude, block.yield_acceleration)
+                            start = offset_at(wave.pieces, p, block.amplitude, block.yield_acceleration)
                         state[SLIDES] = 1.0
-                        continuous_step(block, rule, options, wave, p, start, node(steps, p, i + 1), state)
+                        continuous_step(block, rule, steps, wave.pieces, p, start, node(steps, p, i + 1), state)
 
 
 @scalar

@@ -8,7 +8,7 @@ what follows from that map over many cycles stands here.
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
@@ -21,49 +21,8 @@ from slipsweep.kernels.block import (
     Options,
     stays_below_yield,
 )
-from slipsweep.kernels.excitation import offset_at
-from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import BEGIN, END, FIRST, LAST, Wave
-
-
-class Pulse(NamedTuple):
-    """From one Üg = Üy to the next: V carried on, W gained, the largest and the least V.
-
-    `rested` is the phase at which the block came to rest, infinite where only the end of the shaking
-    brought it to rest; `validity` says if there is no value.
-    """
-
-    velocity: float
-    displacement: float
-    peak: float
-    least: float
-    rested: float
-    validity: int
-
-
-@scalar
-def attenuate(b: float, velocity: float, duration: float) -> tuple[float, float]:
-    """Eq. 12 from t5 on, for `duration` of phase at most: V left and W."""
-    return eq.attenuated_velocity(velocity, b, duration), eq.attenuated_displacement(velocity, b, duration)
-
-
-@scalar
-def first_pulse(block: Block, wave: Wave, k: int) -> int:
-    """The first stretch from k on in which the plane's acceleration exceeds Üy; past the last, if there is none."""
-    while k < wave.height.size and block.amplitude * wave.height[k] <= block.yield_acceleration:
-        k += 1
-    return k
-
-
-@scalar
-def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
-    """Where in stretch k the plane's acceleration comes to Üy or jumps past it: a piece, and τ on it."""
-    p = wave.stretch[k, 0]
-    while block.amplitude * max(wave.pieces[p, FIRST], wave.pieces[p, LAST]) <= block.yield_acceleration:
-        p += 1
-    if block.amplitude * wave.pieces[p, FIRST] >= block.yield_acceleration:
-        return p, wave.pieces[p, BEGIN]
-    return p, offset_at(wave, p, block.amplitude, block.yield_acceleration)
+from slipsweep.kernels.pulse import Pulse, first_pulse
+from slipsweep.motion.pieces import END, Wave
 
 
 @scalar
@@ -100,7 +59,7 @@ def train_of(
             displacement += now.displacement
             peak, least = max(peak, now.peak), min(least, now.least)
             validity |= now.validity
-            if velocity > 0.0:
+            if velocity > 0.0 and now.validity == 0:
                 validity |= NOT_RECOUPLED
             if math.isnan(now.displacement + now.peak) and validity & NO_VALUE == 0:
                 validity |= UNSOLVED

@@ -1,4 +1,4 @@
-"""A waveform cut into the pieces that the solvers go through.
+"""A waveform, or a record, cut into the pieces that the solvers go through.
 
 `wave_of` gives a `pieces.Wave`: the shaking cut where w jumps,
 bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece (and further
@@ -18,6 +18,7 @@ carried over is all that one pulse leaves to the next (`kernels.train`).
 import functools
 import itertools
 import math
+import weakref
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,12 +26,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.pieces import ARC, BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, TERMS, TOP, Wave
+from slipsweep.motion.pieces import JUMPS, Wave, pieces_of, stretches_of
+from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
-#: Longest piece of a smooth wave, in radians of its fastest harmonic: the first term of its Taylor series
-#: beyond `pieces.TERMS` is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
+#: Longest piece of a smooth wave, in radians of its fastest harmonic, and terms of its Taylor series about
+#: the anchor: the first one beyond is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
 _LONGEST = 0.5 * math.pi
+TERMS = 22
 
 #: Points of a cycle closer than this, as parts of it, are one.
 _SAME = 1e-12
@@ -284,51 +287,32 @@ def wave_of(waveform: Waveform) -> Wave:
     offset = np.repeat(2.0 * math.pi * np.arange(len(rows)), [len(row) for row in rows])
     first = np.array([piece.first for piece in pieces])
     last = np.array([piece.last for piece in pieces])
-    at_end = np.array([piece.at_end for piece in pieces])
-    length = 2.0 * math.pi * np.array([piece.end - piece.start for piece in pieces])
-    coefficients = np.array([piece.coefficients for piece in pieces])
-    power = np.arange(1, TERMS + 1)
     before = np.concatenate([[0.0], last[:-1]])
     first = np.where(np.abs(first - before) < _ROUNDING, before, first)  # two cycles' roundings are no jump
-    jumps = first > np.maximum(before, 0.0)
-    stretch = _stretches(first, last)
-    top = np.maximum(first, last)
-    named = {
-        START: offset + 2.0 * math.pi * np.array([piece.start for piece in pieces]),
-        END: offset + 2.0 * math.pi * np.array([piece.end for piece in pieces]),
-        BEGIN: np.where(at_end, -length, 0.0),
-        FINISH: np.where(at_end, 0.0, length),
-        FIRST: first,
-        LAST: last,
-        TOP: np.where(at_end, last, first),
-        DEGREE: np.where(coefficients != 0.0, power, 0).max(axis=1),
-        JUMPS: jumps,
-        ARC: np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
-    }
-    series = [coefficients, coefficients / (power + 1), coefficients / ((power + 1) * (power + 2))]
+    table = pieces_of(
+        start=offset + 2.0 * math.pi * np.array([piece.start for piece in pieces]),
+        end=offset + 2.0 * math.pi * np.array([piece.end for piece in pieces]),
+        length=2.0 * math.pi * np.array([piece.end - piece.start for piece in pieces]),
+        first=first,
+        last=last,
+        at_end=np.array([piece.at_end for piece in pieces]),
+        coefficients=np.array([piece.coefficients for piece in pieces]),
+        arc=np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
+    )
+    stretch, height = stretches_of(table)
     return Wave(
-        pieces=np.ascontiguousarray(np.column_stack([*(named[column] for column in range(len(named))), *series])),
+        pieces=table,
         cycle=np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64),
         shape=np.array(shape, np.int64),
         stretch=stretch,
-        height=np.array([top[a:b].max() for a, b in stretch]),
-        rises=_rises(first, last, jumps),
+        height=height,
+        rises=_rises(first, last, table[:, JUMPS] > 0.0),
+        highest=float(max(first.max(), last.max())),
+        lowest=float(min(first.min(), last.min())),
         lead=lead,
         repeats=repeats,
         alike=repeats > 0 and tail == 1 and not wraps and not ramped[-1],
     )
-
-
-def _stretches(first: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Runs of pieces above zero; one that touches zero ends there."""
-    above = first + last > 0.0
-    starts, ends = [], []
-    for p in range(first.size):
-        if above[p] and (p == 0 or not above[p - 1] or last[p - 1] == first[p] == 0.0):
-            starts.append(p)
-        if above[p] and (p + 1 == first.size or not above[p + 1] or last[p] == first[p + 1] == 0.0):
-            ends.append(p + 1)
-    return np.array([starts, ends], np.int64).T.reshape(-1, 2).copy()
 
 
 def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -342,3 +326,60 @@ def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray
         else:
             joined.append([low, high])
     return np.array(joined, np.float64).reshape(-1, 2)
+
+
+# ------------------------------------------------------------------------------- a record
+
+
+#: Tables of the last records, by identity and polarity: of 10⁵ samples one takes as long as ten cells.
+_TABLES: dict[tuple[int, float], tuple[weakref.ref[Record], Wave]] = {}
+_MOST_TABLES = 4
+
+
+def wave_of_record(record: Record, polarity: float) -> Wave:
+    """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
+    key = (id(record), polarity)
+    known = _TABLES.get(key)
+    if known is None or known[0]() is not record:
+        while len(_TABLES) >= _MOST_TABLES:
+            _TABLES.pop(next(iter(_TABLES)), None)
+        known = _TABLES[key] = (weakref.ref(record), _record_cut(record, polarity))
+    return known[1]
+
+
+def _record_cut(record: Record, polarity: float) -> Wave:
+    times, values = record.times, polarity * record.acceleration
+    interval, change = np.diff(times), np.diff(values)
+    slope = change / interval
+    # a line through zero is two pieces
+    crosses = values[:-1] * np.sign(values[1:]) < 0.0
+    own = np.repeat(np.arange(interval.size), 1 + crosses)
+    after = np.concatenate([[False], own[1:] == own[:-1]])
+    before = crosses[own] & ~after
+    first, last = np.where(after, 0.0, values[own]), np.where(before, 0.0, values[own + 1])
+    length = interval[own]
+    length[before | after] *= np.abs((last - first)[before | after] / change[own][before | after])
+    pieces = pieces_of(
+        start=np.where(after, times[own + 1] - length, times[own]),
+        end=np.where(before, times[own] + length, times[own + 1]),
+        length=length,
+        first=first,
+        last=last,
+        at_end=np.abs(last) > np.abs(first),
+        coefficients=np.where(first == last, 0.0, slope[own])[:, np.newaxis],
+        arc=np.zeros(own.size),
+    )
+    stretch, height = stretches_of(pieces)
+    return Wave(
+        pieces=pieces,
+        cycle=np.array([0, own.size], np.int64),
+        shape=np.zeros(1, np.int64),
+        stretch=stretch,
+        height=height,
+        rises=np.empty((0, 2)),  # each pulse has its own
+        highest=float(values.max()),
+        lowest=float(values.min()),
+        lead=0,
+        repeats=0,
+        alike=False,
+    )

@@ -1,22 +1,23 @@
-"""The table of pieces that a motion of the plane ends as: what its columns are.
+"""The table of pieces that every motion of the plane ends as: what its columns are, and how it is put together.
 
-`slipsweep.motion.waveforms` fills it, `slipsweep.kernels.excitation` evaluates it.
+`slipsweep.motion.waveforms` and `slipsweep.motion.records` cut a motion into pieces, `slipsweep.kernels.excitation`
+evaluates them.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-
-#: Terms of the Taylor series of a piece about its anchor.
-TERMS = 22
+from numpy.typing import NDArray
 
 #: Columns of a table of pieces: the phases at which a piece begins and ends, the same counted from its
 #: anchor (one of the two is 0), w at its beginning, its end and its anchor, the degree of its polynomial
 #: (0 on a plateau, 1 on a straight line), 1 where w jumps up at its beginning, and 1 where it is a quarter
 #: of a sine about its peak, whose closed forms are shorter than its series.
 START, END, BEGIN, FINISH, FIRST, LAST, TOP, DEGREE, JUMPS, ARC = range(10)
-#: c₁, c₂, …; and those of the sum's first and second integral from the anchor, τ² and τ³ on.
-COEFFICIENTS, ONCE, TWICE = range(10, 10 + 3 * TERMS, TERMS)
+#: c₁, and the first ones of the sum's first and second integral from the anchor, τ² and τ³; those of the
+#: next power follow `TERM` columns on, as many as the longest series in a table has terms.
+COEFFICIENTS, ONCE, TWICE = 10, 11, 12
+TERM = 3
 
 
 class Wave(NamedTuple):
@@ -29,8 +30,8 @@ class Wave(NamedTuple):
     Attributes
     ----------
     pieces : ndarray, shape (pieces, columns)
-        Columns `START` to `ARC` and, each `TERMS` wide, `COEFFICIENTS`, `ONCE` and `TWICE`: one array,
-        because a function that is handed many spends its time, and its compilation, on handing them on.
+        Columns `START` to `ARC` and the coefficients: one array, because a function that is handed many spends
+        its time, and its compilation, on handing them on.
     cycle : ndarray of int, shape (cycles in the table + 1,)
         First piece of every cycle.
     shape : ndarray of int, shape (cycles in the table,)
@@ -41,6 +42,8 @@ class Wave(NamedTuple):
         Largest w of each.
     rises : ndarray, shape (ranges, 2)
         Ranges of w > 0 that are passed through, or jumped to, without falling; they do not overlap.
+    highest, lowest : float
+        Largest and least w.
     lead, repeats : int
         See above.
     alike : bool
@@ -53,6 +56,55 @@ class Wave(NamedTuple):
     stretch: np.ndarray
     height: np.ndarray
     rises: np.ndarray
+    highest: float
+    lowest: float
     lead: int
     repeats: int
     alike: bool
+
+
+def pieces_of(
+    start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
+    at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any],
+) -> np.ndarray:  # fmt: skip
+    """The table of pieces, from the columns of these names.
+
+    `length` is that of a piece, which the difference of its ends would round; `at_end` is whether |w| is larger
+    at its end, its anchor then, and row i of `coefficients` are c₁, c₂, … of piece i from there.
+    """
+    degree = np.where(coefficients != 0.0, np.arange(1, coefficients.shape[1] + 1), 0).max(axis=1)
+    coefficients = coefficients[:, : max(int(degree.max()), 1)]
+    before = np.concatenate([[0.0], last[:-1]])
+    power = np.arange(1, coefficients.shape[1] + 1)
+    named = {
+        START: start,
+        END: end,
+        BEGIN: np.where(at_end, -length, 0.0),
+        FINISH: np.where(at_end, 0.0, length),
+        FIRST: first,
+        LAST: last,
+        TOP: np.where(at_end, last, first),
+        DEGREE: degree,
+        JUMPS: first > np.maximum(before, 0.0),
+        ARC: arc,
+    }
+    pieces = np.empty((first.size, len(named) + TERM * power.size))
+    for column, values in named.items():
+        pieces[:, column] = values
+    pieces[:, COEFFICIENTS::TERM] = coefficients
+    pieces[:, ONCE::TERM] = coefficients / (power + 1)
+    pieces[:, TWICE::TERM] = coefficients / ((power + 1) * (power + 2))
+    return pieces
+
+
+def stretches_of(pieces: np.ndarray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Runs of pieces above zero, the first and the first after each, and their heights; one that touches zero ends."""
+    first, last = pieces[:, FIRST], pieces[:, LAST]
+    above = np.concatenate([[False], first + last > 0.0, [False]])
+    touches = np.concatenate([[False], (last[:-1] == 0.0) & (first[1:] == 0.0), [False]])
+    starts = np.flatnonzero(above[1:-1] & (~above[:-2] | touches[:-1]))
+    ends = np.flatnonzero(above[1:-1] & (~above[2:] | touches[1:])) + 1
+    stretch = np.column_stack([starts, ends]).astype(np.int64)
+    top = np.concatenate([np.maximum(first, last), [0.0]])
+    height = np.maximum.reduceat(top, stretch.ravel())[::2].copy() if stretch.size else np.empty(0)
+    return stretch, height
