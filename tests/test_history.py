@@ -8,27 +8,29 @@ import pytest
 from processes import slipsweep as command
 
 import slipsweep
+from slipsweep import Cosine, Harmonics, Sine
 from slipsweep.errors import InputError
 
-#: Newmark blocks that are left with a velocity when the shaking ends.
-SHAKEN: list[dict[str, Any]] = [
-    {"waveform": "cosine"},
-    {"ramp_out": 0.7, "cycles": 3},
-    {"waveform": "harmonics", "harmonics": {"amplitudes": [1, 0.5], "multiples": [1, 2], "phases": [0, 90]}},
-]
+#: Shaking that leaves Newmark's block with a velocity.
+SHAKEN: dict[str, Any] = {
+    "cosine": Cosine(),
+    "ramp": Sine(cycles=3, ramp_out=0.7),
+    "harmonics": Harmonics([1, 0.5], [1, 2], phases=[0, 90]),
+}
 
 
-def history(yield_acceleration: float, points: int = 16, frequency: float = 1.5, **options: Any) -> Any:
+def history(yield_acceleration: float, excitation: Any) -> Any:
     return slipsweep.simulate(
-        0, 0.4, 3, frequency, model="newmark", yield_acceleration=yield_acceleration, points_per_cycle=points, **options
-    )
+        0, 0.4, 3, 1.5, model="newmark", excitation=excitation, yield_acceleration=yield_acceleration,
+        points_per_cycle=16,
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize("options", SHAKEN, ids=lambda options: options.get("waveform", "ramp"))
+@pytest.mark.parametrize("shaken", SHAKEN)
 @pytest.mark.parametrize("yield_acceleration", [0.3, 1e-2, 1e-4, 1e-7, 1e-12, 1e-30])
-def test_a_long_slide_has_a_bounded_number_of_points(options: dict[str, Any], yield_acceleration: float) -> None:
-    whole = history(yield_acceleration, **options)
-    cycles = options.get("cycles", 10)
+def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_acceleration: float) -> None:
+    whole = history(yield_acceleration, SHAKEN[shaken])
+    cycles = SHAKEN[shaken].cycles
     time = whole.time.values
     assert time.size <= 16 * (cycles + 100) + 2
     assert (np.diff(time) > 0).all()
@@ -49,7 +51,7 @@ def test_a_long_slide_has_a_bounded_number_of_points(options: dict[str, Any], yi
 
 
 def test_all_points_within_a_hundred_cycles_are_those_of_the_shaking() -> None:
-    whole = history(0.02, waveform="cosine")
+    whole = history(0.02, Cosine())
     assert 10 * 16 < whole.time.size < 110 * 16
     np.testing.assert_allclose(np.diff(whole.time.values), 1 / 16 / 1.5, rtol=1e-9)
 
@@ -57,13 +59,13 @@ def test_all_points_within_a_hundred_cycles_are_those_of_the_shaking() -> None:
 def test_slides_beyond_double_precision_are_refused() -> None:
     for least in (1e-308, 1e-320):
         try:
-            whole = history(least, waveform="cosine")
+            whole = history(least, Cosine())
         except InputError:
             continue
         assert math.isfinite(whole.time.values[-1])
         assert whole.relative_velocity.values[-1] == 0.0
     with pytest.raises(InputError):
-        history(5e-324, waveform="cosine")
+        history(5e-324, Cosine())
 
 
 def test_on_the_command_line(tmp_path: Any) -> None:

@@ -185,7 +185,10 @@ def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str,
     ):
         write_head(file, spec, table, spec.labels, history_of(command))
         for name, array in table.data_vars.items():
-            file[name][...] = rounded(name, array.values, spec.dtype(name))
+            try:
+                file[name][...] = rounded(name, array.values, spec.dtype(name))
+            except TooLarge as large:
+                raise InputError(f"{spec.source}: {large}") from None
 
 
 def without_time_axis(table: Table) -> Table:
