@@ -12,6 +12,7 @@ from typing import Any
 
 import filelock
 import numba
+import numba.core.event as events
 import numba.core.registry
 import numpy as np
 import pytest
@@ -96,9 +97,9 @@ def test_eight_processes_compile_once(tmp_path: Path) -> None:
     assert finish(start(PROGRAM, tmp_path / "cache")).split() == [results[0], "False"]
 
 
-def test_eight_sweeps_at_once_on_an_empty_cache(tmp_path: Path) -> None:
+def test_sweeps_at_once_on_an_empty_cache(tmp_path: Path) -> None:
     """The one that compiles computes the bits of those that load."""
-    outputs = {finish(process) for process in [start(SWEEP, tmp_path / "cache") for _ in range(8)]}
+    outputs = {finish(process) for process in [start(SWEEP, tmp_path / "cache") for _ in range(3)]}
     assert len(outputs) == 1
     kernels = files(tmp_path / "cache")
     assert len(kernels) == 1
@@ -121,10 +122,19 @@ def test_a_process_that_dies_while_it_compiles_holds_up_nobody(tmp_path: Path) -
 # ----------------------------------------------------------------- caches that are no good
 
 
+def compilations(value: float) -> tuple[float, bool]:
+    """What a new kernel gives, and whether numba had to compile it."""
+    with events.install_recorder("numba:compile") as recorder:
+        result = compiled.Kernel(double)(value)
+    return result, any(event.is_start for _, event in recorder.buffer)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 @pytest.mark.parametrize("damage", ["empty", "cut", "altered", "other", "unreadable", "folder"])
-def test_a_damaged_file_is_compiled_anew(tmp_path: Path, damage: str) -> None:
-    result, _ = finish(start(PROGRAM, tmp_path)).split()
-    (path,) = files(tmp_path)
+def test_a_damaged_file_is_compiled_anew(cache: Path, damage: str) -> None:
+    assert compilations(2.0) == (4.0, True)
+    assert compilations(2.0) == (4.0, False)
+    (path,) = files(cache)
     content = path.read_bytes()
     if damage == "empty":
         path.write_bytes(b"")
@@ -142,9 +152,9 @@ def test_a_damaged_file_is_compiled_anew(tmp_path: Path, damage: str) -> None:
     else:
         path.unlink()
         path.mkdir()
-    assert finish(start(PROGRAM, tmp_path)).split() == [result, "True"]
+    assert compilations(2.0) == (4.0, True)
     if damage != "folder":
-        assert finish(start(PROGRAM, tmp_path)).split() == [result, "False"]
+        assert compilations(2.0) == (4.0, False)
 
 
 def test_no_folder_to_write_in(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """Kernels compiled by numba's inner parts, or the plain way where one is missing."""
 
+import math
 import os
 import subprocess
 import sys
@@ -151,22 +152,35 @@ def test_what_is_not_there_is_said(wanted: dict[str, str | None], message: str) 
         need(Owner, **wanted)
 
 
-#: The smallest of the package's kernels; says a result and how it was compiled.
-PARAMETERS = """
+#: A small kernel; says what it gives, how it was compiled and how often.
+KERNEL = """
 import warnings
 warnings.simplefilter("error")
-import slipsweep
+import numba.core.event as events
+import numpy as np
 from slipsweep.jit import form
-print(slipsweep.friction_parameters(5.0, 0.4, 6.0).delta_mu.item(), form.part.__module__)
+from slipsweep.jit.cache import Kernel
+from slipsweep.jit.elementary import exp
+
+def kernel(values):
+    return exp(values[0])
+
+with events.install_recorder("numba:compile") as recorder:
+    found = Kernel(kernel)(np.array([1.0]))
+print(found, form.part.__module__, len(recorder.buffer))
 """
 
 
 def test_the_plain_way_when_asked_for(tmp_path: Path) -> None:
-    """Without a word; and what is kept of one way is not taken for the other's."""
-    inner, way = run(PARAMETERS, tmp_path, SLIPSWEEP_PLAIN_NUMBA="0").split()
-    assert way == "slipsweep.jit.inner.parts"
-    for _ in range(2):  # compiled, and loaded
-        plain, way = run(PARAMETERS, tmp_path, SLIPSWEEP_PLAIN_NUMBA="1").split()
-        assert way == "slipsweep.jit.plain"
-        assert float(plain) == pytest.approx(float(inner), rel=1e-14)
-    assert list(tmp_path.glob("*/plain/**/*.nbi"))
+    """Without a word; compiled once, and what is kept of one way is not taken for the other's."""
+    path = tmp_path / "program.py"  # of a file: else numba would not keep it
+    path.write_text(KERNEL)
+
+    def outcome(plain: str) -> list[str]:
+        return run(f"import runpy; runpy.run_path({str(path)!r})", tmp_path, SLIPSWEEP_PLAIN_NUMBA=plain).split()
+
+    for plain, module in ("0", "slipsweep.jit.inner.parts"), ("1", "slipsweep.jit.plain"):
+        first, second = outcome(plain), outcome(plain)
+        assert first[1] == second[1] == module
+        assert first[2] != "0" == second[2]
+        assert float(first[0]) == float(second[0]) == pytest.approx(math.e, rel=1e-15)
