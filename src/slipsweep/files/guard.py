@@ -116,25 +116,16 @@ def _limit_memory() -> None:
 def _forked(read: Trial, path: Path) -> tuple[int, str]:
     """Read in a copy of this process."""
     reading, writing = os.pipe()
-    with warnings.catch_warnings():
-        # of other threads, which the copy lacks: it takes nothing of theirs
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if child == 0:
-        status = 1
-        try:
-            faulthandler.disable()
-            for number in (*_TIME_OVER, signal.SIGTERM, signal.SIGINT):
-                signal.signal(number, signal.SIG_DFL)
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            for stream in (1, 2):  # what the C library says of a broken heap
-                os.dup2(nowhere, stream)
-            status = _run(read, path, lambda text: os.write(writing, text.encode(errors="replace")[:4000]))
-        finally:
-            os._exit(status)
-    os.close(writing)
+    child = 0
+    # a signal that came while Python forks would be lost
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         with os.fdopen(reading, "rb") as answer:
+            try:
+                child = _fork(read, path, writing)
+            finally:
+                os.close(writing)
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
             message = answer.read().decode(errors="replace")
         _, status = os.waitpid(child, 0)
         child = 0
@@ -143,6 +134,30 @@ def _forked(read: Trial, path: Path) -> tuple[int, str]:
         if child:  # interrupted
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
+
+
+def _fork(read: Trial, path: Path, writing: int) -> int:
+    """Start a copy of this process, which reads the file and ends; return its number."""
+    with warnings.catch_warnings():
+        # of other threads, which the copy lacks: it takes nothing of theirs
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child:
+        return child
+    status = 1
+    try:
+        faulthandler.disable()
+        watched = (*_TIME_OVER, signal.SIGTERM, signal.SIGINT)
+        for number in watched:
+            if number in _TIME_OVER or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, watched)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for stream in (1, 2):  # what the C library says of a broken heap
+            os.dup2(nowhere, stream)
+        status = _run(read, path, lambda text: os.write(writing, text.encode(errors="replace")[:4000]))
+    finally:
+        os._exit(status)
 
 
 _CODE = """
