@@ -322,7 +322,7 @@ def _suggest(name: str, known: Sequence[str]) -> str:
 
 def amplitude_of(displacement_amplitude: Variable, frequency: Variable) -> Variable:
     """The amplitude A = ω²d on a slice: files do not hold it where d and the frequency span a grid."""
-    from slipsweep.motion.waveforms import peak_acceleration
+    from slipsweep.motion.amplitude import peak_acceleration
 
     dims = (*displacement_amplitude.dims, *(dim for dim in frequency.dims if dim not in displacement_amplitude.dims))
     both = (

@@ -23,10 +23,11 @@ from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import CYCLE_KERNEL, RECORD_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
 from slipsweep.model.options import Mendez, Model, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, Validity
+from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.pieces import Wave
 from slipsweep.motion.records import Record
-from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
+from slipsweep.motion.waveforms import Sine, Waveform
 
 if TYPE_CHECKING:
     from slipsweep.jit.cache import Kernel

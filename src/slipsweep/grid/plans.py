@@ -33,8 +33,9 @@ from slipsweep.model.variables import (
     RESULTS,
     WAVEFORM_INPUTS,
 )
+from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.records import Record
-from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
+from slipsweep.motion.waveforms import WAVEFORMS
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",

@@ -15,13 +15,9 @@ A ramp multiplies it by an envelope that grows linearly from 0 over the first `r
 falls to 0 over the last `ramp_out`; A is the peak without it.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import ClassVar, Self
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
@@ -180,10 +176,3 @@ class Harmonics(Waveform, _Terms):
 WAVEFORMS: Family[Waveform] = Family(
     "excitation", "waveform", (Sine, Cosine, Triangle, Square, Harmonics), "sine", "waveform"
 )
-
-
-def peak_acceleration(displacement_amplitude: NDArray[np.float64], frequency: NDArray[np.float64]) -> NDArray[Any]:
-    """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
-    omega = 2.0 * math.pi * frequency
-    with np.errstate(over="ignore"):  # `plans.plan_sweep` refuses what has no finite A
-        return omega * omega * displacement_amplitude
