@@ -6,9 +6,9 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
-import typer
 from processes import slipsweep
 
 from slipsweep import cli
@@ -120,13 +120,17 @@ def test_no_command_writes_what_it_reads(folder: Path, command: str, capfd: pyte
 
 
 def test_the_table_has_every_command_that_writes() -> None:
-    """A new command that writes must say here what it reads."""
-    writing = {
-        name
-        for name, command in typer.main.get_command(cli.app).commands.items()  # type: ignore[attr-defined]
-        if any("--output" in parameter.opts for parameter in command.params)
+    """A command that comes to write, or to read, must say here what it reads."""
+    paths = {
+        str(getattr(command.callback, "__name__", "")): {
+            name for name, kind in get_type_hints(command.callback).items() if "Path" in str(kind)
+        }
+        for command in cli.app.registered_commands
     }
-    assert {words[0] for words, _, _ in COMMANDS.values()} | {"simulate"} == writing  # simulate reads nothing
+    reading = {name for name, parameters in paths.items() if "output" in parameters and len(parameters) > 1}
+    assert {words[0] for words, _, _ in COMMANDS.values()} == reading
+    assert all(len(parameters - {"output"}) <= 1 for parameters in paths.values())
+    assert {name for name, parameters in paths.items() if "output" not in parameters} == {"info"}
 
 
 def test_an_input_by_another_name_is_not_written_either(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
