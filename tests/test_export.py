@@ -258,3 +258,30 @@ def test_words_of_one_cell(folder: Path, tmp_path: Path, suffix: str) -> None:
     assert export.export(cell, path, words=True) == 1
     row = bare(read(path)).iloc[0]
     assert (row.label, row.sliding_mode, row.frequency) == ("mild ± slope, wet", "stick_slip", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "attribute", "value", "refusal"),
+    [
+        ("permanent_displacement", "units", np.arange(3), None),
+        ("validity", "flag_masks", 2.0 ** np.arange(8), None),
+        ("validity", "flag_masks", "all", "flag_meanings has 8 words and flag_masks 0 whole numbers"),
+        ("sliding_mode", "flag_values", np.array([0, 1], np.int8), "3 words and flag_values 2 whole numbers"),
+        ("sliding_mode", "flag_meanings", 7, "1 words and flag_values 3 whole numbers"),
+    ],
+)
+def test_attributes_that_another_program_has_changed(
+    folder: Path, tmp_path: Path, name: str, attribute: str, value: object, refusal: str | None
+) -> None:
+    changed = tmp_path / "changed.nc"
+    with xr.open_dataset(folder / "grid.nc", mask_and_scale=False) as data:
+        data[name].attrs[attribute] = value
+        data.to_netcdf(changed)
+    if refusal is not None:
+        with pytest.raises(InputError, match=refusal):
+            export.export(changed, tmp_path / "t.csv", words=True)
+        return
+    for source in (folder / "grid.nc", changed):
+        export.export(source, tmp_path / f"{source.stem}.csv", words=True)
+    tables = [bare(pd.read_csv(tmp_path / f"{stem}.csv")) for stem in ("grid", "changed")]
+    pd.testing.assert_frame_equal(*tables)

@@ -288,7 +288,7 @@ def check_sweep(file: ResultFile) -> None:
         raise InputError(f'{file.path}: not a result of "slipsweep run"')
     for name, attributes in [*_COORDINATES.items(), *_RESULTS.items()]:
         found = file[name].attrs.get("units") if name in file else None
-        if found is not None and found != attributes.get("units", found):
+        if found and found != attributes.get("units", found):
             raise InputError(f'{file.path}: {name}: units = "{found}"; must be "{attributes["units"]}"')
     options = (
         "model",

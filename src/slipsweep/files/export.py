@@ -55,18 +55,21 @@ class Column:
     def in_words(self, codes: NDArray[Any]) -> NDArray[Any]:
         """Replace codes by words; the few that occur are spelled out once each."""
         occurring, places = np.unique(codes, return_inverse=True)
-        meanings = str(self.attributes["flag_meanings"]).split()
+        meanings = self.attributes["flag_meanings"].split()
         key = "flag_masks" if "flag_masks" in self.attributes else "flag_values"
-        numbers = np.atleast_1d(self.attributes.get(key, ())).tolist()
+        given = np.atleast_1d(self.attributes.get(key, ()))
+        # other programs write them as floating-point numbers
+        is_whole = given.dtype.kind in "iuf" and np.array_equal(given, np.rint(given))
+        numbers = given.astype(np.int64).tolist() if is_whole else []
         if len(numbers) != len(meanings):
             raise InputError(
                 f"{self.variable.path}: {self.variable.name}: flag_meanings has {len(meanings)} words and {key} "
-                f"{len(numbers)} numbers; must be as many"
+                f"{len(numbers)} whole numbers; must be as many"
             )
         known = dict(zip(numbers, meanings, strict=True))
         spelled = np.empty(occurring.size, dtype=object)
         for place, code in enumerate(occurring.tolist()):
-            flags = [word for mask, word in known.items() if code & int(mask)] if key == "flag_masks" else []
+            flags = [word for mask, word in known.items() if code & mask] if key == "flag_masks" else []
             spelled[place] = " ".join(flags) if key == "flag_masks" else known.get(code, str(code))
         return spelled[places.reshape(codes.shape)]
 

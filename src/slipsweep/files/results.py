@@ -49,6 +49,9 @@ _COORDINATES = {**STATISTIC_COORDINATES, **PARAMETERS}
 _VALID = ("valid_range", "valid_min", "valid_max")
 _ENCODING = ("scale_factor", "add_offset", "_Unsigned", "_FillValue", "missing_value", *_VALID)
 
+#: Attributes of variables that are texts: what another program has put there instead is made one.
+_TEXTS = ("units", "long_name", "coordinates", "bounds", "flag_meanings")
+
 #: Cells of a variable in chunks (none is slipsweep's own) that are read on trial: chunks are found by lists in
 #: the file, which may be damaged.
 _TRIED_CELLS = 2**25
@@ -118,7 +121,7 @@ class FileVariable:
     sizes : dict of str to int
         Dimensions and their lengths.
     attrs : dict
-        But for those by which values are packed or missing.
+        But for those by which values are packed or missing; units, names and meanings are texts.
     is_text : bool
     stored : dtype
         That of the numbers in the file.
@@ -130,7 +133,8 @@ class FileVariable:
         self.path, self.name, self._variable = path, str(variable.name), variable
         attributes = {name: _attribute(variable, name) for name in variable.ncattrs()}
         self._encoding = {name: attributes.pop(name) for name in _ENCODING if name in attributes}
-        self.attrs: dict[str, Any] = attributes
+        texts = {name: str(attributes[name]) for name in _TEXTS if name in attributes}
+        self.attrs: dict[str, Any] = attributes | texts
         self._has_characters = variable.dtype == "S1"
         self.is_text = self._has_characters or variable.dtype is str
         self.dims: tuple[str, ...] = tuple(variable.dimensions[: -1 if self._has_characters else None])
