@@ -402,6 +402,8 @@ def kernels_of(solver: Callable[..., Any], problem: Problem) -> "list[Kernel]":
     """The kernels that one of the functions above takes for any grid (a sine may need the waves' one besides)."""
     if solver is friction_parameters:
         return [parameter_grid]
+    if solver is solve_record:
+        return [RECORD_KERNEL]
     if solver is not solve:
         return []
     if isinstance(problem.solver, Step):

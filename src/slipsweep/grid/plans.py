@@ -51,7 +51,7 @@ class Task:
     Attributes
     ----------
     solver : callable
-        `engine.solve`, `engine.friction_parameters`, or what solves a record (`record_sweeps`).
+        `engine.solve`, `engine.solve_record`, or `engine.friction_parameters`.
     problem : Problem
     names : tuple of str
         Results to compute.
