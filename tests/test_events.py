@@ -45,15 +45,22 @@ def test_a_root_that_is_not_found_is_nan() -> None:
     assert math.isnan(found(math.nan, 1.0, 0.0, 1.0))
 
 
+class Failing:
+    """A kernel that does not solve cell 4."""
+
+    def expect(self) -> None:
+        pass
+
+    def __call__(self, grid: Any, *arguments: Any) -> None:
+        arguments[-1].unsolved[0] = 4  # the results
+
+
 @pytest.mark.parametrize("options", [{"excitation": "triangle"}, {"solver": "step"}])
 def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def failing(grid: Any, *arguments: Any) -> None:
-        arguments[-1].unsolved[0] = 4  # the results
-
-    monkeypatch.setattr(engine, "WAVE_KERNEL", failing)
-    monkeypatch.setattr(engine, "STEP_KERNELS", dict.fromkeys(engine.STEP_KERNELS, failing))
+    monkeypatch.setattr(engine, "WAVE_KERNEL", Failing())
+    monkeypatch.setattr(engine, "STEP_KERNELS", dict.fromkeys(engine.STEP_KERNELS, Failing()))
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,
@@ -66,10 +73,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
 
 
 def test_a_cell_of_a_record_that_is_not_solved_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(grid: Any, *arguments: Any) -> None:
-        arguments[-1].unsolved[0] = 4
-
-    monkeypatch.setattr(engine, "RECORD_KERNEL", failing)
+    monkeypatch.setattr(engine, "RECORD_KERNEL", Failing())
     record = slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)
     axes: dict[str, Any] = {"theta": [0.0, 5.0], "mu_s": 0.3, "scale": [1.0, 2.0, 3.0], "polarity": -1}
     with pytest.raises(RunError, match=r"theta = 5.0, mu_s = 0.3, scale = 2.0, .*polarity = -1.0: an event"):

@@ -46,6 +46,7 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
             solved.append(last - first)
             return kernel(grid, first, last, *rest)
 
+        call.expect = kernel.expect  # type: ignore[attr-defined]
         return call
 
     monkeypatch.setattr(engine, "CYCLE_KERNEL", counting(engine.CYCLE_KERNEL))
