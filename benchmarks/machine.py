@@ -88,13 +88,17 @@ def number(value: float, digits: int = 3) -> str:
     return f"{value:.{max(digits - 2, 0)}e}"
 
 
-def arguments(description: str | None, folder: Path = RESULTS) -> argparse.Namespace:
-    """The command line that all measurements share."""
+def arguments(
+    description: str | None, folder: Path = RESULTS, counts: Mapping[str, int] | None = None
+) -> argparse.Namespace:
+    """The command line that all measurements share; `counts` are whole numbers of its own, with their defaults."""
     parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
     parser.add_argument("--tiny", action="store_true", help="a few cells only, to see that it runs")
     parser.add_argument(
         "--folder", type=Path, default=folder, help="where tables and figures go (default: %(default)s)"
     )
+    for name, default in (counts or {}).items():
+        parser.add_argument(f"--{name}", type=int, default=default, help="(default: %(default)s)")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     return given

@@ -150,3 +150,14 @@ def test_slides_that_run_past_the_end_of_a_cycle(wave: dict[str, Any], given: di
     np.testing.assert_array_equal(found.validity, exact.validity)
     for name in ("permanent_displacement", "peak_relative_velocity"):
         np.testing.assert_allclose(found[name], exact[name], rtol=1e-7, err_msg=name)
+
+
+@RULES
+def test_a_slide_that_begins_with_the_end_of_a_rise(rule: str) -> None:
+    """Steps grow from the onset's 1e-10 of a cycle to those of the plateau behind it; there are many of them."""
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 0.9, "yield_acceleration": 4.8, "amplitude": 4.8 * (1 + 2e-9)}
+    block |= {"frequency": 1.0, "waveform": "square", "ramp_in": 0.0085, "cycles": 6, "delta_mu": 0.28}
+    exact = slipsweep.sweep(**choices(**block, solver="cycle"))
+    for steps in (8, 1000):
+        found = slipsweep.sweep(**choices(**block, solver="step", rule=rule, steps_per_cycle=steps))
+        np.testing.assert_allclose(found.permanent_displacement, exact.permanent_displacement, rtol=1e-6)

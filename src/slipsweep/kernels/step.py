@@ -402,7 +402,8 @@ def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float,
     wave, amplitude, literal = steps.wave, block.amplitude, block.rise == LITERAL
     begin, end, at = node(steps, p, k), node(steps, p, k + 1), steps.offset[p] + 2 * k
     x_end, located = amplitude * steps.nodes[at + 2], True
-    for _ in range(_MOST_EVENTS + steps.per_cycle):
+    # of a slide's own steps (`longest_step`), which grow by share/4 from 1e-14 on, there are ln(1e13) 4/share
+    for _ in range(_MOST_EVENTS + 3 * steps.per_cycle):
         if state[SLIDES] == 0.0:
             if x < block.yield_acceleration:
                 if x_end <= block.yield_acceleration:

@@ -1,0 +1,76 @@
+"""The solvers held to each other: ``python -m benchmarks.agreement`` writes agreement.md.
+
+Draws cells as tests/agreement.py does, under all options and waveforms, and solves each in every way that there is.
+``.ci/include-report`` puts the table into docs/waveforms.md.  Nothing is timed; it ends with an error where
+two ways disagree.
+"""
+
+import random
+import sys
+from collections import Counter, defaultdict
+from statistics import median
+from typing import TYPE_CHECKING
+
+from benchmarks.machine import ROOT, arguments, measured_on, number, table
+
+if TYPE_CHECKING:
+    from agreement import Comparison
+
+#: Cells drawn, and in a group.
+CELLS, SIZE = 10_000, 32
+
+
+def rows_of(found: "dict[str, list[Comparison]]") -> list[list[object]]:
+    """A line a kind: counts, median and worst difference, the worst over its bound."""
+    rows: list[list[object]] = []
+    for kind, comparisons in found.items():
+        differences = [comparison.difference for comparison in comparisons]
+        times = [comparison.times_bound for comparison in comparisons]
+        agreed = sum(one <= 1.0 for one in times)
+        shown = (number(value, 2) for value in (median(differences), max(differences), max(times)))
+        rows.append([kind, len(times), agreed, *shown])
+    return rows
+
+
+HEADER = ["the cycle solver against", "cells", "agreed", "median difference", "largest", "largest over its bound"]
+
+
+def main() -> None:
+    """Draw, compare, write agreement.md."""
+    given = arguments(__doc__, counts={"cells": CELLS, "seed": -1})
+    sys.path.insert(0, str(ROOT / "tests"))
+    from agreement import FLOORS, compare, group_of
+
+    seed = given.seed if given.seed >= 0 else random.randrange(2**31)
+    cells = 2 * SIZE if given.tiny else given.cells
+    print(f"seed {seed}", flush=True)
+    kinds: dict[str, list[Comparison]] = {kind: [] for kind in FLOORS}
+    regimes: dict[str, list[Comparison]] = defaultdict(list)
+    modes: Counter[int] = Counter()
+    wrong = []
+    for drawn in range(0, cells, SIZE):
+        for comparison in compare(group_of(seed + drawn // SIZE, min(SIZE, cells - drawn))):
+            kinds[comparison.kind].append(comparison)
+            if comparison.kind.startswith("step"):
+                regimes[comparison.regime].append(comparison)
+                modes[comparison.mode] += 1
+            if not comparison.times_bound <= 1.0:
+                wrong.append(comparison)
+                print(f"{comparison.kind}: {comparison.text}", flush=True)
+        if drawn % (50 * SIZE) == 0:
+            print(f"{drawn} cells, {len(wrong)} disagreements", flush=True)
+    by_kind = table(HEADER, rows_of({kind: found for kind, found in kinds.items() if found}))
+    by_regime = table([HEADER[0].replace("the cycle", "the step"), *HEADER[1:]], rows_of(dict(sorted(regimes.items()))))
+    print(by_kind, by_regime, sep="\n")
+    head = (
+        f"{cells:,} cells, {modes[0]:,} of them stuck, {modes[1]:,} in stick–slip, {modes[2]:,} in continuous sliding, "
+        f"{modes[-1]:,} without a value. {measured_on(('numpy', 'numba'))} Written by `python -m benchmarks.agreement"
+        f" --cells {cells} --seed {seed}`."
+    )
+    (given.folder / "agreement.md").write_text(f"{head}\n\n{by_kind}\n{by_regime}", encoding="utf-8")
+    if wrong:
+        raise SystemExit(f"{len(wrong)} disagreements")
+
+
+if __name__ == "__main__":
+    main()
