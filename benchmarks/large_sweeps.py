@@ -27,6 +27,7 @@ from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, n
 from slipsweep.files import spec
 from slipsweep.grid import blocks
 from slipsweep.runs import store
+from slipsweep.runs.jobs import Job, sweep_job
 
 #: Results that are written by default, with their types.
 RESULTS = {"permanent_displacement": "f8", "peak_relative_velocity": "f8", "sliding_mode": "i1", "validity": "i2"}
@@ -178,17 +179,17 @@ def overhead(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
         f"four axes of {length}": [length] * 4,
         "no frequency axis": [length // 2, length, 10 * length, 1],
     }.items():
-        parsed = spec.parse(sweep_file(folder / "blocks.toml", lengths).read_text(), "blocks.toml")
+        job = sweep_job(spec.parse(sweep_file(folder / "blocks.toml", lengths).read_text(), "blocks.toml"))
 
-        def blocked(cells: int, parsed: spec.SweepSpec = parsed) -> Callable[[], object]:
-            return lambda: store.run(parsed, folder / "blocks.nc", command="-", overwrite=True, block_cells=cells)
+        def blocked(cells: int, job: Job = job) -> Callable[[], object]:
+            return lambda: store.run(job, folder / "blocks.nc", command="-", overwrite=True, block_cells=cells)
 
-        counts = [sum(1 for _ in blocks.grid_blocks(parsed.shape, cells)) for cells in (size, size // 8)]
+        counts = [sum(1 for _ in blocks.grid_blocks(job.plan.sizes, cells)) for cells in (size, size // 8)]
         whole, eighth = alternate({"1": blocked(size), "8": blocked(size // 8)}, 1 if tiny else 5, min).values()
         each = max(0.0, eighth - whole) / (counts[1] - counts[0])
         share = each * counts[0] / whole
         worst = max(worst, share)
-        rows.append([name, f"{parsed.cells:,}", *counts, number(whole), number(eighth), number(each * 1e3)])
+        rows.append([name, f"{job.plan.cells:,}", *counts, number(whole), number(eighth), number(each * 1e3)])
         rows[-1].append(f"{share:.1%}")
     (folder / "blocks.nc").unlink(missing_ok=True)
     text = (

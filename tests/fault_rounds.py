@@ -24,6 +24,7 @@ import numpy as np
 from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.runs import solving, store
+from slipsweep.runs.jobs import sweep_job
 
 SWEEP = """
 [axes.theta]
@@ -75,7 +76,7 @@ class Stop(BaseException):
 
 def run(path: Path, text: str = SWEEP, **options: Any) -> store.Report:
     """`store.run` in this process."""
-    return store.run(spec.parse(text, "a.toml"), path, command="x", **{"block_cells": CELLS, **options})
+    return store.run(sweep_job(spec.parse(text, "a.toml")), path, command="x", **{"block_cells": CELLS, **options})
 
 
 def values(path: Path) -> Values:

@@ -22,6 +22,7 @@ from slipsweep.explore import page as explore
 from slipsweep.files import spec
 from slipsweep.model.variables import Validity
 from slipsweep.runs import store
+from slipsweep.runs.jobs import sweep_job
 
 SWEEP = """
 [axes.theta]
@@ -66,7 +67,7 @@ values = [1, 2, 4]
 
 def made(folder: Path, name: str, text: str) -> Path:
     path = folder / f"{name}.nc"
-    store.run(spec.parse(text, name), path, command="slipsweep run")
+    store.run(sweep_job(spec.parse(text, name)), path, command="slipsweep run")
     return path
 
 

@@ -20,7 +20,7 @@ from slipsweep.files import spec
 from slipsweep.model.choices import Choice, Family, declared
 from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.motion.waveforms import WAVEFORMS
-from slipsweep.runs import parts
+from slipsweep.runs.jobs import sweep_job
 
 FAMILIES: dict[str, Family[Any]] = {family.keyword: family for family in (MODELS, WAVEFORMS, SOLVERS)}
 
@@ -236,7 +236,7 @@ def test_attributes_of_no_choice(attributes: dict[str, Any], message: str) -> No
 @pytest.mark.parametrize("other", [Cycle(), Step(rule="simpson"), Step(steps_per_cycle=512)])
 def test_a_run_goes_on_with_the_same_solver_only(other: Cycle | Step) -> None:
     sweep = spec.parse(GRID, "a.toml")
-    one, two = (parts.identity(sweep.with_solver(solver), False) for solver in (Step(), other))
+    one, two = (sweep_job(sweep.with_solver(solver)).asked for solver in (Step(), other))
     assert {name for name in one if one[name] != two[name]} == {"solver"}
 
 
@@ -255,7 +255,7 @@ import sys
 import slipsweep
 from slipsweep.cli import main
 from slipsweep.files import spec
-from slipsweep.runs import parts
+from slipsweep.runs.jobs import sweep_job
 from slipsweep.studies import history
 
 assert slipsweep.__file__.startswith(sys.argv[1]), slipsweep.__file__
@@ -277,7 +277,7 @@ assert (attrs["damping"], attrs["ageing"], attrs["tolerance"]) == (0.5, 0.0, 0.0
 # resuming
 sweep = spec.load("a.toml")
 assert (sweep.excitation.damping, sweep.model.ageing, sweep.solver.tolerance) == (0.25, 0.5, 0.75)
-one, two = (parts.identity(sweep.with_solver(slipsweep.Step(tolerance=t)), False) for t in (0.75, 0.5))
+one, two = (sweep_job(sweep.with_solver(slipsweep.Step(tolerance=t))).asked for t in (0.75, 0.5))
 assert {name for name in one if one[name] != two[name]} == {"solver"}
 
 # the command line: what arrives where it is computed

@@ -20,6 +20,7 @@ from slipsweep.cli import main
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import spec
 from slipsweep.runs import cluster, store
+from slipsweep.runs.jobs import sweep_job
 from slipsweep.runs.parts import installation
 
 distributed = pytest.importorskip("distributed")
@@ -99,7 +100,9 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 def run(text: str, path: Path, **options: Any) -> store.Report:
     """`store.run` in several blocks."""
-    return store.run(spec.parse(text, "a.toml"), path, command="slipsweep run", block_cells=BLOCK_CELLS, **options)
+    return store.run(
+        sweep_job(spec.parse(text, "a.toml")), path, command="slipsweep run", block_cells=BLOCK_CELLS, **options
+    )
 
 
 def assert_same_bits(one: Path, other: Path) -> None:
@@ -294,7 +297,7 @@ def test_nobody_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_nothing_to_solve_starts_nothing() -> None:
     with cluster.cluster(scheduler="127.0.0.1:9") as solved:
-        assert list(solved(spec.parse(SWEEP, "a.toml"), {}, None)) == []
+        assert list(solved(spec.parse(SWEEP, "a.toml").plan(), {}, None)) == []
 
 
 @pytest.mark.parametrize(

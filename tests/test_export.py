@@ -14,6 +14,7 @@ from slipsweep.errors import InputError
 from slipsweep.files import export, spec
 from slipsweep.model.variables import VALIDITY_TEXT, Validity
 from slipsweep.runs import store
+from slipsweep.runs.jobs import sweep_job
 
 GRID = """
 [axes.theta]
@@ -52,7 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a grid and a list of cases, solved."""
     folder = tmp_path_factory.mktemp("export")
     for name, text in (("grid", GRID), ("cases", CASES)):
-        store.run(spec.parse(text, name), folder / f"{name}.nc", command="x")
+        store.run(sweep_job(spec.parse(text, name)), folder / f"{name}.nc", command="x")
     return folder
 
 
@@ -100,7 +101,7 @@ def test_units_stand_in_the_header(folder: Path, tmp_path: Path) -> None:
 
 def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
     text = GRID.replace("displacement_amplitude", "amplitude").replace("decay_rate", "structure_frequency")
-    store.run(spec.parse(text, "x"), tmp_path / "a.nc", command="x")
+    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     assert export.count_rows(tmp_path / "a.nc", ["limiting_acceleration"]) == 18
     assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", variables=["limiting_acceleration"]) == 18
     table = bare(pd.read_csv(tmp_path / "a.csv"))
@@ -147,7 +148,7 @@ def test_memory_stays_that_of_a_block(tmp_path: Path) -> None:
             ("theta", 0, 20, 30), ("mu_s", 0.2, 0.9, 20), ("amplitude", 1, 9, 50), ("frequency", 1, 9, 20),
         )
     )  # fmt: skip
-    store.run(spec.parse(text + '[output]\nvariables = ["validity"]', "x"), tmp_path / "a.nc", command="x")
+    store.run(sweep_job(spec.parse(text + '[output]\nvariables = ["validity"]', "x")), tmp_path / "a.nc", command="x")
     tracemalloc.start()
     try:
         assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", block_cells=5000) == 600_000

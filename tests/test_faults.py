@@ -21,6 +21,7 @@ from slipsweep import Step
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs, spec
 from slipsweep.runs import parts, solving, store
+from slipsweep.runs.jobs import sweep_job
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +128,7 @@ def files(path: Path) -> list[Path]:
 def test_a_journal_that_ends_anywhere_promises_its_whole_lines_only(tmp_path: Path) -> None:
     folder = parts.Folder(tmp_path / "a.nc")
     folder.path.mkdir()
-    manifest = parts.Manifest(parts.identity(spec.parse(SWEEP, "a"), False), 4000, False, "now")
+    manifest = parts.Manifest(parts.identity({"sweep file": SWEEP}, False), 4000, False, "now")
     sums = {
         number: parts.checksum({"a": np.arange(9.0) * number, "b": np.full((3, 2), number, np.int8)})
         for number in (0, 7, 12)
@@ -214,7 +215,7 @@ def test_blocks_of_another_sweep_are_refused_with_the_difference(
     with pytest.raises(InputError, match="the sweep file differs: line 4 was 'stop = 20', is 'stop = 21'"):
         run(path, SWEEP.replace("stop = 20\nnum = 30", "stop = 21\nnum = 30"), resume=True)
     with pytest.raises(InputError, match=r"solver was Cycle\(\), is Step\("):
-        store.run(spec.parse(SWEEP, "a").with_solver(Step()), path, command="x", resume=True)
+        store.run(sweep_job(spec.parse(SWEEP, "a").with_solver(Step())), path, command="x", resume=True)
     with pytest.raises(InputError, match="--split was False, is True"):
         run(path, resume=True, split=True)
     with pytest.raises(InputError, match="--memory: too little for the blocks of 4000 cells"):

@@ -1,5 +1,6 @@
 """Sweep files damaged at random: each is a sweep or is refused in one line, and nothing else happens."""
 
+import math
 import random
 import tomllib
 from collections import Counter
@@ -172,6 +173,11 @@ def _count() -> Any:
     print(f"\n{ended.total()} damaged sweep files: {dict(ended)}")
 
 
+def cells(parsed: spec.SweepSpec) -> int:
+    """Cells of the grid."""
+    return math.prod({one.dim: one.values.size for one in parsed.parameters.values()}.values())
+
+
 def check(text: str) -> spec.SweepSpec | None:
     """Parse; whatever is neither a sweep nor a refusal of one line fails."""
     try:
@@ -185,8 +191,7 @@ def check(text: str) -> spec.SweepSpec | None:
         assert len(message) < 700, message
         ended["refused"] += 1
         return None
-    assert parsed.cells >= 1
-    assert parsed.nbytes > 0
+    assert cells(parsed) >= 1
     ended["sweeps"] += 1
     return parsed
 
@@ -226,7 +231,7 @@ def test_a_damaged_file_runs_or_fails_in_one_line(
     if parsed:
         assert isinstance(parsed.excitation, Waveform)
         steps = parsed.solver.steps_per_cycle if isinstance(parsed.solver, Step) else 8
-        if parsed.cells > FEW or parsed.excitation.cycles > 20 or steps > 512:
+        if cells(parsed) > FEW or parsed.excitation.cycles > 20 or steps > 512:
             return
     folder = tmp_path_factory.mktemp("run")
     (folder / "a.toml").write_text(text, newline="")

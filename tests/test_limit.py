@@ -17,7 +17,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid.tables import Variable
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
-from slipsweep.studies.limits import limit_table
+from slipsweep.studies.limits import plan_limits
 
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -314,7 +314,7 @@ def test_cases_keep_their_names(tmp_path: Path) -> None:
     }
     drawn = ["dry ± joint", r"_wet \$^joint^\$"]
     for frequency in ([1.0, 2.0, 3.0], 1.0):
-        figure = limit_chart(limit_table(displacement=0.005, **zipped, frequency=frequency), names)
+        figure = limit_chart(plan_limits(displacement=0.005, **zipped, frequency=frequency).solve(), names)
         figure.savefig(tmp_path / "l.png")
         if frequency == 1.0:
             assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == drawn

@@ -19,7 +19,8 @@ from slipsweep.files import export, spec
 from slipsweep.grid import blocks
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import RECORD_RESULTS
-from slipsweep.runs import parts, solving, store
+from slipsweep.runs import solving, store
+from slipsweep.runs.jobs import sweep_job
 
 SWEEPS = Path(__file__).parents[1] / "sweeps"
 
@@ -51,7 +52,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def run(sweep: Path, path: Path, **options: Any) -> store.Report:
-    return store.run(spec.load(sweep), path, command="slipsweep run a.toml", **options)
+    return store.run(sweep_job(spec.load(sweep)), path, command="slipsweep run a.toml", **options)
 
 
 def stored(path: Path) -> dict[str, Any]:
@@ -197,8 +198,9 @@ def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) ->
 
 def test_blocks_of_a_record_are_seconds_of_work(folder: Path) -> None:
     checked = spec.load(folder / "a.toml")
-    assert solving.default_cells(checked) < blocks.BLOCK_CELLS // 10
-    assert "record" in parts.identity(checked, False)
+    job = sweep_job(checked)
+    assert solving.default_cells(job.plan) < blocks.BLOCK_CELLS // 10
+    assert "record" in job.asked
 
 
 # ------------------------------------------------------------------------------------- refused
@@ -266,7 +268,7 @@ def test_a_sweep_file_may_scale_the_record_to_its_peak(folder: Path) -> None:
         )
         np.testing.assert_array_equal(found[name].values, scaled[name].values)
     again = folder / "again.nc"
-    store.run(spec.load(folder / "a.nc"), again, command="x")
+    store.run(sweep_job(spec.load(folder / "a.nc")), again, command="x")
     xr.testing.assert_equal(found, xr.load_dataset(again, mask_and_scale=False))
 
 

@@ -28,6 +28,7 @@ from slipsweep.explore.page import read_excerpt
 from slipsweep.files import guard, spec
 from slipsweep.files.results import ResultFile
 from slipsweep.runs import store
+from slipsweep.runs.jobs import sweep_job
 
 GRID = """
 [axes.theta]
@@ -48,7 +49,7 @@ cycles = 3
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("results") / "grid.nc"
-    store.run(spec.parse(GRID, "grid"), path, command="slipsweep run grid.toml")
+    store.run(sweep_job(spec.parse(GRID, "grid")), path, command="slipsweep run grid.toml")
     return path
 
 

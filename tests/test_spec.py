@@ -71,8 +71,9 @@ def test_defaults() -> None:
     assert arguments["solver"] == Cycle()
     assert arguments["variables"] == list(variables.DEFAULT_RESULTS)
     assert "yield_acceleration" not in arguments
-    assert sweep.shape == {"theta": 5, "mu_s": 2, "amplitude": 4, "frequency": 3}
-    assert (sweep.cells, sweep.nbytes) == (120, 120 * (8 + 8 + 1 + 2))
+    plan = sweep.plan()
+    assert plan.sizes == {"theta": 5, "mu_s": 2, "amplitude": 4, "frequency": 3}
+    assert list(plan.names) == list(variables.DEFAULT_RESULTS)
 
 
 def test_every_parameter_may_be_an_axis_and_a_case() -> None:
@@ -149,18 +150,20 @@ def test_coulomb_is_the_default_that_an_axis_replaces() -> None:
 def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
     sweep = spec.parse(CASES, "a.toml")
     arguments = sweep.arguments()
-    assert sweep.shape == {"mu_s": 3, "frequency": 2, "case": 2}
+    assert sweep.plan().sizes == {"mu_s": 3, "frequency": 2, "case": 2}
     assert sweep.labels == ("first", "2")
     for name, values in {"theta": [5, 6], "amplitude": [3, 5]}.items():
         assert arguments[name].dims == ("case",)
         np.testing.assert_array_equal(arguments[name].values, values)
 
 
-def test_arguments_of_a_block() -> None:
-    arguments = spec.parse(CASES, "a.toml").arguments({"mu_s": slice(1, 3), "case": slice(1, 2)})
-    np.testing.assert_array_equal(arguments["mu_s"], [0.5, 0.7])
-    np.testing.assert_array_equal(arguments["frequency"], [1, 2])
-    np.testing.assert_array_equal(arguments["theta"].values, [6])
+def test_the_plan_of_a_block() -> None:
+    part = spec.parse(CASES, "a.toml").plan().part({"mu_s": slice(1, 3), "case": slice(1, 2)})
+    assert part.sizes == {"mu_s": 2, "frequency": 2, "case": 1}
+    coords = part.empty().coords
+    np.testing.assert_array_equal(coords["mu_s"].values, [0.5, 0.7])
+    np.testing.assert_array_equal(coords["frequency"].values, [1, 2])
+    np.testing.assert_array_equal(coords["theta"].values, [6])
 
 
 @pytest.mark.parametrize(
@@ -387,4 +390,4 @@ def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
 def test_the_sweeps_that_come_along_are_good(path: Path) -> None:
     sweep = spec.load(path)
     if path.stem == "design_chart":
-        assert 2.5e6 < sweep.cells < 3.5e6
+        assert 2.5e6 < sweep.plan().cells < 3.5e6

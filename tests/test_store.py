@@ -24,6 +24,7 @@ from slipsweep.grid import blocks, plans
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model import variables
 from slipsweep.runs import placed, solving, store
+from slipsweep.runs.jobs import sweep_job
 
 GRID = """
 # θ in degrees
@@ -57,7 +58,7 @@ delta_mu = 0.1
 
 
 def run(text: str, path: Path, **options: Any) -> store.Report:
-    return store.run(spec.parse(text, "a.toml"), path, command="slipsweep run a.toml", **options)
+    return store.run(sweep_job(spec.parse(text, "a.toml")), path, command="slipsweep run a.toml", **options)
 
 
 def stored(path: Path) -> dict[str, Any]:
@@ -100,14 +101,29 @@ def test_a_block_is_one_run_of_any_result(shape: dict[str, int], most: int, data
     sizes = {dim: length for dim, length in shape.items() if data.draw(st.booleans())}
     numbers = np.arange(math.prod(sizes.values())).reshape(tuple(sizes.values()))
     for part in blocks.grid_blocks(shape, most):
-        first, count = placed.run_of(part, sizes)
+        (first,), count = placed.runs_of(part, sizes)
         wanted = numbers[tuple(part[dim] for dim in sizes)]
         assert wanted.ravel().tolist() == list(range(first, first + count))
 
 
-def test_what_is_no_run_of_a_result_is_refused() -> None:
-    with pytest.raises(ValueError, match="is more than one run of"):
-        placed.run_of({"theta": slice(0, 2), "mu_s": slice(0, 2)}, {"theta": 3, "mu_s": 3})
+@given(shape=SHAPES, most=st.integers(1, 400), data=st.data())
+@settings(max_examples=200, deadline=None)
+def test_runs_of_blocks_with_dimensions_kept_together(shape: dict[str, int], most: int, data: st.DataObject) -> None:
+    """Wherever these are among the others, and with dimensions of results that are none of the grid's."""
+    together = [dim for dim in shape if data.draw(st.booleans())]
+    sizes = {dim: length for dim, length in shape.items() if data.draw(st.booleans())} | {"quantile": 3}
+    numbers = np.arange(math.prod(sizes.values())).reshape(tuple(sizes.values()))
+    seen = np.zeros(tuple(shape.values()), int)
+    for part in blocks.grid_blocks(shape, most, together):
+        firsts, count = placed.runs_of(part, sizes)
+        wanted = numbers[tuple(blocks.places(part, sizes).values())]
+        assert wanted.ravel().tolist() == [first + at for first in firsts for at in range(count)]
+        seen[tuple(part.values())] += 1
+        assert seen[tuple(part.values())].size <= most
+    assert (seen == 1).all()
+    lengths = blocks.block_lengths(shape, most, together)
+    if any(lengths[dim] < shape[dim] for dim in together):
+        assert all(lengths[dim] == 1 for dim in shape if dim not in together)
 
 
 def test_blocks_are_whole_along_the_last_dimensions() -> None:
@@ -125,12 +141,12 @@ def test_blocks_are_whole_along_the_last_dimensions() -> None:
 @pytest.mark.parametrize("most", [7, 96, 1000])
 def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> None:
     names = ", ".join(f'"{name}"' for name in variables.RESULTS if name != "amplitude")
-    checked = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml")
-    cut = dict(enumerate(blocks.grid_blocks(checked.shape, most)))
-    whole = checked.plan().solve()
+    plan = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml").plan()
+    cut = dict(enumerate(blocks.grid_blocks(plan.sizes, most)))
+    whole = plan.solve()
     places: list[set[int]] = []
     previous: tuple[int, Table] | None = None
-    for found in solving.solve_here(checked, cut):
+    for found in solving.solve_here(plan, cut):
         # a block is as it was solved until the next but one is asked for, whatever their sizes
         for number, table in filter(None, (previous, found)):
             for name, result in table.data_vars.items():
@@ -144,15 +160,17 @@ def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> Non
 
 
 def test_workers_share_a_sweep_evenly_within_the_memory() -> None:
-    night = spec.parse(GRID.replace("num = 40", "num = 1000000"), "a.toml")  # 60 million cells, 19 bytes each
+    sweep = spec.parse(GRID.replace("num = 40", "num = 1000000"), "a.toml")
+    night = sweep.plan()  # 60 million cells, 19 bytes each
     assert solving.cells_within(2 * 10**9, night) == (2 * 10**9 - 400 * 10**6) // (2 * 19 + 8)
     assert solving.cells_within(2 * 10**9, night, 4) == (2 * 10**9 - 1400 * 10**6) // (14 * 19 + 8)
     with pytest.raises(InputError, match=r"--memory = 1 GB: must be 1\.41 GB at least with --workers 4"):
         solving.cells_within(10**9, night, 4)
-    stepping = night.with_solver(slipsweep.Step())
-    assert solving.cells_shared(stepping, 2) == 60_000_000 // 32
+    stepping = sweep.with_solver(slipsweep.Step()).plan()  # a cell takes 65 times as long
+    assert solving.cells_shared(stepping, 2) == 4_000_000 // 65
     assert solving.cells_shared(stepping, None) == 60_000_000 // 1024
-    assert solving.cells_shared(stepping, 1000) == 10_000
+    assert solving.cells_shared(stepping, 1000) == math.ceil(500_000 / 65)
+    assert solving.cells_within(2 * 10**9, stepping) == 4_000_000 // 65  # seconds of work, whatever the memory
     assert solving.cells_shared(night, None) == 500_000  # each but a few times what sending it takes
     assert solving.cells_shared(night, 1) == 60_000_000 // 16
 
@@ -356,12 +374,12 @@ def test_ncdump_reads_it(tmp_path: Path, text: str) -> None:
 
 def test_a_result_repeats_its_run(tmp_path: Path) -> None:
     sweep_spec = spec.parse(CASES, "a.toml").with_solver(slipsweep.Step())
-    store.run(sweep_spec, tmp_path / "a.nc", command="x")
+    store.run(sweep_job(sweep_spec), tmp_path / "a.nc", command="x")
     again = spec.load(tmp_path / "a.nc")
     assert again.text == CASES
     # the solver was not the sweep file's own: it is remembered all the same
     assert again.solver == slipsweep.Step()
-    store.run(again, tmp_path / "b.nc", command="x")
+    store.run(sweep_job(again), tmp_path / "b.nc", command="x")
     assert_same_data(tmp_path / "a.nc", tmp_path / "b.nc")
 
 

@@ -464,7 +464,7 @@ def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
         ({"mu_s": xr.DataArray([0.3], dims="case")}, "mu_s: simulate takes one case; must be a single number"),
         ({"theta": 95.0}, "theta = 95: must be 0 <= theta < 90 degrees"),
         ({"points_per_cycle": 3}, "points_per_cycle = 3: must be a whole number >= 4"),
-        ({"points_per_cycle": 10**9, "cycles": 10**9}, "a history of 1e+18 points takes "),
+        ({"points_per_cycle": 10**9, "cycles": 10**9}, "a history of 1e+18 points: takes "),
         ({"times": [0.0, 2.0, 1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
         ({"times": [-1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
         ({"times": [0.0, math.nan]}, "times: must be one row of finite, increasing numbers >= 0"),
@@ -489,7 +489,7 @@ def test_unknown_arguments_are_errors() -> None:
 
 def test_a_grid_too_large_for_memory_is_refused() -> None:
     axis = np.linspace(0.1, 10.0, 3000)
-    with pytest.raises(InputError, match=r"grid of 3000 theta x .* x 3000 frequency: 8\.1e\+13 cells take .* TB, but"):
+    with pytest.raises(InputError, match=r"grid of 3000 theta x .* x 3000 frequency, 8\.1e\+13 cells: takes .* TB"):
         slipsweep.sweep(axis, axis, axis, axis)
 
 

@@ -17,8 +17,10 @@ from slipsweep.charts import uncertainty_figures
 from slipsweep.charts.slices import Result
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.files import netcdf, spec
-from slipsweep.studies.uncertainty import DRAWN, check_sampling, plan_samples
+from slipsweep.files import spec
+from slipsweep.runs import store
+from slipsweep.runs.jobs import sweep_job
+from slipsweep.studies.uncertainty import DRAWN, check_sampling
 
 G = 9.81
 LOGNORMAL: dict[str, Any] = {"distribution": "lognorm", "s": 0.3}
@@ -405,7 +407,7 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
 
 
 def test_what_memory_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("slipsweep.studies.uncertainty.available_memory", lambda: 10**6)
+    monkeypatch.setattr("slipsweep.grid.resources.available_memory", lambda: 10**6)
     with pytest.raises(
         InputError, match=r"3 amplitude x 2 frequency, 65536 samples: takes .* but 1 MB of memory is free"
     ):
@@ -535,14 +537,6 @@ def test_bad_sweep_files(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.toml"]
 
 
-@pytest.mark.parametrize("option", ["--resume", "--split", "--memory=1GB"])
-def test_options_of_large_sweeps_are_refused(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
-) -> None:
-    assert main(["run", str(folder / "fragile.toml"), "-o", str(tmp_path / "a.nc"), option]) == 2
-    assert f"{option.partition('=')[0]}: not with [uncertainty]" in capsys.readouterr().err
-
-
 def test_other_commands_say_what_they_want(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(folder / "fragile.nc")
     assert main(["limit", path, "-d", "5cm"]) == 2
@@ -559,11 +553,7 @@ def test_cases_keep_their_labels(tmp_path: Path) -> None:
     text = FILE.replace(
         "[axes.theta]\nvalues = [0, 5]", '[[cases]]\nlabel = "north"\ntheta = 0\n[[cases]]\nlabel = "süd"\ntheta = 5'
     )
-    checked = spec.parse(text, "cases.toml")
-    assert checked.sampling is not None
-    arguments = {name: value for name, value in checked.arguments().items() if name != "variables"}
-    table = plan_samples(checked.sampling, **arguments).solve()
-    netcdf.write_statistics(checked, table, tmp_path / "cases.nc", command="slipsweep run")
+    store.run(sweep_job(spec.parse(text, "cases.toml")), tmp_path / "cases.nc", command="slipsweep run")
     with netCDF4.Dataset(tmp_path / "cases.nc") as file:
         assert list(file["label"][:]) == ["north", "süd"]
         assert file["displacement_quantile"].dimensions == ("amplitude", "frequency", "case", "quantile")
@@ -606,11 +596,9 @@ def test_bands_are_the_quantiles(folder: Path) -> None:
 
 def test_the_share_without_a_value_is_shown(tmp_path: Path) -> None:
     text = FILE.replace("[0, 5]", "[15]").replace("s = 0.1\n", "s = 0.2\n").replace("scale = 0.4", "scale = 0.3")
-    checked = spec.parse(text.replace('"1cm", 0.1', "0.1"), "steep.toml")
-    assert checked.sampling is not None
-    arguments = {name: value for name, value in checked.arguments().items() if name != "variables"}
-    whole = plan_samples(checked.sampling, **arguments).solve()
-    netcdf.write_statistics(checked, whole, tmp_path / "steep.nc", command="slipsweep run")
+    job = sweep_job(spec.parse(text.replace('"1cm", 0.1', "0.1"), "steep.toml"))
+    store.run(job, tmp_path / "steep.nc", command="slipsweep run")
+    whole = job.plan.solve()
     with Result(tmp_path / "steep.nc") as result:
         names = ["exceedance_probability", "displacement_quantile", "valueless_share"]
         table = result.select(names, {"amplitude": slice(None), "quantile": slice(None)}, {"frequency": 1})

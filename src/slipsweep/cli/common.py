@@ -4,18 +4,37 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from slipsweep.errors import InputError
 from slipsweep.model.variables import VALIDITY_TEXT
 
 if TYPE_CHECKING:
     from slipsweep.grid.tally import Tally
+    from slipsweep.runs.jobs import Job
+    from slipsweep.runs.store import Report
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
+
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with an interrupted run, from the blocks that it finished.")
+]
+Split = Annotated[bool, typer.Option("--split", help="Write a folder with a netCDF file for each block, not one file.")]
+Memory = Annotated[
+    str | None, typer.Option(metavar="SIZE", help="Most memory to take, like 512MiB or 2GB (default: 500 to 600 MB).")
+]
+Workers = Annotated[
+    int | None, typer.Option(metavar="N", help="Solve on N processes of this machine (needs the extra [cluster]).")
+]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Solve on the workers of the dask scheduler at HOST:PORT.")
+]
 
 
 def examples(*lines: str) -> str:
@@ -96,3 +115,52 @@ class Watch:
 
 def typed_command() -> str:
     return shlex.join(["slipsweep", *sys.argv[1:]])
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """How a run is carried out in blocks: the options of that name."""
+
+    overwrite: bool
+    resume: bool
+    split: bool
+    memory: str | None
+    workers: int | None
+    scheduler: str | None
+
+    def __post_init__(self) -> None:
+        if self.resume and self.overwrite:
+            raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
+
+    def given(self) -> list[str]:
+        """Options that only make sense with an output in blocks."""
+        others = {**asdict(self), "overwrite": None}
+        return [f"--{name}" for name, value in others.items() if value not in (None, False)]
+
+    def run(self, job: "Job", path: Path, quiet: bool, unit: str = "cells") -> "Report":
+        """Solve and write what a command asks for."""
+        from slipsweep.grid.resources import parse_size
+        from slipsweep.runs import solving, store
+
+        store.check_output(job, path, overwrite=self.overwrite or self.resume, split=self.split)
+        memory = None if self.memory is None else parse_size("--memory", self.memory)
+        with ExitStack() as stack:
+            solved: solving.Solved = solving.solve_here
+            shared = None
+            if self.workers is not None or self.scheduler is not None:
+                from slipsweep.runs.cluster import cluster
+
+                solved = stack.enter_context(cluster(workers=self.workers, scheduler=self.scheduler))
+                shared = solving.cells_shared(job.plan, self.workers)
+            return store.run(
+                job,
+                path,
+                command=typed_command(),
+                overwrite=self.overwrite,
+                resume=self.resume,
+                split=self.split,
+                block_cells=None if memory is None else solving.cells_within(memory, job.plan, self.workers or 0),
+                shared_cells=shared,
+                progress=stack.enter_context(progress_bar(job.plan.cells, quiet, unit)),
+                solved=solved,
+            )

@@ -1,12 +1,21 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, progress_bar, typed_command
+from slipsweep.cli.common import (
+    Blocks,
+    Memory,
+    Overwrite,
+    Quiet,
+    Resume,
+    Scheduler,
+    Split,
+    Workers,
+    progress_bar,
+)
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
@@ -16,7 +25,8 @@ if TYPE_CHECKING:
 
 EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
 
-_TITLE = "Amplitudes at which a tolerable displacement is reached"
+#: Endings of figures.
+_FIGURES = (".png", ".svg", ".pdf")
 
 
 def limit(
@@ -36,68 +46,78 @@ def limit(
         str | None, typer.Option(metavar="ACCELERATION", help="End of the search: 2g, 15 (m/s²).  [default: 5g]")
     ] = None,
     overwrite: Overwrite = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+    resume: Resume = False,
+    split: Split = False,
+    memory: Memory = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find the smallest amplitude that reaches a tolerable displacement, over all other axes of a sweep.
 
     Solved anew, to the last digit, not interpolated from the result.
     """
-    writers: dict[str, Callable[[Table, Path, bool, tuple[str, ...]], None]] = {
-        ".nc": _write_netcdf,
-        **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
-    }
-    paths = output or []
-    for path in paths:
-        if path.suffix not in writers:
-            raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
+    blocks = Blocks(overwrite, resume, split, memory, workers, scheduler)
+    results: list[Path] = []
+    figures: list[Path] = []
+    for path in output or []:
+        if path.suffix in _FIGURES:
+            figures.append(path)
+        elif path.suffix == ".nc" or (split and not path.suffix):
+            results.append(path)
+        else:
+            raise InputError(f"{path}: the name must end in one of {', '.join(('.nc', *_FIGURES))}")
+    if len(results) > 1:
+        raise InputError(f"{results[1]}: a second netCDF output, beside {results[0]}; give one")
+    for option in blocks.given() if not results else []:
+        raise InputError(f"{option}: needs -o OUT.nc, whose blocks are solved and written one after the other")
 
     from slipsweep.files import outputs, spec
+    from slipsweep.runs.jobs import limit_job
 
     checked = spec.load(sweep)
-    if checked.record is not None:
-        raise InputError(
-            f"{sweep}: excitation.record: limit looks for the amplitude of a harmonic motion; "
-            "of a record sweep the scale"
-        )
-    outputs.check_outputs(paths, overwrite, reads=checked.files)
-    given = _arguments(checked, displacement, maximum_amplitude)
+    outputs.check_outputs(figures, overwrite, reads=checked.files)
+    job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
+    if results:
+        from slipsweep.runs.store import stored_table
 
-    from slipsweep.studies.limits import limit_table
-
-    cells = checked.cells // checked.shape.get("amplitude", checked.shape.get("displacement_amplitude", 1))
-    with progress_bar(cells * len(displacement), quiet) as progress:
-        table = limit_table(**given, progress=progress)
-    labels = checked.labels if "case" in table.sizes else ()
-    for path in paths:
-        writers[path.suffix](table, path, overwrite, labels)
+        report = blocks.run(job, results[0], quiet)
+        # all of it for a figure only
+        names = job.plan.names if figures else () if quiet else ("limit_amplitude", "limit_status")
+        table = stored_table(job.plan, report.path, report.block_cells, names)
+    else:
+        with job.named(), progress_bar(job.plan.cells, quiet) as progress:
+            table = job.plan.solve(progress)
+    for path in figures:
+        _write_figure(table, path, overwrite, job.labels)
     if not quiet:
         _summarize(table)
-        for path in paths:
+        for path in output or []:
             typer.echo(path)
 
 
-def _arguments(sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None) -> dict[str, Any]:
-    """Arguments of `limit_table`: those of the sweep but for the amplitude and the time stepping."""
+def _asked(
+    sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None
+) -> tuple[float | list[float], float | None]:
+    """Tolerable displacements and the end of the search, in SI units."""
+    from slipsweep.model.parameters import check_values
     from slipsweep.model.units import quantity
 
-    if sweep.sampling is not None:
-        raise InputError(f"{sweep.source}: has uncertain inputs; limits are those of a sweep without [uncertainty]")
-    skipped = ("amplitude", "displacement_amplitude", "solver", "variables")
-    given = {name: value for name, value in sweep.arguments().items() if name not in skipped}
     g = sweep.model.g
-    lengths = [quantity("--displacement", text, "displacement_amplitude", g) for text in displacement]
+    lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
+    check_values("displacement", lengths, "--displacement")
+    highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "amplitude", g)
     # one is one number; several are a dimension, in order and without repetition
-    given["displacement"] = lengths[0] if len(lengths) == 1 else sorted(set(lengths))
-    if maximum_amplitude is not None:
-        given["maximum_amplitude"] = quantity("--maximum-amplitude", maximum_amplitude, "amplitude", g)
-    return given
+    return (lengths if len(displacement) > 1 else lengths[0]), highest
 
 
 def _summarize(table: "Table") -> None:
     import numpy as np
 
+    from slipsweep.grid.resources import grid_text
+
     limits, status = table["limit_amplitude"], table["limit_status"].values
-    grid = " x ".join(f"{size} {dim}" for dim, size in limits.sizes.items()) or "one cell"
+    grid = grid_text(limits.sizes) or "one cell"
     typer.echo(f"{limits.values.size} limits ({grid})")
     g = float(table.attrs["g"])
     found = limits.values[~np.isnan(limits.values)]
@@ -109,12 +129,6 @@ def _summarize(table: "Table") -> None:
         share = np.count_nonzero(status == one) / status.size
         if share:
             typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
-
-
-def _write_netcdf(table: "Table", path: Path, overwrite: bool, labels: tuple[str, ...]) -> None:
-    from slipsweep.files import netcdf
-
-    netcdf.write_table(table, path, title=_TITLE, command=typed_command(), overwrite=overwrite, labels=labels)
 
 
 def _write_figure(table: "Table", path: Path, overwrite: bool, labels: tuple[str, ...]) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import complete_or_absent, writing
-from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode
 from slipsweep.motion.records import Record
@@ -107,16 +107,40 @@ def _provenance(history: str) -> dict[str, str]:
     return {"Conventions": "CF-1.11", "history": history}
 
 
-def write_head(file: netCDF4.Dataset, spec: SweepSpec, table: Table, labels: tuple[str, ...], history: str) -> None:
-    """Write all of a sweep's file but its results."""
-    _define(file, table, spec.dtype)
-    _label_cases(file, labels)
-    _describe(file, {**table.attrs, "title": spec.output.title, **_provenance(history), "sweep": spec.text})
+@dataclass(frozen=True)
+class Head:
+    """What a file says beside its results.
+
+    Attributes
+    ----------
+    title : str
+    labels : tuple of str
+        Names of the cases.
+    record : Record, optional
+        The motion that the results are the response to: its samples are written with them.
+    sweep : str, optional
+        The text of a sweep file, from which the run can be repeated.
+    """
+
+    title: str
+    labels: tuple[str, ...] = ()
+    record: Record | None = None
+    sweep: str | None = None
+
+
+def write_head(
+    file: netCDF4.Dataset, head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]], history: str
+) -> None:
+    """Write all of a file but its results."""
+    _define(file, table, dtype)
+    _label_cases(file, head.labels)
+    sweep = {} if head.sweep is None else {"sweep": head.sweep}
+    _describe(file, {**table.attrs, "title": head.title, **_provenance(history), **sweep})
     file.set_auto_maskandscale(False)
     for name, coordinate in table.coords.items():
         file[name][...] = coordinate.values
-    if spec.record is not None:
-        _embed(file, spec.record)
+    if head.record is not None:
+        _embed(file, head.record)
 
 
 def _embed(file: netCDF4.Dataset, record: Record) -> None:
@@ -166,29 +190,10 @@ def write_table(
         new_file(temporary, path) as file,
         writing(path),
     ):
-        _define(file, table, lambda name: table[name].values.dtype)
-        _label_cases(file, labels)
-        _describe(file, {**table.attrs, "title": title, **_provenance(history_of(command))})
-        file.set_auto_maskandscale(False)
-        for name, array in {**table.coords, **table.data_vars}.items():
-            file[name][...] = array.values
-        if record is not None:
-            _embed(file, record)
-
-
-def write_statistics(spec: SweepSpec, table: Table, path: Path, *, command: str, overwrite: bool = False) -> None:
-    """Write the statistics of a sweep with uncertain inputs: with its text, so that it can be repeated from them."""
-    with (
-        complete_or_absent(path, overwrite) as temporary,
-        new_file(temporary, path) as file,
-        writing(path),
-    ):
-        write_head(file, spec, table, spec.labels, history_of(command))
+        head = Head(title, labels, record)
+        write_head(file, head, table, lambda name: table[name].values.dtype, history_of(command))
         for name, array in table.data_vars.items():
-            try:
-                file[name][...] = rounded(name, array.values, spec.dtype(name))
-            except TooLarge as large:
-                raise InputError(f"{spec.source}: {large}") from None
+            file[name][...] = array.values
 
 
 def without_time_axis(table: Table) -> Table:

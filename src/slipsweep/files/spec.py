@@ -6,10 +6,10 @@ know of another, turn axes into arrays and convert their units.  Every refusal i
 `InputError` of one line, ``FILE: key = VALUE: what is allowed``.
 """
 
-import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
@@ -28,12 +28,10 @@ from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import show, unit_factor
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
-    DIMENSION_ORDER,
     DRAWN,
     PARAMETERS,
     RECORD_RESULTS,
     RECORD_SAMPLES,
-    RESULT_DTYPES,
     RESULTS,
 )
 from slipsweep.motion.reading import Reading
@@ -41,7 +39,7 @@ from slipsweep.motion.records import Record, read_record
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.plans import Plan
+    from slipsweep.grid.plans import AnyPlan
     from slipsweep.studies.uncertainty import Sampling
 
 Floats = NDArray[np.float64]
@@ -256,53 +254,69 @@ class SweepSpec:
         """The recorded motion, where the shaking is one."""
         return self.excitation if isinstance(self.excitation, Record) else None
 
-    @property
-    def shape(self) -> dict[str, int]:
-        """Dimensions in the order of the results, and their lengths."""
-        lengths = {p.dim: p.values.size for p in self.parameters.values() if p.dim is not None}
-        return {dim: lengths[dim] for dim in (*DIMENSION_ORDER, "case") if dim in lengths}
-
-    @property
-    def cells(self) -> int:
-        """Number of cells of the grid."""
-        return math.prod(self.shape.values())
-
-    def dtype(self, variable: str) -> np.dtype[Any]:
-        """Data type of a result in the file."""
-        return np.dtype(RESULT_DTYPES.get(variable, self.output.dtype))
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all results, uncompressed."""
-        return self.cells * sum(self.dtype(name).itemsize for name in self.output.variables)
-
     def with_solver(self, solver: Solver) -> "SweepSpec":
         """Return the same sweep under another solver."""
         return replace(self, solver=solver)
 
-    def plan(self, block: Mapping[str, slice] | None = None) -> "Plan":
-        """Return what is to be solved for a part of the grid (as in `arguments`) or for all of it."""
-        from slipsweep.studies.sweeps import plan_of  # imports numba: not for sweeps that are only looked at
+    def plan(self) -> "AnyPlan":
+        """Return what the sweep file asks for: a sweep, or the statistics of samples.
 
-        return plan_of(**self.arguments(block))
-
-    def arguments(self, block: Mapping[str, slice] | None = None) -> dict[str, Any]:
-        """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.grid.plans.plan_sweep`).
-
-        Parameters
-        ----------
-        block : mapping of dimension to slice, optional
-            The part of the grid that is wanted; dimensions not named are taken whole.
+        Raises
+        ------
+        InputError
+            What only the plan can know is not allowed.
         """
-        block = block or {}
+        # these import numba, and scipy: not for sweeps that are only looked at
+        with self._named():
+            if self.sampling is None:
+                from slipsweep.studies.sweeps import plan_of
+
+                return plan_of(**self.arguments())
+            from slipsweep.studies.uncertainty import plan_samples
+
+            return plan_samples(self.sampling, **self._arguments_but("variables"))
+
+    def limits(self, displacement: float | list[float], maximum_amplitude: float | None = None) -> "AnyPlan":
+        """Return the plan of `slipsweep.limit_amplitude` over all axes but the amplitude, by the cycle solver.
+
+        Raises
+        ------
+        InputError
+            As `plan`; or it is no sweep of which there are limits.
+        """
+        with self._named():
+            if self.record is not None:
+                raise InputError(
+                    "excitation.record: limit looks for the amplitude of a harmonic motion; of a record sweep the scale"
+                )
+            if self.sampling is not None:
+                raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
+            from slipsweep.studies.limits import plan_limits
+
+            given = self._arguments_but("amplitude", "displacement_amplitude", "solver", "variables")
+            return plan_limits(displacement=displacement, maximum_amplitude=maximum_amplitude, **given)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Name the file in front of what is not allowed."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.source}: {error}") from None
+
+    def _arguments_but(self, *names: str) -> dict[str, Any]:
+        return {name: value for name, value in self.arguments().items() if name not in names}
+
+    def arguments(self) -> dict[str, Any]:
+        """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.grid.plans.plan_sweep`)."""
         arguments: dict[str, Any] = {}
         for name, (dim, values) in self.parameters.items():
             if dim is None:
                 arguments[name] = float(values)
             elif dim == name:
-                arguments[name] = values[block.get(dim, slice(None))]
+                arguments[name] = values
             else:
-                arguments[name] = Variable((dim,), values[block.get(dim, slice(None))])
+                arguments[name] = Variable((dim,), values)
         return arguments | {
             "excitation": self.excitation,
             "model": self.model,

@@ -2,23 +2,25 @@
 
 A plan holds the checked options, the coordinates, and the tasks that give the results:
 one for the motion, one for the friction parameters, which have no frequency dimension.
-A task can be cut into parts; solved at once or part by part, it gives the same bits.
+A plan can be cut into parts; solved at once or part by part, it gives the same bits.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
+from slipsweep.grid.blocks import Block, places
 from slipsweep.grid.engine import MOTION_RESULTS, Problem
-from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.options import MODELS, SOLVERS, Cycle
+from slipsweep.grid.tally import Tally
+from slipsweep.model.options import MODELS, SOLVERS, Cycle, Step
 from slipsweep.model.parameters import BOUNDS, check_choices, check_given, check_progress, check_values, number_text
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
@@ -42,6 +44,53 @@ _FRICTION_INPUTS = (
 )  # fmt: skip
 
 Arrays = dict[str, np.ndarray]
+
+#: Cells of the cycle solver that a cell of a record takes, about.
+_RECORD_COST = 200
+
+
+class AnyPlan(Protocol):
+    """What every study is, and all that it takes to carry it out in blocks: a grid, and results over it."""
+
+    @property
+    def sizes(self) -> Mapping[str, int]:
+        """Dimensions of the grid in the order of the results, and their lengths."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Results in the order of the table."""
+
+    @property
+    def cells(self) -> int:
+        """What there is to solve, in what `progress` counts."""
+
+    @property
+    def cost(self) -> float:
+        """What a cell of the grid takes, in cells of the cycle solver."""
+
+    @property
+    def together(self) -> Sequence[str]:
+        """Dimensions along which a part of the grid takes about as much as all of it: to be cut last."""
+
+    @property
+    def memory(self) -> int:
+        """Bytes that solving takes beside the results, however small the grid."""
+
+    @property
+    def cell_memory(self) -> int:
+        """Bytes for each cell of the grid that it takes beside them."""
+
+    def empty(self) -> Table:
+        """The results with their dimensions and coordinates but no values: zeros that take no memory."""
+
+    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
+        """Compute everything at once; `progress` and `empty` as in `engine.solve`."""
+
+    def part(self, block: Block) -> "AnyPlan":
+        """The plan of a part of the grid, which gives the same bits as the whole does there."""
+
+    def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
+        """Modes and flags in a block of results."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +148,10 @@ class Plan:
         Results in the order they are returned in.
     attrs : dict
         What the results say of themselves.
+    cost, together, cell_memory
+        As in `AnyPlan`.
+    described : mapping of str to dict
+        Attributes of the results.
     """
 
     sizes: dict[str, int]
@@ -106,9 +159,35 @@ class Plan:
     tasks: tuple[Task, ...]
     names: tuple[str, ...]
     attrs: dict[str, Any]
+    cost: float = 1.0
+    together: tuple[str, ...] = ()
+    cell_memory: int = 0
+    described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: RESULTS | RECORD_RESULTS)
+
+    #: Slabs of friction parameters, say: nothing beside what a program takes.
+    memory = 0
 
     def __post_init__(self) -> None:
         check_dimensions(self.sizes, self.coords, self.names)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the grid."""
+        return math.prod(self.sizes.values())
+
+    def part(self, block: Block) -> "Plan":
+        """The plan cut to a block of its grid."""
+        tasks = tuple(task.part(tuple(places(block, task.sizes).values())) for task in self.tasks)
+        sizes = {dim: cut.stop - cut.start for dim, cut in places(block, self.sizes).items()}
+        return replace(
+            self, sizes=sizes, coords={name: one.cut(block) for name, one in self.coords.items()}, tasks=tasks
+        )
+
+    def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
+        """Modes and flags in a block of results."""
+        tally = Tally()
+        tally.add(results)
+        return tally
 
     def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
         """Compute everything at once; `progress` and `empty` as in `engine.solve`.
@@ -122,7 +201,12 @@ class Plan:
         sizes: dict[str, int] = max(
             (task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()), default={}
         )
-        check_memory(sizes, sum(task.nbytes for task in self.tasks))
+        cells = math.prod(sizes.values())
+        check_memory(
+            f"grid of {grid_text(sizes)}, {cells:.4g} cells",
+            sum(task.nbytes for task in self.tasks) + cells * self.cell_memory,
+            _ADVICE,
+        )
         for task in self.tasks:
             for kernel in engine.kernels_of(task.solver, task.problem):
                 kernel.expect()
@@ -140,9 +224,8 @@ class Plan:
 
     def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> Table:
         """The results, with `evaluate` giving a task's arrays."""
-        described = RESULTS | RECORD_RESULTS
         found = {
-            name: Variable(tuple(task.sizes), values, described[name])
+            name: Variable(tuple(task.sizes), values, self.described[name])
             for task in self.tasks
             for name, values in evaluate(task).items()
         }
@@ -203,6 +286,7 @@ def plan_sweep(
         tuple(tasks),
         tuple(name for name in wanted if name in motion + friction + amplitude),
         about("Permanent displacement of a rigid block, swept", problem),
+        cost_of(problem),
     )
 
 
@@ -319,16 +403,14 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
 
 
-def check_memory(sizes: Mapping[str, int], needed: int) -> None:
-    """Refuse what memory cannot hold, before any of it is taken."""
-    free = available_memory()
-    if free is not None and needed > free:
-        grid = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
-        raise InputError(
-            f"grid of {grid}: {math.prod(sizes.values()):.4g} cells take {size_text(needed)}, but {size_text(free)} "
-            "of memory is free; ask for fewer variables or cells, or give chunks= for a lazy result"
-        )
+def cost_of(problem: Problem) -> float:
+    """What a cell takes, in cells of the cycle solver."""
+    if isinstance(problem.excitation, Record):
+        return _RECORD_COST
+    return 1.0 + problem.solver.steps_per_cycle / 16 if isinstance(problem.solver, Step) else 1.0
 
+
+_ADVICE = "ask for fewer variables or cells, or give chunks= for a lazy result"
 
 _SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 

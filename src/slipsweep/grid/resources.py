@@ -1,6 +1,7 @@
 """What the machine has left, and how to say sizes."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from slipsweep.errors import InputError
@@ -14,6 +15,24 @@ def available_memory() -> int | None:
         return None
     fields = dict(line.split(":", 1) for line in lines)
     return int(fields["MemAvailable"].split()[0]) * 1024 if "MemAvailable" in fields else None
+
+
+def check_memory(what: str, needed: int, advice: str) -> None:
+    """Refuse what memory cannot hold, before any of it is taken.
+
+    Raises
+    ------
+    InputError
+        Naming what takes how much, and what to do about it.
+    """
+    free = available_memory()
+    if free is not None and needed > free:
+        raise InputError(f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}")
+
+
+def grid_text(sizes: Mapping[str, int]) -> str:
+    """A grid in words, such as "2 theta x 10 amplitude"; nothing of one without dimensions."""
+    return " x ".join(f"{size} {dim}" for dim, size in sizes.items())
 
 
 def size_text(size: float) -> str:

@@ -1,6 +1,6 @@
 """Blocks of a sweep solved by the workers of a dask.distributed cluster.
 
-The client (this process) sends the parameters of a block, a few kilobytes, and gets its results
+The client (this process) sends the plan of a block, a few kilobytes, and gets its results
 back as plain arrays; it alone writes the file, so that workers need no shared folder.  A task
 runs on a thread of its worker, hence on one core (`slipsweep.grid.threads`): a worker with n threads
 solves n blocks at a time.  What a dead worker had is solved again by another.
@@ -9,7 +9,7 @@ solves n blocks at a time.  What a dead worker had is solved again by another.
 import importlib.util
 import itertools
 import logging
-import math
+import pickle
 import queue
 import signal
 import time
@@ -19,12 +19,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.blocks import Block
+from slipsweep.grid.plans import AnyPlan
 from slipsweep.grid.tables import Table
 from slipsweep.runs.parts import installation
 from slipsweep.runs.solving import Progress, Solved
-from slipsweep.studies.sweeps import plan_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -80,11 +79,11 @@ def cluster(
     with ExitStack() as stack:
 
         def solved(
-            spec: SweepSpec, blocks: Mapping[int, Block], progress: Progress | None = None
+            plan: AnyPlan, blocks: Mapping[int, Block], progress: Progress | None = None
         ) -> Iterator[tuple[int, Table]]:
             if blocks:
                 client, name = _connect(stack, workers, scheduler)
-                yield from _Run(client, name, patience).solve(spec, blocks, progress)
+                yield from _Run(client, name, patience).solve(plan, blocks, progress)
 
         yield solved
 
@@ -159,13 +158,14 @@ def _close(client: "Client") -> None:
         client.close(timeout=_SILENCE)
 
 
-def _solve(client: dict[str, str], arguments: dict[str, Any]) -> Table:
-    """Solve one block, on a worker."""
+def _solve(client: dict[str, str], part: bytes) -> Table:
+    """Solve one block, on a worker: its plan, which only the same installation can read."""
     if client != installation():  # a worker that came after `_check_installations`
         from distributed import get_worker
 
         raise RunError(_mismatch(get_worker().address, installation(), client))
-    return plan_of(**arguments).solve()
+    plan: AnyPlan = pickle.loads(part)
+    return plan.solve()
 
 
 def _mismatch(worker: str, found: dict[str, str] | None, client: dict[str, str]) -> str:
@@ -186,7 +186,7 @@ class _Run:
         self.finished: queue.SimpleQueue[Future] = queue.SimpleQueue()
 
     def solve(
-        self, spec: SweepSpec, blocks: Mapping[int, Block], progress: Progress | None
+        self, plan: AnyPlan, blocks: Mapping[int, Block], progress: Progress | None
     ) -> Iterator[tuple[int, Table]]:
         """Yield blocks as they come back; a bounded number of them is under way."""
         self._wait_for_workers()
@@ -195,8 +195,9 @@ class _Run:
         pending: dict[Any, tuple[int, int]] = {}  # by key of the task: the block's number and its cells
         while True:
             for number, block in itertools.islice(remaining, max(0, _AHEAD * self.threads - len(pending))):
-                future = self._submit(spec.arguments(block))
-                pending[future.key] = number, math.prod(cut.stop - cut.start for cut in block.values())
+                part = plan.part(block)
+                future = self._submit(pickle.dumps(part))
+                pending[future.key] = number, part.cells
                 future.add_done_callback(self.finished.put)
                 del future  # the workers may forget a block once it is here
             if not pending:
@@ -212,12 +213,12 @@ class _Run:
             yield number, results
             del results
 
-    def _submit(self, arguments: dict[str, Any]) -> "Future":
+    def _submit(self, part: bytes) -> "Future":
         with warnings.catch_warnings():
             # scattering large [[cases]] instead would lose them with the worker that has them
             warnings.filterwarnings("ignore", "Sending large graph")
             try:
-                return self.client.submit(_solve, installation(), arguments, pure=False)
+                return self.client.submit(_solve, installation(), part, pure=False)
             except Exception as error:
                 raise self._lost() from error
 

@@ -37,7 +37,6 @@ from numpy.typing import NDArray
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.outputs import sync
-from slipsweep.files.spec import SweepSpec
 from slipsweep.jit import sources
 from slipsweep.runs.placed import Layout
 
@@ -50,14 +49,10 @@ _BLOCK = re.compile(r"block-\d{6,}\.(nc|tmp)")
 _LINE = re.compile(r"(\d+) ([0-9a-f]+)\n")
 
 
-def identity(spec: SweepSpec, split: bool) -> dict[str, Any]:
-    """What two runs must have in common for one to go on with the blocks of the other."""
-    record = spec.record
-    samples = {} if record is None else {"times": record.times, "acceleration": record.acceleration}
+def identity(asked: Mapping[str, Any], split: bool) -> dict[str, Any]:
+    """What two runs must have in common for one to go on with the blocks of the other; `asked` as in `jobs.Job`."""
     return {
-        "sweep file": spec.text,
-        **({"record": checksum(samples)} if samples else {}),
-        "solver": repr(spec.solver),
+        **asked,
         "--split": split,
         "checksums": "XXH3-128",
         **installation(),
@@ -71,6 +66,7 @@ def installation() -> dict[str, str]:
         "slipsweep sources": sources.keys().results,
         "numpy version": version("numpy"),
         "numba version": version("numba"),
+        "scipy version": version("scipy"),  # which draws uncertain inputs
     }
 
 
@@ -122,8 +118,12 @@ class Manifest:
                 continue
             if name == "sweep file":
                 return f"the sweep file differs: {_first_difference(str(value), other[name])}"
-            return f"{name} was {value}, is {other.get(name)}"
+            return f"{name} was {_shown(value)}, is {_shown(other.get(name))}"
         return None
+
+
+def _shown(value: object) -> str:
+    return "not given" if value is None else str(value)
 
 
 def _first_difference(before: str, after: str) -> str:

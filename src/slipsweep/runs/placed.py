@@ -11,10 +11,12 @@ they took 0.1 s of it, at the disk's own 2.4 GB/s (``python -m benchmarks.large_
 """
 
 import errno
+import itertools
+import math
 import mmap
 import os
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +27,8 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from slipsweep.files.netcdf import new_file, write_head
-from slipsweep.files.spec import SweepSpec
+from slipsweep.files.netcdf import Head, new_file, write_head
+from slipsweep.grid.blocks import places
 from slipsweep.grid.tables import Table
 
 #: What is written directly begins and ends at multiples of this, in the file and in memory: as much as any disk asks.
@@ -59,8 +61,8 @@ class Layout:
     nbytes: int
 
 
-def make_file(path: Path, spec: SweepSpec, table: Table, labels: tuple[str, ...], history: str) -> Layout:
-    """Make a sweep's file with all but the results in it, and room for those.
+def make_file(path: Path, head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]], history: str) -> Layout:
+    """Make a file with all but the results in it, and room for those.
 
     Raises
     ------
@@ -70,7 +72,7 @@ def make_file(path: Path, spec: SweepSpec, table: Table, labels: tuple[str, ...]
         The netCDF library did not store a result as it was told to.
     """
     with new_file(path, path) as file:
-        write_head(file, spec, table, labels, history)
+        write_head(file, head, table, dtype, history)
         for name in table.data_vars:
             # the first value that is written makes room for all
             file[name][(-1,) * file[name].ndim or ...] = 0
@@ -79,7 +81,7 @@ def make_file(path: Path, spec: SweepSpec, table: Table, labels: tuple[str, ...]
         for name in table.data_vars:
             stored = file[name]
             offset, length = stored.id.get_offset(), stored.id.get_storage_size()
-            if offset is None or length != stored.size * spec.dtype(name).itemsize or not stored.dtype.isnative:
+            if offset is None or length != stored.size * dtype(name).itemsize or not stored.dtype.isnative:
                 raise RuntimeError(f"{name} is not stored as one run of its values")
             offsets[name], lengths[name] = offset, length
     return Layout(offsets, lengths, path.stat().st_size)
@@ -110,23 +112,26 @@ def _between(path: Path, layout: Layout) -> Iterator[tuple[str | None, bytes]]:
         yield None, file.read(layout.nbytes - at)
 
 
-def run_of(block: Mapping[str, slice], sizes: Mapping[str, int]) -> tuple[int, int]:
-    """First value of a block in a result of these dimensions, and how many there are.
+def runs_of(block: Mapping[str, slice], sizes: Mapping[str, int]) -> tuple[list[int], int]:
+    """Where a block's values lie in a result of these dimensions: the first of each run of values, and its length.
 
-    Raises
-    ------
-    ValueError
-        The values do not follow one another; those of `blocks.grid_blocks` do.
+    Blocks that are whole along the last dimensions, as `blocks.grid_blocks` cuts them where no others are to be kept
+    together, are one run.
     """
-    first, count, stride = 0, 1, 1
+    parts = places(block, sizes)
+    strides = dict(zip(sizes, [math.prod([*sizes.values()][at + 1 :]) for at in range(len(sizes))], strict=True))
+    count, inner = 1, True
+    starts: list[Iterable[int]] = []
     for dim in reversed(list(sizes)):
-        part, length = block[dim], sizes[dim]
-        if count < stride and part.stop - part.start > 1:
-            raise ValueError(f"{block} is more than one run of {sizes}")
-        first += part.start * stride
-        count *= part.stop - part.start
-        stride *= length
-    return first, count
+        part, stride = parts[dim], strides[dim]
+        if inner:
+            starts.append([part.start * stride])
+            count *= part.stop - part.start
+            # what lies before a dimension that is cut is no longer next to it
+            inner = part.stop - part.start == sizes[dim]
+        else:
+            starts.append(range(part.start * stride, part.stop * stride, stride))
+    return [sum(corner) for corner in itertools.product(*reversed(starts))], count
 
 
 def open_directly(path: Path) -> int | None:
@@ -170,19 +175,27 @@ class PlacedFile:
         """Give the file its size again: zeros where its end was cut off."""
         self.file.truncate(self.layout.nbytes)
 
-    def read(self, name: str, first: int, count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
-        """Values of a result, from its value number `first` on."""
-        values = np.empty(count, dtype)
-        left = values.data.cast("B")
-        self.file.seek(self.layout.offsets[name] + first * dtype.itemsize)
-        while left and (got := self.file.readinto(left)):
-            left = left[got:]
+    def read(self, name: str, runs: tuple[list[int], int], dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Values of a result, where they lie as `runs_of` says."""
+        firsts, count = runs
+        values = np.empty(len(firsts) * count, dtype)
+        for number, first in enumerate(firsts):
+            left = values[number * count : (number + 1) * count].data.cast("B")
+            self.file.seek(self.layout.offsets[name] + first * dtype.itemsize)
+            while left and (got := self.file.readinto(left)):
+                left = left[got:]
         return values
 
-    def write(self, name: str, first: int, values: NDArray[Any]) -> None:
-        """Write values of a result, from its value number `first` on."""
+    def write(self, name: str, runs: tuple[list[int], int], values: NDArray[Any]) -> None:
+        """Write values of a result to where they lie."""
+        firsts, count = runs
+        rows = np.ascontiguousarray(values).reshape(len(firsts), count)
+        for first, row in zip(firsts, rows, strict=True):
+            self._write_run(name, first, row)
+
+    def _write_run(self, name: str, first: int, values: NDArray[Any]) -> None:
         at = self.layout.offsets[name] + first * values.itemsize
-        content = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+        content = values.view(np.uint8)
         begin, end = -at % _SECTOR, content.size - (at + content.size) % _SECTOR
         if self.direct is None or end - begin < _LEAST:
             self._write(at, content)

@@ -1,4 +1,4 @@
-"""How large the blocks of a sweep are, and how they are solved in this process."""
+"""How large the blocks of a run are, and how they are solved in this process."""
 
 import itertools
 import math
@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.files.spec import SweepSpec
-from slipsweep.grid import blocks as grid
-from slipsweep.grid.blocks import Block, block_lengths
+from slipsweep.grid import blocks
+from slipsweep.grid.blocks import Block
+from slipsweep.grid.plans import AnyPlan
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table
-from slipsweep.model.variables import RESULT_DTYPES
 
 #: Called with a number of cells just solved, from any thread.
 Progress: TypeAlias = Callable[[int], None]
@@ -22,11 +21,7 @@ Progress: TypeAlias = Callable[[int], None]
 #: What solves blocks, given with their numbers: yields each with its number, in any order.
 #: A block's results are let go of before the next is asked for, but for one: whose memory may be
 #: used for those of the next but one.
-Solved: TypeAlias = Callable[[SweepSpec, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
-
-#: As `blocks.BLOCK_CELLS`, of a record: a cell takes some hundreds of times as long, and no more than seconds
-#: of work are to be lost with a block.
-RECORD_BLOCK_CELLS = 20_000
+Solved: TypeAlias = Callable[[AnyPlan, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
 
 #: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
 #: 469 MB, of which 96 MB were its blocks.
@@ -36,41 +31,47 @@ _BASE_MEMORY = 400_000_000
 _WORKER_MEMORY = 250_000_000
 
 #: Blocks for each worker process of a cluster, so that all end at about the same time, where
-#: that leaves blocks of this many cells at least: tens of milliseconds of work, against the
-#: two that a block takes on its way.
+#: that leaves blocks of this much work at least, in cells of the cycle solver: tens of
+#: milliseconds, against the two that a block takes on its way.
 _BLOCKS_A_WORKER = 16
-_LEAST_CELLS = {"record": 1_000, "step": 10_000, "cycle": 500_000}
+_LEAST_WORK = 500_000
 
 #: Processes reckoned with where a scheduler has them.
 _UNKNOWN_WORKERS = 64
 
 
-def default_cells(spec: SweepSpec) -> int:
-    """Return how many cells of a sweep are solved and written at a time if nothing else is asked for."""
-    return grid.BLOCK_CELLS if spec.record is None else RECORD_BLOCK_CELLS
+def default_cells(plan: AnyPlan) -> int:
+    """Return how many cells are solved and written at a time if nothing else is asked for.
+
+    No more than seconds of work are to be lost with a block.
+    """
+    return max(1, int(blocks.BLOCK_CELLS / plan.cost))
 
 
-def block_memory(spec: SweepSpec, most: int) -> int:
+def block_memory(plan: AnyPlan, most: int) -> int:
     """Return the memory that blocks of at most `most` cells take, in bytes.
 
     Two are there at a time, one being solved and one being written, with 8 bytes a cell
     for conversion and counting.
     """
-    return math.prod(block_lengths(spec.shape, most).values()) * _cell_memory(spec)
+    lengths = blocks.block_lengths(plan.sizes, most, plan.together)
+    return plan.memory + math.prod(lengths.values()) * _cell_memory(plan)
 
 
-def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
+def cells_within(memory: int, plan: AnyPlan, workers: int = 0) -> int:
     """Return how many cells a block may have for a run to stay within `memory` bytes.
 
     With `workers` processes beside this one, of which each has a block being solved and two
-    waiting or on their way, that is the memory of all together.
+    waiting or on their way, that is the memory of all together.  Where a cell takes more work than
+    one of the cycle solver, blocks are no larger than `default_cells`, however much memory there is.
 
     Raises
     ------
     InputError
         Not even a small block fits.
     """
-    base, cell = _BASE_MEMORY + workers * _WORKER_MEMORY, _cell_memory(spec, 2 + 3 * workers)
+    base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
+    cell = _cell_memory(plan, 2 + 3 * workers)
     cells = (memory - base) // cell
     if cells < 1000:
         least = base + 1000 * cell
@@ -78,29 +79,33 @@ def cells_within(memory: int, spec: SweepSpec, workers: int = 0) -> int:
         shown = size_text(math.ceil(least / digits) * digits)
         with_workers = f" with --workers {workers}" if workers else ""
         raise InputError(f"--memory = {size_text(memory)}: must be {shown} at least{with_workers}")
-    return cells
+    return cells if plan.cost <= 1.0 else min(cells, default_cells(plan))
 
 
-def cells_shared(spec: SweepSpec, workers: int | None) -> int:
-    """Return how many cells a block should have for workers to share a sweep evenly (None: a number unknown)."""
-    solver = "record" if spec.record is not None else spec.solver.name
-    share = spec.cells // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
-    return min(default_cells(spec), max(_LEAST_CELLS[solver], share))
+def cells_shared(plan: AnyPlan, workers: int | None) -> int:
+    """Return how many cells a block should have for workers to share a run evenly (None: a number unknown)."""
+    share = math.prod(plan.sizes.values()) // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
+    return min(default_cells(plan), max(math.ceil(_LEAST_WORK / plan.cost), share))
 
 
-def _cell_memory(spec: SweepSpec, blocks: int = 2) -> int:
-    return blocks * sum(np.dtype(RESULT_DTYPES.get(name, "f8")).itemsize for name in spec.output.variables) + 8
+def _cell_memory(plan: AnyPlan, count: int = 2) -> int:
+    """Bytes that a cell of the grid takes in so many blocks."""
+    own = (
+        result.values.dtype.itemsize * math.prod(size for dim, size in result.sizes.items() if dim not in plan.sizes)
+        for result in plan.empty().data_vars.values()
+    )
+    return count * sum(own) + plan.cell_memory + 8
 
 
 def solve_here(
-    spec: SweepSpec, blocks: Mapping[int, Block], progress: Progress | None = None
+    plan: AnyPlan, missing: Mapping[int, Block], progress: Progress | None = None
 ) -> Iterator[tuple[int, Table]]:
     """Solve blocks one after the other in this process.
 
     Parameters
     ----------
-    spec : SweepSpec
-    blocks : mapping of int to Block
+    plan : AnyPlan
+    missing : mapping of int to Block
         The blocks to solve, by their numbers.
     progress : callable, optional
 
@@ -111,8 +116,8 @@ def solve_here(
         one is asked for, whose arrays take their memory.
     """
     # one set of arrays is being written while the other is solved into
-    for (number, block), memory in zip(blocks.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
-        yield number, spec.plan(block).solve(progress, memory.rewound().empty)
+    for (number, block), memory in zip(missing.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
+        yield number, plan.part(block).solve(progress, memory.rewound().empty)
 
 
 class _Memory:

@@ -13,7 +13,7 @@ import math
 import shutil
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -28,14 +28,14 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import TooLarge, history_of, rounded
 from slipsweep.files.outputs import appear, check_outputs, sync, writing
-from slipsweep.files.results import stored_tally
-from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.blocks import Block, block_lengths, grid_blocks
-from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.blocks import Block, block_lengths, grid_blocks, places
+from slipsweep.grid.plans import AnyPlan
+from slipsweep.grid.resources import available_memory, grid_text, size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.runs import parts
-from slipsweep.runs.placed import PlacedFile, file_checksum, make_file, run_of
+from slipsweep.runs.jobs import Job
+from slipsweep.runs.placed import PlacedFile, file_checksum, make_file, runs_of
 from slipsweep.runs.solving import Progress, Solved, block_memory, default_cells, solve_here
 
 #: Seconds after which what is written is brought to the disk itself.
@@ -47,14 +47,14 @@ class Report:
     """What `run` did."""
 
     path: Path
-    shape: dict[str, int]
+    block_cells: int
     seconds: float
     nbytes: int
     tally: Tally
 
 
 def run(
-    spec: SweepSpec,
+    job: Job,
     path: Path,
     *,
     command: str,
@@ -66,14 +66,14 @@ def run(
     progress: Progress | None = None,
     solved: Solved = solve_here,
 ) -> Report:
-    """Compute a sweep and write it as netCDF, complete or not at all.
+    """Solve a plan and write its results as netCDF, complete or not at all.
 
     Finished blocks of a run that failed or was killed are kept beside the output
     (`slipsweep.runs.parts`).
 
     Parameters
     ----------
-    spec : SweepSpec
+    job : Job
     path : Path
         The file to write, or the folder (`split`).
     command : str
@@ -109,9 +109,9 @@ def run(
         Writing failed, memory ran out, or another run is writing `path`.  A note tells how many
         blocks are kept.
     """
-    parts_path = parts.Folder(path).path
-    check_outputs([path], overwrite or resume, reads=spec.files, folder=split, work=parts_path)
-    identity = parts.identity(spec, split)
+    check_output(job, path, overwrite=overwrite or resume, split=split)
+    plan = job.plan
+    identity = parts.identity(job.asked, split)
     with parts.opened(path) as work:
         if not overwrite:
             work.read()
@@ -127,33 +127,36 @@ def run(
             if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
                 # killed between giving the output its name and clearing the folder away
                 work.done = True
-                return Report(path, spec.shape, 0.0, _nbytes(path), stored_tally(path))
+                tally = Tally(plan.cells)
+                for block, arrays in stored_blocks(plan, path, block_cells):
+                    _count(tally, plan, block, arrays)
+                return Report(path, block_cells, 0.0, _nbytes(path), tally)
         else:
             work.clear()
-            block_cells = min(filter(None, (block_cells, shared_cells)), default=default_cells(spec))
+            block_cells = min(filter(None, (block_cells, shared_cells)), default=default_cells(plan))
         # once more: a run that was writing it may have ended before this one got hold of the lock
-        check_outputs([path], overwrite, reads=spec.files, folder=split)
+        check_outputs([path], overwrite, reads=job.files, folder=split)
         data = work.data(split)
-        _check_size(spec, path, block_cells, _nbytes(data))
+        _check_size(job, path, block_cells, _nbytes(data))
 
         started = time.perf_counter()
-        tally = Tally(spec.cells)
-        cut = dict(enumerate(grid_blocks(spec.shape, block_cells)))
+        tally = Tally(plan.cells)
+        cut = dict(enumerate(grid_blocks(plan.sizes, block_cells, plan.together)))
         try:
             manifest = work.manifest or parts.Manifest(identity, block_cells, overwrite, history_of(command))
-            with closing((_Files if split else _OneFile)(spec, data, manifest)) as target:
+            with closing((_Files if split else _OneFile)(job, data, manifest)) as target:
                 _ready(work, target, cut, tally, progress)
                 missing = {number: block for number, block in cut.items() if number not in work.finished}
-                _write_blocks(work, target, cut, solved(spec, missing, progress), tally)
+                _write_blocks(work, target, cut, _named(job, solved(plan, missing, progress)), tally)
                 target.check(len(cut))
             with writing(path):
                 work.close()
                 appear(data, path, overwrite)
         except TooLarge as large:
             work.clear()  # no --resume could finish it
-            raise InputError(f"{spec.source}: {large}") from None
+            raise InputError(f"{job.source}: {large}") from None
         except MemoryError:
-            error = RunError(f"{path}: out of memory at a block of {_block_text(spec, block_cells)}")
+            error = RunError(f"{path}: out of memory at a block of {_block_text(plan, block_cells)}")
             raise _noted(error, work, data, len(cut)) from None
         except BaseException as error:
             if isinstance(error, RunError):
@@ -161,7 +164,71 @@ def run(
             _noted(error, work, data, len(cut))
             raise
         work.done = True
-    return Report(path, spec.shape, time.perf_counter() - started, _nbytes(path), tally)
+    return Report(path, block_cells, time.perf_counter() - started, _nbytes(path), tally)
+
+
+def check_output(job: Job, path: Path, *, overwrite: bool, split: bool) -> None:
+    """Refuse an output that cannot be, before anything is computed for it."""
+    check_outputs([path], overwrite, reads=job.files, folder=split, work=parts.Folder(path).path)
+
+
+def stored_blocks(plan: AnyPlan, path: Path, block_cells: int) -> Iterator[tuple[Block, dict[str, NDArray[Any]]]]:
+    """Read a result as it was written: blocks, and the arrays of their results."""
+    sizes = {name: result.sizes for name, result in plan.empty().data_vars.items()}
+    cut = grid_blocks(plan.sizes, block_cells, plan.together)
+    if path.is_dir():
+        for number, block in enumerate(cut):
+            with _opened(path / _block_name(number)) as file:
+                yield block, {name: np.asarray(file[name][...]) for name in sizes}
+        return
+    with _opened(path) as file:
+        for block in cut:
+            yield (
+                block,
+                {
+                    name: np.asarray(file[name][tuple(places(block, own).values()) or ...])
+                    for name, own in sizes.items()
+                },
+            )
+
+
+def stored_table(plan: AnyPlan, path: Path, block_cells: int, names: Collection[str]) -> Table:
+    """Read some results of a plan that were written as `run` told."""
+    table = plan.empty()
+    found = {
+        name: replace(one, values=np.empty(one.values.shape, one.values.dtype))
+        for name, one in table.data_vars.items()
+        if name in names
+    }
+    for block, arrays in stored_blocks(plan, path, block_cells) if found else ():
+        for name, one in found.items():
+            one.values[tuple(places(block, one.sizes).values())] = arrays[name]
+    return Table(table.coords, found, table.attrs)
+
+
+def _opened(path: Path) -> Any:
+    file = open_netcdf(path)
+    file.set_auto_maskandscale(False)
+    return file
+
+
+def _named(job: Job, found: Iterator[tuple[int, Table]]) -> Iterator[tuple[int, Table]]:
+    with job.named():
+        yield from found
+
+
+def _count(tally: Tally, plan: AnyPlan, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Count a block, but for what other blocks along a dimension that a result lacks have as well."""
+    whole = plan.empty().data_vars
+    tally.merge(
+        plan.tally(
+            {
+                name: values
+                for name, values in arrays.items()
+                if not any(part.start for dim, part in block.items() if dim not in whole[name].dims)
+            }
+        )
+    )
 
 
 def _check_same(work: parts.Folder, identity: Mapping[str, Any], block_cells: int | None) -> None:
@@ -197,9 +264,9 @@ def _ready(
             arrays = target.find(number, cut[number], work.finished[number])
             if arrays is not None:
                 kept[number] = work.finished[number]
-                tally.add(arrays)
+                _count(tally, target.job.plan, cut[number], arrays)
                 if progress is not None:
-                    progress(math.prod(part.stop - part.start for part in cut[number].values()))
+                    progress(target.job.plan.part(cut[number]).cells)
     with writing(work.output):
         if kept:
             work.keep(kept)
@@ -229,9 +296,9 @@ def _write_blocks(
         nonlocal syncing, synced
         with writing(work.output):
             arrays = {
-                name: rounded(name, result.values, target.spec.dtype(name)) for name, result in table.data_vars.items()
+                name: rounded(name, result.values, target.job.dtype(name)) for name, result in table.data_vars.items()
             }
-            counted = counter.submit(tally.add, arrays)
+            counted = counter.submit(_count, tally, target.job.plan, cut[number], arrays)
             work.check()
             work.add(number, target.write(number, cut[number], table, arrays))
             if time.monotonic() - synced >= _SYNC_SECONDS:
@@ -262,9 +329,9 @@ def _write_blocks(
 class _OneFile:
     """All blocks in one netCDF file, each in its place."""
 
-    def __init__(self, spec: SweepSpec, data: Path, manifest: parts.Manifest) -> None:
-        self.spec, self.data, self.manifest = spec, data, manifest
-        self.table = spec.plan().empty()
+    def __init__(self, job: Job, data: Path, manifest: parts.Manifest) -> None:
+        self.job, self.data, self.manifest = job, data, manifest
+        self.table = job.plan.empty()
         self.file: PlacedFile | None = None
 
     def close(self) -> None:
@@ -275,7 +342,8 @@ class _OneFile:
 
     def create(self) -> None:
         """Make the file, with all but the blocks in it."""
-        layout = make_file(self.data, self.spec, self.table, self.spec.labels, self.manifest.history)
+        head = replace(self.job.head, labels=self.job.labels)
+        layout = make_file(self.data, head, self.table, self.job.dtype, self.manifest.history)
         self.manifest.layout, self.manifest.head = layout, file_checksum(self.data, layout)
         sync(self.data)
         self.file = PlacedFile(self.data, layout)
@@ -299,9 +367,9 @@ class _OneFile:
         assert self.file is not None
         arrays = {}
         for name, result in self.table.data_vars.items():
-            shape = [block[dim].stop - block[dim].start for dim in result.dims]
+            shape = [part.stop - part.start for part in places(block, result.sizes).values()]
             try:
-                values = self.file.read(name, *run_of(block, result.sizes), self.spec.dtype(name))
+                values = self.file.read(name, runs_of(block, result.sizes), self.job.dtype(name))
             except OSError:  # a sector that cannot be read; that the file can was seen when it was opened
                 return None
             arrays[name] = values.reshape(shape)
@@ -311,7 +379,7 @@ class _OneFile:
         """Write a block, with its values as they are to be stored; return what is to go on record."""
         assert self.file is not None
         for name, result in self.table.data_vars.items():
-            self.file.write(name, run_of(block, result.sizes)[0], arrays[name])
+            self.file.write(name, runs_of(block, result.sizes), arrays[name])
         return parts.checksum(arrays)
 
     def check(self, blocks: int) -> None:
@@ -328,8 +396,8 @@ class _OneFile:
 class _Files:
     """A folder with a netCDF file for each block, complete by itself."""
 
-    def __init__(self, spec: SweepSpec, data: Path, manifest: parts.Manifest) -> None:
-        self.spec, self.data, self.manifest = spec, data, manifest
+    def __init__(self, job: Job, data: Path, manifest: parts.Manifest) -> None:
+        self.job, self.data, self.manifest = job, data, manifest
         self.unsynced: deque[Path] = deque()
 
     def close(self) -> None:
@@ -353,14 +421,13 @@ class _Files:
             raise  # no damage
         except OSError:
             return None
-        with open_netcdf(self._name(number)) as file:
-            file.set_auto_maskandscale(False)
-            return {name: np.asarray(file[name][...]) for name in self.spec.output.variables}
+        with _opened(self._name(number)) as file:
+            return {name: np.asarray(file[name][...]) for name in self.job.plan.names}
 
     def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
         """Write a block, with its values as they are to be stored; return what is to go on record."""
         coords = dict(table.coords)
-        labels = self.spec.labels
+        labels = self.job.labels
         if "case" in block:
             # files are put together by the coordinates of their dimensions, which rows of [[cases]] lack
             rows = np.arange(block["case"].start, block["case"].stop, dtype=np.int32) + 1
@@ -368,11 +435,12 @@ class _Files:
             labels = labels[block["case"]]
         path = self._name(number)
         temporary = path.with_suffix(".tmp")
-        layout = make_file(temporary, self.spec, replace(table, coords=coords), labels, self.manifest.history)
+        head = replace(self.job.head, labels=labels)
+        layout = make_file(temporary, head, replace(table, coords=coords), self.job.dtype, self.manifest.history)
         file = PlacedFile(temporary, layout)
         try:
             for name, values in arrays.items():
-                file.write(name, 0, values)
+                file.write(name, ([0], values.size), values)
         finally:
             file.close()
         temporary.replace(path)
@@ -392,7 +460,11 @@ class _Files:
         sync(self.data)
 
     def _name(self, number: int) -> Path:
-        return self.data / f"block-{number:06}.nc"
+        return self.data / _block_name(number)
+
+
+def _block_name(number: int) -> str:
+    return f"block-{number:06}.nc"
 
 
 def _removed(path: Path) -> RunError:
@@ -406,24 +478,27 @@ def _nbytes(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
-def _check_size(spec: SweepSpec, path: Path, block_cells: int, written: int) -> None:
+def _check_size(job: Job, path: Path, block_cells: int, written: int) -> None:
     """Refuse a grid whose file cannot fit on the disk, or whose blocks cannot fit in memory."""
+    plan = job.plan
+    results = plan.empty().data_vars
+    nbytes = sum(result.values.size * job.dtype(name).itemsize for name, result in results.items())
     free = shutil.disk_usage(path.parent).free
-    if spec.nbytes > free + written:
+    if nbytes > free + written:
         raise InputError(
-            f"{spec.source}: a grid of {spec.cells:.3g} cells makes {size_text(spec.nbytes)}, but {path.parent} has "
-            f"{size_text(free)} free: take coarser axes, fewer output.variables, "
+            f"{job.source}: a grid of {math.prod(plan.sizes.values()):.3g} cells makes {size_text(nbytes)}, but "
+            f"{path.parent} has {size_text(free)} free: take coarser axes, fewer output.variables, "
             'output.dtype = "float32" or another disk'
         )
     memory = available_memory()
-    needed = block_memory(spec, block_cells)
+    needed = block_memory(plan, block_cells)
     if memory is not None and needed > memory:
         raise InputError(
-            f"{spec.source}: blocks of {_block_text(spec, block_cells)} need {size_text(needed)} of memory, "
+            f"{job.source}: blocks of {_block_text(plan, block_cells)} need {size_text(needed)} of memory, "
             f"but {size_text(memory)} is free: close other programs or take fewer output.variables"
         )
 
 
-def _block_text(spec: SweepSpec, block_cells: int) -> str:
-    lengths = block_lengths(spec.shape, block_cells)
-    return f"{math.prod(lengths.values())} cells ({' x '.join(f'{n} {dim}' for dim, n in lengths.items())})"
+def _block_text(plan: AnyPlan, block_cells: int) -> str:
+    lengths = block_lengths(plan.sizes, block_cells, plan.together)
+    return f"{math.prod(lengths.values())} cells ({grid_text(lengths)})"

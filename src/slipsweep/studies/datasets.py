@@ -23,7 +23,7 @@ from slipsweep.model.variables import PARAMETERS, RESULT_DTYPES, STATISTIC_COORD
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies.history import history_table
-from slipsweep.studies.limits import AMPLITUDE_STEPS, limit_table
+from slipsweep.studies.limits import AMPLITUDE_STEPS, plan_limits
 from slipsweep.studies.sweeps import plan_of
 
 #: What a caller may give for a parameter.
@@ -270,16 +270,16 @@ def limit_amplitude(
         As `sweep`; or a displacement or a maximum amplitude that is not positive.
     """
     given = _inputs(locals())
-    table = limit_table(
+    plan = plan_limits(
         **_plain(given),
         displacement=_plain({"displacement": displacement})["displacement"],
         excitation=excitation,
         model=model,
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,
-        progress=progress,
     )
-    return _dataset(table, _brought(given, table.coords, table.data_vars))
+    brought = _brought(given, plan.coords, plan.names)
+    return _dataset(plan.solve(progress), brought)
 
 
 def sample(

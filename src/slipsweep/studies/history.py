@@ -8,7 +8,7 @@ import numpy as np
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.plans import check_problem, plan_sweep
-from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
@@ -106,9 +106,4 @@ def _phases(points: int, cycles: int, after: float) -> np.ndarray:
 def _check_memory(samples: int) -> None:
     """Refuse what memory cannot hold: the table, its columns apart, phases and times."""
     needed = samples * 8 * (2 * len(HISTORY) + 2)
-    free = available_memory()
-    if free is not None and needed > free:
-        raise InputError(
-            f"a history of {samples:.4g} points takes {size_text(needed)}, but {size_text(free)} of memory is free; "
-            "take fewer cycles or points_per_cycle, or give times"
-        )
+    check_memory(f"a history of {samples:.4g} points", needed, "take fewer cycles or points_per_cycle, or give times")

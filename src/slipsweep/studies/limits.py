@@ -10,6 +10,8 @@ cycle solver, for all cells at once.
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,10 +21,9 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.blocks import slabs
 from slipsweep.grid.engine import Problem
-from slipsweep.grid.plans import check_dimensions, plan_sweep
-from slipsweep.grid.resources import available_memory, size_text
-from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import check_progress, check_single, check_values, check_whole, number_text
+from slipsweep.grid.plans import Plan, plan_sweep
+from slipsweep.grid.tables import Variable
+from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (
     LIMIT_RESULTS,
     MAXIMUM_AMPLITUDE_IN_G,
@@ -38,6 +39,11 @@ Floats = NDArray[np.float64]
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 512
 
+#: What a limit takes beside its block's scan, in cells of the cycle solver: the bisection, and a scan's scaling.
+_COST = 100.0
+
+TITLE = "Amplitudes at which a tolerable displacement is reached"
+
 #: Displacements scanned together: 16 MB, and as much again to compare them.
 _SCANNED = 2_000_000
 
@@ -48,15 +54,14 @@ JUMP = 1e-6
 _SCALES = ("frequency", "structure_frequency")
 
 
-def limit_table(
+def plan_limits(
     *,
     displacement: Any,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
-    progress: Callable[[int], None] | None = None,
     **given: Any,
-) -> Table:
-    """Limit amplitudes; keyword arguments, results and errors of `slipsweep.limit_amplitude`.
+) -> Plan:
+    """Plan of limit amplitudes; keyword arguments, results and errors of `slipsweep.limit_amplitude`.
 
     Arrays with dimensions of their own are `Variable`.
     """
@@ -78,84 +83,87 @@ def limit_table(
     if maximum_amplitude is None:
         maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.model.g
     highest = check_single("maximum_amplitude", maximum_amplitude)
-    check_progress(progress)
-    check_dimensions(plan.sizes, {}, {*LIMIT_RESULTS, "sliding_mode", "validity"})
-    _check_memory(plan.sizes)
-
-    arrays = dict(task.inputs)
-    targets = arrays.pop("amplitude")
-    shape = tuple(plan.sizes.values())
-    found = solve(task.problem, shape, arrays, targets, highest, steps, progress)
+    inputs = dict(task.inputs)
+    inputs["displacement"] = inputs.pop("amplitude")
+    _, scaling = _groups(inputs, len(plan.sizes))
+    dims = tuple(plan.sizes)
     coords = {name: variable for name, variable in plan.coords.items() if name != "amplitude"}
-    return Table(
-        {**coords, "displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
-        {
-            name: Variable(tuple(plan.sizes), found[name], LIMIT_RESULTS.get(name) or RESULTS[name])
-            for name in (*LIMIT_RESULTS, "sliding_mode", "validity")
-        },
-        plan.attrs
-        | {
-            "title": "Amplitudes at which a tolerable displacement is reached",
-            "maximum_amplitude": highest,
-            "amplitude_steps": steps,
-        },
+    names = (*LIMIT_RESULTS, "sliding_mode", "validity")
+    return Plan(
+        plan.sizes,
+        coords | {"displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
+        (replace(task, solver=partial(solve, highest, steps), names=names, inputs=inputs),),
+        names,
+        {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
+        # a scan serves a block for all that is asked of it
+        cost=max(1.0, steps / math.prod(plan.sizes[dims[axis]] for axis in scaling)) + _COST,
+        together=tuple(dims[axis] for axis in scaling),
+        # inputs laid out over the grid, and transposed copies
+        cell_memory=60,
+        described=RESULTS | LIMIT_RESULTS,
     )
 
 
+def _groups(inputs: Mapping[str, Floats], dimensions: int) -> tuple[list[int], list[int]]:
+    """Dimensions along which blocks differ, and those along which only what is asked of them does."""
+    blocks = [values.shape for name, values in inputs.items() if name not in (*_SCALES, "displacement")]
+    moving = [axis for axis in range(dimensions) if any(own[axis] > 1 for own in blocks)]
+    return moving, [axis for axis in range(dimensions) if axis not in moving]
+
+
 def solve(
+    maximum_amplitude: float,
+    steps: int,
     problem: Problem,
     shape: tuple[int, ...],
     arrays: Mapping[str, Floats],
-    displacement: Floats,
-    maximum_amplitude: float,
-    steps: int = AMPLITUDE_STEPS,
+    wanted: tuple[str, ...],
     progress: Callable[[int], None] | None = None,
+    empty: engine.Empty = np.empty,
 ) -> dict[str, NDArray[Any]]:
     """Find the limit amplitudes of a grid.
 
     Parameters
     ----------
+    maximum_amplitude : float
+        Where the scan ends, m/s².
+    steps : int
+        Steps of the scan.
     problem : Problem
         Options common to all cells.
     shape : tuple of int
         Shape of the results.
     arrays : mapping of str to array
-        Inputs of `engine.solve` but for the amplitude, laid out as there.
-    displacement : array
-        What is to be reached, m, laid out in the same way.
-    maximum_amplitude : float
-        Where the scan ends, m/s².
-    steps : int
-        Steps of the scan.
-    progress : callable, optional
-        Called with a number of result cells as they are finished.
+        Inputs of `engine.solve` but for the amplitude, laid out as there, and the `displacement`
+        that is to be reached, m.
+    wanted : tuple of str
+        Variables of `slipsweep.limit_amplitude`.
+    progress, empty : callable
+        As in `engine.solve`.
 
     Returns
     -------
     dict of str to ndarray
-        Arrays of `shape`: the variables of `slipsweep.limit_amplitude`.
+        Arrays of `shape`.
     """
-    inputs = {**arrays, "displacement": displacement}
-    blocks = [values.shape for name, values in arrays.items() if name not in _SCALES]
-    moving = [axis for axis in range(len(shape)) if any(own[axis] > 1 for own in blocks)]
-    scaling = [axis for axis in range(len(shape)) if axis not in moving]
+    moving, scaling = _groups(arrays, len(shape))
     # two dimensions are enough: the blocks, and what is asked of each
     table = tuple(math.prod(shape[axis] for axis in group) for group in (moving, scaling))
-    rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in inputs.items()}
-    results = {
-        name: np.empty(table, RESULT_DTYPES.get(name, "float64"))
-        for name in ("limit_amplitude", "limit_status", "permanent_displacement", "sliding_mode", "validity")
-    }
+    rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in arrays.items()}
+    found = {name: np.empty(table, RESULT_DTYPES.get(name, "float64")) for name in wanted}
     for slab in slabs(table, max(1, _SCANNED // steps)):
-        part = engine.cut(rows, slab)
         cells = tuple(cut.stop - cut.start for cut in slab)
-        for name, values in _solve_slab(problem, cells, part, maximum_amplitude, steps).items():
-            results[name][slab] = values
+        solved = _solve_slab(problem, cells, engine.cut(rows, slab), maximum_amplitude, steps)
+        for name, values in found.items():
+            values[slab] = solved[name]
         if progress is not None:
             progress(math.prod(cells))
     order = [[*moving, *scaling].index(axis) for axis in range(len(shape))]
     sizes = [shape[axis] for axis in (*moving, *scaling)]
-    return {name: values.reshape(sizes).transpose(order).copy() for name, values in results.items()}
+    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    for name, values in results.items():
+        values[...] = found[name].reshape(sizes).transpose(order)
+    return results
 
 
 def _two_dimensional(values: Floats, shape: tuple[int, ...], groups: tuple[list[int], list[int]]) -> Floats:
@@ -298,15 +306,3 @@ def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]
     status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP
     status[np.isnan(below)] = LimitStatus.AFTER_GAP
     return status
-
-
-def _check_memory(sizes: Mapping[str, int]) -> None:
-    """Refuse what memory cannot hold: results, inputs laid out over the grid, and their transposed copies."""
-    cells = math.prod(sizes.values())
-    needed, free = cells * 80, available_memory()
-    if free is not None and needed > free:
-        grid = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
-        raise InputError(
-            f"grid of {grid}: {number_text(float(cells))} limits take {size_text(needed)}, but {size_text(free)} of "
-            "memory is free; ask for fewer cells"
-        )

@@ -12,7 +12,7 @@ import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
-from slipsweep.grid.plans import Plan, Task, about, aligned, check_inputs, check_problem, checked, grid_sizes
+from slipsweep.grid.plans import Plan, Task, about, aligned, check_inputs, check_problem, checked, cost_of, grid_sizes
 from slipsweep.grid.tables import Variable
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_choices, check_given, check_numbers, shown
@@ -43,7 +43,8 @@ def plan_record(
         inputs["scale"] = _scale(inputs.pop("amplitude"), excitation)
     sizes = grid_sizes(coords)
     task = Task(engine.solve_record, problem, wanted, sizes, aligned(inputs, sizes))
-    return Plan(sizes, coords, (task,), wanted, about("Response of a rigid block to a recorded motion", problem))
+    attrs = about("Response of a rigid block to a recorded motion", problem)
+    return Plan(sizes, coords, (task,), wanted, attrs, cost_of(problem))
 
 
 def _ordered(given: Mapping[str, Any]) -> dict[str, Any]:

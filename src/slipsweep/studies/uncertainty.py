@@ -7,9 +7,11 @@ its value at the grid point, or an offset to it.  u = W/ω²: where the samples 
 they are solved and sorted once, and quantiles and probabilities of all frequencies read off that.
 """
 
+import functools
 import itertools
 import json
 import math
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,10 +21,10 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, threads
-from slipsweep.grid.blocks import slabs
+from slipsweep.grid.blocks import Block, slabs
 from slipsweep.grid.engine import Problem
-from slipsweep.grid.plans import aligned, check_dimensions, grid_sizes, plan_sweep
-from slipsweep.grid.resources import available_memory, size_text
+from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes, plan_sweep
+from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.model.options import MODELS, Newmark
@@ -487,7 +489,13 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
 
 
 class SamplePlan:
-    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones."""
+    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
+
+    A plan as all others are (`plans.AnyPlan`); its parts have the draws of the whole.
+    """
+
+    names = tuple(_STATISTICS)
+    cell_memory = 0
 
     def __init__(
         self,
@@ -522,65 +530,107 @@ class SamplePlan:
         values = np.broadcast_to(frequency.values.transpose(axes).reshape(lengths), [self.sizes[dim] for dim in dims])
         self.frequency: Floats = values.reshape(shape)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # to another process goes what is drawn from, a few numbers, and not what was drawn
+        return _drawn_again, (self.sampling, self.problem, self.coords, self.attrs)
+
     @property
     def cells(self) -> int:
         """Number of samples to solve, of all grid points."""
         return math.prod(self.solved.values()) * self.sampling.samples
 
-    def solve(self, progress: Callable[[int], None] | None = None) -> Table:
-        """Solve the samples slab by slab, and reduce them to what `slipsweep.sample` returns.
+    @property
+    def cost(self) -> float:
+        """What a grid point takes, in cells of the cycle solver."""
+        return max(1.0, cost_of(self.problem) * self.sampling.samples / math.prod(self.scaled.values()))
 
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with a number of samples just solved, from any thread.
-        """
-        check_progress(progress)
+    @property
+    def together(self) -> tuple[str, ...]:
+        """Dimensions along which the same samples serve."""
+        return tuple(self.scaled)
+
+    @property
+    def memory(self) -> int:
+        """Bytes of the draws, while they are made, and of the samples that are solved together."""
+        samples, drawn = self.sampling.samples, len(self.draws)
+        return 24 * samples * drawn + self._points * samples * (8 * (2 + drawn) + 11)
+
+    @property
+    def _points(self) -> int:
+        """Grid points solved together."""
+        return max(_CELLS // self.sampling.samples, 1)
+
+    def part(self, block: Block) -> "SamplePlan":
+        """The plan cut to a block of its grid."""
+        coords = {name: one.cut(block) for name, one in self.coords.items()}
+        return SamplePlan(self.sampling, self.draws, self.problem, coords, self.attrs)
+
+    def empty(self) -> Table:
+        """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
+        return self._table(lambda shape, dtype: np.broadcast_to(np.zeros((), dtype), shape))
+
+    def _table(self, empty: engine.Empty) -> Table:
+        """The statistics, in arrays that `empty` makes."""
         coordinates: dict[str, NDArray[Any]] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,
             "mode": np.array([int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING], np.int8),
             "flag": np.array([int(flag) for flag in Validity], np.int16),
         }
-        shape, frequencies = tuple(self.solved.values()), self.frequency.shape[-1]
-        shapes = {
-            name: (*shape, *((frequencies,) if name in _BY_FREQUENCY else ()), *(coordinates[dim].size for dim in own))
-            for name, own in _STATISTICS.items()
-        }
-        points = max(_CELLS // self.sampling.samples, 1)
-        self._check_memory(8 * sum(map(math.prod, shapes.values())), points)
-        found = {name: np.empty(lengths) for name, lengths in shapes.items()}
-        for slab in slabs(shape, points):
-            where: Any = (*slab, ...)
-            reduced = self._reduce(self._solve(slab, progress), self.frequency[where].reshape(-1, frequencies))
-            for name, values in reduced.items():
-                found[name][where] = values.reshape([part.stop - part.start for part in slab] + [*values.shape[1:]])
-
-        # the scaled dimensions, one behind the other until here, to their places among the others
-        dims = (*self.solved, *self.scaled)
-        order = [dims.index(dim) for dim in self.sizes]
         results = {}
         for name, own in _STATISTICS.items():
-            values = found[name]
-            if name in _BY_FREQUENCY:
-                whole = values.reshape([*(self.sizes[dim] for dim in dims), *(coordinates[dim].size for dim in own)])
-                values = np.array(whole.transpose([*order, *range(len(dims), whole.ndim)]), order="C")
-            over = tuple(self.sizes) if name in _BY_FREQUENCY else tuple(self.solved)
-            results[name] = Variable((*over, *own), values, STATISTICS[name])
+            over = [dim for dim in self.sizes if name in _BY_FREQUENCY or dim in self.solved]
+            shape = (*(self.sizes[dim] for dim in over), *(coordinates[dim].size for dim in own))
+            results[name] = Variable((*over, *own), empty(shape, "float64"), STATISTICS[name])
         coords = {name: Variable((name,), values, STATISTIC_COORDINATES[name]) for name, values in coordinates.items()}
         return Table(self.coords | coords, results, self.attrs)
 
-    def _check_memory(self, results: int, points: int) -> None:
-        """Refuse what memory cannot hold: the results, the draws, and the samples of `points` grid points."""
-        samples, drawn = self.sampling.samples, len(self.draws)
-        needed = results + 24 * samples * drawn + points * samples * (8 * (2 + drawn) + 11)
-        free = available_memory()
-        if free is not None and needed > free:
-            grid = " x ".join(f"{size} {dim}" for dim, size in self.sizes.items()) or "one point"
-            raise InputError(
-                f"grid of {grid}, {samples} samples: takes {size_text(needed)}, but {size_text(free)} of memory is "
-                "free; ask for fewer samples, grid points, quantiles or thresholds"
+    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
+        """Solve the samples slab by slab, and reduce them to what `slipsweep.sample` returns.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with a number of samples just solved, from any thread.
+        empty : callable, optional
+            Makes the arrays of the statistics.
+        """
+        check_progress(progress)
+        samples = self.sampling.samples
+        check_memory(
+            f"grid of {grid_text(self.sizes) or 'one point'}, {samples} samples",
+            self.memory + sum(one.values.size * 8 for one in self.empty().data_vars.values()),
+            "ask for fewer samples, grid points, quantiles or thresholds",
+        )
+        table = self._table(empty)
+        # cells first, their frequencies after them, wherever these have their places among the others
+        order = [*self.solved, *self.scaled]
+        views = {
+            name: one.values.transpose(
+                [*(one.dims.index(dim) for dim in order if dim in one.dims), *map(one.dims.index, _STATISTICS[name])]
             )
+            for name, one in table.data_vars.items()
+        }
+        for slab in slabs(tuple(self.solved.values()), self._points):
+            where: Any = (*slab, ...)
+            frequencies = self.frequency[where].reshape(-1, self.frequency.shape[-1])
+            for name, values in self._reduce(self._solve(slab, progress), frequencies).items():
+                target = views[name][where]
+                target[...] = values.reshape(target.shape)
+        return table
+
+    def tally(self, results: Mapping[str, NDArray[Any]]) -> Tally:
+        """Samples by sliding mode and by flag, from their shares."""
+        shares = ("mode_share", "flag_share", "valueless_share")
+        if not {*shares} <= results.keys():
+            return Tally()
+        modes, flags, valueless = (
+            np.rint(results[name] * np.float64(self.sampling.samples)).astype(np.int64) for name in shares
+        )
+        known: list[SlidingMode] = [mode for mode in SlidingMode if mode is not SlidingMode.MISSING]
+        by_mode = dict(zip(known, modes.reshape(-1, len(known)).sum(0).tolist(), strict=True))
+        by_flag = dict(zip(Validity, flags.reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
+        return Tally(0, {SlidingMode.MISSING: int(valueless.sum()), **by_mode}, by_flag)
 
     def _solve(self, slab: tuple[slice, ...], progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
         """Displacement (at 1 Hz or, where it is drawn, at the frequency over the grid's), mode and flags of a slab."""
@@ -667,16 +717,18 @@ class SamplePlan:
         return found
 
 
-def tally(table: Table, samples: int) -> Tally:
-    """Count the samples of all grid points by sliding mode and by flag."""
-    modes, flags, valueless = (
-        np.rint(table[name].values * samples).astype(np.int64)
-        for name in ("mode_share", "flag_share", "valueless_share")
-    )
-    known: list[SlidingMode] = [mode for mode in SlidingMode if mode is not SlidingMode.MISSING]
-    by_mode = dict(zip(known, modes.reshape(-1, len(known)).sum(0).tolist(), strict=True))
-    by_flag = dict(zip(Validity, flags.reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
-    return Tally(valueless.size * samples, {SlidingMode.MISSING: int(valueless.sum()), **by_mode}, by_flag)
+def _drawn_again(
+    sampling: Sampling, problem: Problem, coords: dict[str, Variable], attrs: dict[str, Any]
+) -> SamplePlan:
+    """The plan that another process has sent."""
+    return SamplePlan(sampling, _draws_of(pickle.dumps(sampling)), problem, coords, attrs)
+
+
+@functools.lru_cache(maxsize=1)
+def _draws_of(sampling: bytes) -> dict[str, Floats]:
+    """Draws of a sampling that was sent: of one part after the other the same."""
+    sent: Sampling = pickle.loads(sampling)
+    return sent.draws()
 
 
 def _quantiles(ordered: Floats, wanted: Floats) -> Floats:

@@ -1,0 +1,100 @@
+"""What a run carries out and writes: a plan, and what its file says beside the results."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from slipsweep.errors import InputError
+from slipsweep.files.netcdf import Head
+from slipsweep.files.outputs import Read
+from slipsweep.files.spec import SweepSpec
+from slipsweep.grid.plans import AnyPlan
+from slipsweep.model.variables import RESULT_DTYPES
+from slipsweep.runs.parts import checksum
+
+
+@dataclass(frozen=True)
+class Job:
+    """A plan that is not made before it is needed, and what belongs to it.
+
+    Attributes
+    ----------
+    source : str
+        The sweep file, as the user named it.
+    files : tuple of Path or int
+        The files that were read for it.
+    make : callable
+        Makes the plan.
+    head : Head
+    floats : str
+        Data type of floating-point results in the file.
+    asked : dict of str to object
+        All that the results depend on, by what users know it by: numbers, text, lists of these.
+    """
+
+    source: str
+    files: tuple[Read, ...]
+    make: Callable[[], AnyPlan]
+    head: Head
+    floats: str
+    asked: dict[str, Any]
+
+    @cached_property
+    def plan(self) -> AnyPlan:
+        """What is to be solved."""
+        return self.make()
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the cases, where they are a dimension of the results."""
+        return self.head.labels if "case" in self.plan.sizes else ()
+
+    def dtype(self, name: str) -> np.dtype[Any]:
+        """Data type of a result in the file."""
+        return np.dtype(RESULT_DTYPES.get(name, self.floats))
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Name the sweep file in front of what turns out, while it is solved, not to be allowed."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.source}: {error}") from None
+
+
+def sweep_job(spec: SweepSpec) -> Job:
+    """The job of `slipsweep run`: a sweep, or the statistics of samples."""
+    head = Head(spec.output.title, spec.labels, spec.record, spec.text)
+    return Job(spec.source, spec.files, spec.plan, head, spec.output.dtype, _asked(spec, solver=repr(spec.solver)))
+
+
+def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None) -> Job:
+    """The job of `slipsweep limit`: limit amplitudes over all axes of a sweep but the amplitude.
+
+    Parameters
+    ----------
+    spec : SweepSpec
+    displacement : float or list of float
+        m, increasing.
+    maximum_amplitude : float, optional
+        m/s².
+    """
+    return Job(
+        spec.source,
+        spec.files,
+        lambda: spec.limits(displacement, maximum_amplitude),
+        Head("Amplitudes at which a tolerable displacement is reached", spec.labels),
+        "float64",  # a limit is exact to the last bit
+        {**_asked(spec), "--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
+    )
+
+
+def _asked(spec: SweepSpec, **options: str) -> dict[str, Any]:
+    record: Mapping[str, Any] = {}
+    if spec.record is not None:
+        record = {"record": checksum({"times": spec.record.times, "acceleration": spec.record.acceleration})}
+    return {"sweep file": spec.text, **record, **options}
