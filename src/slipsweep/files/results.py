@@ -56,6 +56,9 @@ _TEXTS = ("units", "long_name", "coordinates", "bounds", "flag_meanings")
 #: the file, which may be damaged.
 _TRIED_CELLS = 2**25
 
+#: Of them, those that are read in one step, with its limit of time: chunks of one cell take some microseconds each.
+_STEP_CELLS = 2**16
+
 #: Bytes from which on it is asked whether memory holds what is read.
 _LARGE = 100_000_000
 
@@ -87,7 +90,7 @@ def read_through(path: Path, next_step: Callable[[], None]) -> None:
     with ResultFile(path) as file:
         for variable in file.variables.values():
             left = _TRIED_CELLS if variable.is_text or not variable.in_one_piece else 0
-            for block in grid_blocks(variable.sizes, BLOCK_CELLS):
+            for block in grid_blocks(variable.sizes, _STEP_CELLS):
                 if left <= 0:
                     break
                 next_step()
