@@ -80,3 +80,18 @@ def test_on_the_command_line(tmp_path: Any) -> None:
             assert "Traceback" not in done.stderr
             assert "Warning" not in done.stderr
     assert (tmp_path / "newmark1e-7.csv").read_text().count("\n") < 512 * 111
+
+
+@pytest.mark.parametrize("solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"])
+@pytest.mark.parametrize(
+    "excitation",
+    [*(Sine(cycles, ramp) for cycles in (10, 23) for ramp in (0.3, 1.3, 2.0, 2.3)), Cosine(12)],
+    ids=str,
+)
+def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | Cosine, solver: Any) -> None:
+    """A block that does not recouple comes out of the first cycles in motion: its pulses repeat from that velocity."""
+    cell: dict[str, Any] = {"theta": 0, "mu_s": 0.4, "amplitude": 3, "frequency": 1, "yield_acceleration": 1e-3}
+    swept = slipsweep.sweep(**cell, excitation=excitation, solver=solver)
+    history = slipsweep.simulate(**cell, excitation=excitation)
+    assert int(swept.validity) & slipsweep.Validity.NOT_RECOUPLED
+    assert float(swept.permanent_displacement) == pytest.approx(float(history.relative_displacement[-1]), rel=1e-10)

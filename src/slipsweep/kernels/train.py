@@ -82,7 +82,8 @@ def train_of(
         now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0)
         velocity, displacement, peak = now.velocity, now.displacement, now.peak
         validity |= now.validity
-        seen_velocity, seen_displacement, seen_at, next_look = 0.0, 0.0, 0, 1
+        # what the cycles before the repeated one (a ramp, say) leave is the first velocity to come back to
+        seen_velocity, seen_displacement, seen_at, next_look = velocity, displacement, 0, 1
         done, left = 0, wave.repeats
         after = k
         while left > 0 and validity & NO_VALUE == 0:
