@@ -28,7 +28,7 @@ def rows_of(found: "dict[str, list[Comparison]]") -> list[list[object]]:
         times = [comparison.times_bound for comparison in comparisons]
         agreed = sum(one <= 1.0 for one in times)
         shown = (number(value, 2) for value in (median(differences), max(differences), max(times)))
-        rows.append([kind, len(times), agreed, *shown])
+        rows.append([kind.replace("_", " "), len(times), agreed, *shown])
     return rows
 
 

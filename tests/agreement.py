@@ -386,6 +386,10 @@ def _as_a_record(group: Group, exact: Exact) -> Iterator[Comparison]:
             # whose mode and whose stiffness a record does not say
             result["sliding_mode"] = own["sliding_mode"]
             result["validity"] |= own["validity"] & np.int16(Validity.FLEXIBLE_BLOCK)
+            if result["validity"] & own["validity"] & VALUELESS:
+                result["validity"] = own[
+                    "validity"
+                ]  # a record looks for no pulse's flags where one for all takes the value
             yield _judged("triangle as a record", group, exact, j, result)
 
 
