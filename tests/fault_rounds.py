@@ -12,9 +12,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -47,6 +50,30 @@ num = 10
 variables = ["permanent_displacement", "sliding_mode", "limiting_acceleration"]
 """
 
+#: The same grid, of which each point has samples.
+DRAWN = f"""{SWEEP.partition("[output]")[0]}
+[uncertainty]
+samples = 16
+[uncertainty.yield_acceleration]
+kind = "factor"
+distribution = "lognorm"
+s = 0.1
+"""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A command, the sweep file that it reads, and the work of its blocks, in cells of the cycle solver."""
+
+    text: str = SWEEP
+    command: tuple[str, ...] = ("run", "a.toml", "-q")
+    work: int | None = None
+
+
+SWEEPING = Asked()
+SAMPLES = Asked(DRAWN, work=2000)
+LIMITS = Asked(command=("limit", "a.toml", "-q", "-d", "1cm", "-d", "10cm", "-o", "a.nc"), work=40_000)
+
 #: Cells of a block: 600 blocks for runs that are killed, 60 for those whose blocks are damaged.
 SMALL, CELLS = 400, 4000
 
@@ -64,9 +91,9 @@ import sys
 from slipsweep.grid import blocks
 from slipsweep.runs import solving
 blocks.BLOCK_CELLS = int(sys.argv[1])
-solving.cells_shared = lambda *arguments: int(sys.argv[1])
+solving.cells_shared = lambda plan, workers: solving.default_cells(plan)
 from slipsweep.cli import main
-sys.exit(main(["run", "a.toml", "-q", *sys.argv[2:]]))
+sys.exit(main(sys.argv[2:]))
 """
 
 
@@ -111,10 +138,10 @@ def stopped(path: Path, after: int = 30, **options: Any) -> Path:
     return path.with_name(f"{path.name}.parts")
 
 
-def start(folder: Path, *options: str, cells: int = SMALL, **more: Any) -> "subprocess.Popen[str]":
-    """Start `slipsweep run` in small blocks as a process."""
-    (folder / "a.toml").write_text(SWEEP)
-    command = [sys.executable, "-c", _COMMAND, str(cells), *options]
+def start(folder: Path, *options: str, asked: Asked = SWEEPING, **more: Any) -> "subprocess.Popen[str]":
+    """Start a command in small blocks as a process."""
+    (folder / "a.toml").write_text(asked.text)
+    command = [sys.executable, "-c", _COMMAND, str(asked.work or SMALL), *asked.command, *options]
     return subprocess.Popen(
         command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, **more
     )  # fmt: skip
@@ -152,9 +179,9 @@ def held(process: "subprocess.Popen[str]") -> Iterator[None]:
         process.send_signal(signal.SIGCONT)
 
 
-def go_on(folder: Path, expected: Values, *options: str) -> None:
+def go_on(folder: Path, expected: Values, *options: str, asked: Asked = SWEEPING) -> None:
     """Go on to the end, undisturbed: the result is the undisturbed one, and nothing else is left."""
-    status, errors = ended(start(folder, "--resume", *options))
+    status, errors = ended(start(folder, "--resume", *options, asked=asked))
     # the run before may have been killed when all was done
     assert status == 0 or (status == 2 and "a.nc: exists already" in errors), errors
     assert values(folder / "a.nc") == expected
@@ -164,13 +191,15 @@ def go_on(folder: Path, expected: Values, *options: str) -> None:
 # ------------------------------------------------------------------------------------- killed
 
 
-def signalled(folder: Path, rng: random.Random, expected: Values, number: signal.Signals, *options: str) -> int:
+def signalled(
+    folder: Path, rng: random.Random, expected: Values, number: signal.Signals, *options: str, asked: Asked = SWEEPING
+) -> int:
     """End runs at random moments, three times in a row."""
     journal = folder / "a.nc.parts" / "journal"
     faults = 0
     for _ in range(3):
         before = journal.stat().st_mtime_ns if journal.exists() else None
-        process = start(folder, "--resume", *options)
+        process = start(folder, "--resume", *options, asked=asked)
 
         def begun(before: int | None = before) -> bool:
             if number == signal.SIGKILL:  # it may come at any moment
@@ -190,7 +219,7 @@ def signalled(folder: Path, rng: random.Random, expected: Values, number: signal
         faults += 1
         if number != signal.SIGKILL:
             assert errors.startswith("slipsweep: interrupted; "), (status, errors)
-    go_on(folder, expected)
+    go_on(folder, expected, asked=asked)
     return faults
 
 
@@ -202,6 +231,24 @@ def killed(folder: Path, rng: random.Random, expected: Values) -> int:
 def interrupted(folder: Path, rng: random.Random, expected: Values) -> int:
     """Ctrl-C or SIGTERM at random moments."""
     return signalled(folder, rng, expected, rng.choice([signal.SIGINT, signal.SIGTERM]))
+
+
+@cache
+def whole(asked: Asked) -> Values:
+    """What a command gives that nothing happens to."""
+    with tempfile.TemporaryDirectory() as folder:
+        assert ended(start(Path(folder), asked=replace(asked, work=10**9))) == (0, "")
+        return values(Path(folder) / "a.nc")
+
+
+def samples_killed(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Kill −9 at random moments, of statistics under uncertain inputs."""
+    return signalled(folder, rng, whole(SAMPLES), signal.SIGKILL, asked=SAMPLES)
+
+
+def limits_killed(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Kill −9 at random moments, of limit amplitudes."""
+    return signalled(folder, rng, whole(LIMITS), signal.SIGKILL, asked=LIMITS)
 
 
 def children(pid: int) -> list[int]:
@@ -452,6 +499,8 @@ def rival(folder: Path, rng: random.Random, expected: Values) -> int:
 #: Kinds of faults, in words.
 FAULTS: dict[str, Fault] = {
     "killed (SIGKILL) at a random moment": killed,
+    "the same of statistics under uncertain inputs": samples_killed,
+    "the same of limit amplitudes": limits_killed,
     "interrupted (SIGINT, SIGTERM) at a random moment": interrupted,
     "a worker of `--workers 2` killed": worker_killed,
     "a run with `--workers 2` killed": killed_with_workers,

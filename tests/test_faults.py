@@ -170,7 +170,7 @@ def test_blocks_of_a_version_with_other_checksums_are_refused(tmp_path: Path, un
     before = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
     with pytest.raises(InputError, match="holds 30 finished blocks of an interrupted run"):
         run(path)
-    with pytest.raises(InputError, match=r"cannot go on with the blocks in .*: checksums was None, is XXH3-128"):
+    with pytest.raises(InputError, match=r"cannot go on with the blocks in .*: checksums was none, is XXH3-128"):
         run(path, resume=True)
     assert before == {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
 

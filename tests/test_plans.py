@@ -20,8 +20,8 @@ from processes import slipsweep as command
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
+from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.blocks import block_lengths, grid_blocks, places
-from slipsweep.grid.plans import AnyPlan
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import Job, limit_job, sweep_job
 
@@ -176,8 +176,8 @@ def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
     stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 2, block_cells=6)
     for other, message in (
         (limit_job(sweep, 0.06), r"--displacement was 0\.05, is 0\.06"),
-        (limit_job(sweep, 0.05, 20.0), r"--maximum-amplitude was not given, is 20"),
-        (sweep_job(sweep), "--displacement was 0.05, is not given"),
+        (limit_job(sweep, 0.05, 20.0), r"--maximum-amplitude was none, is 20"),
+        (sweep_job(sweep), "--displacement was 0.05, is none"),
     ):
         with pytest.raises(InputError, match=message):
             store.run(other, tmp_path / "a.nc", command="x", resume=True)

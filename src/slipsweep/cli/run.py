@@ -59,7 +59,6 @@ def run(
     """Compute a sweep and write it to a netCDF file."""
     from slipsweep.files import spec
     from slipsweep.grid.resources import grid_text, size_text
-    from slipsweep.runs.jobs import sweep_job
 
     blocks = Blocks(overwrite, resume, split, memory, workers, scheduler)
     checked = spec.load(sweep)
@@ -73,6 +72,8 @@ def run(
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
     if split and output is None:
         path = path.with_suffix("")
+    from slipsweep.runs.jobs import sweep_job
+
     job = sweep_job(checked)
     watch = Watch()
     unit = "cells" if checked.sampling is None else "samples"

@@ -39,7 +39,7 @@ from slipsweep.motion.records import Record, read_record
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.plans import AnyPlan
+    from slipsweep.grid.anyplan import AnyPlan
     from slipsweep.studies.uncertainty import Sampling
 
 Floats = NDArray[np.float64]

@@ -17,6 +17,7 @@ from slipsweep.errors import RunError
 from slipsweep.grid import threads
 from slipsweep.grid.blocks import slabs
 from slipsweep.grid.served import check_served, is_ordinary
+from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Options
@@ -51,9 +52,6 @@ MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", *MOTION_CO
 RECORD_CODES = (*RECORD_COUNTS, "validity")
 
 Array = NDArray[np.float64]
-
-#: Makes the array of a result, of a shape and dtype: `np.empty`, or what hands out memory again.
-Empty = Callable[[tuple[int, ...], str], NDArray[Any]]
 
 
 @dataclass(frozen=True)

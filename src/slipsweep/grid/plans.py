@@ -6,9 +6,9 @@ A plan can be cut into parts; solved at once or part by part, it gives the same 
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from slipsweep.grid import engine
 from slipsweep.grid.blocks import Block, places
 from slipsweep.grid.engine import MOTION_RESULTS, Problem
 from slipsweep.grid.resources import check_memory, grid_text
-from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.model.options import MODELS, SOLVERS, Cycle, Step
 from slipsweep.model.parameters import BOUNDS, check_choices, check_given, check_progress, check_values, number_text
@@ -47,50 +47,6 @@ Arrays = dict[str, np.ndarray]
 
 #: Cells of the cycle solver that a cell of a record takes, about.
 _RECORD_COST = 200
-
-
-class AnyPlan(Protocol):
-    """What every study is, and all that it takes to carry it out in blocks: a grid, and results over it."""
-
-    @property
-    def sizes(self) -> Mapping[str, int]:
-        """Dimensions of the grid in the order of the results, and their lengths."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Results in the order of the table."""
-
-    @property
-    def cells(self) -> int:
-        """What there is to solve, in what `progress` counts."""
-
-    @property
-    def cost(self) -> float:
-        """What a cell of the grid takes, in cells of the cycle solver."""
-
-    @property
-    def together(self) -> Sequence[str]:
-        """Dimensions along which a part of the grid takes about as much as all of it: to be cut last."""
-
-    @property
-    def memory(self) -> int:
-        """Bytes that solving takes beside the results, however small the grid."""
-
-    @property
-    def cell_memory(self) -> int:
-        """Bytes for each cell of the grid that it takes beside them."""
-
-    def empty(self) -> Table:
-        """The results with their dimensions and coordinates but no values: zeros that take no memory."""
-
-    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
-        """Compute everything at once; `progress` and `empty` as in `engine.solve`."""
-
-    def part(self, block: Block) -> "AnyPlan":
-        """The plan of a part of the grid, which gives the same bits as the whole does there."""
-
-    def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
-        """Modes and flags in a block of results."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +79,7 @@ class Task:
             np.dtype(RESULT_DTYPES.get(name, "float64")).itemsize for name in self.names
         )
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Arrays:
+    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Arrays:
         """Compute the results; `progress` is told of cells as they are finished, `empty` makes the arrays."""
         return self.solver(self.problem, tuple(self.sizes.values()), self.inputs, self.names, progress, empty)
 
@@ -149,7 +105,7 @@ class Plan:
     attrs : dict
         What the results say of themselves.
     cost, together, cell_memory
-        As in `AnyPlan`.
+        As in `anyplan.AnyPlan`.
     described : mapping of str to dict
         Attributes of the results.
     """
@@ -189,7 +145,7 @@ class Plan:
         tally.add(results)
         return tally
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
+    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
         """Compute everything at once; `progress` and `empty` as in `engine.solve`.
 
         Raises

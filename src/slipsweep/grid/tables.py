@@ -4,11 +4,15 @@ xarray itself, with what it brings along, takes longer to import than most sweep
 run; the command line does without it.  The names here are its names.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+#: Makes the array of a result, of a shape and dtype: `np.empty`, or what hands out memory again.
+Empty = Callable[[tuple[int, ...], str], NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)

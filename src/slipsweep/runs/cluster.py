@@ -19,8 +19,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError, RunError
+from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.blocks import Block
-from slipsweep.grid.plans import AnyPlan
 from slipsweep.grid.tables import Table
 from slipsweep.runs.parts import installation
 from slipsweep.runs.solving import Progress, Solved

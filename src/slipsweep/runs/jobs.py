@@ -12,7 +12,7 @@ from slipsweep.errors import InputError
 from slipsweep.files.netcdf import Head
 from slipsweep.files.outputs import Read
 from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.plans import AnyPlan
+from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.model.variables import RESULT_DTYPES
 from slipsweep.runs.parts import checksum
 

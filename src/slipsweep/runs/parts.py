@@ -123,7 +123,7 @@ class Manifest:
 
 
 def _shown(value: object) -> str:
-    return "not given" if value is None else str(value)
+    return "none" if value is None else str(value)
 
 
 def _first_difference(before: str, after: str) -> str:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import blocks
+from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.blocks import Block
-from slipsweep.grid.plans import AnyPlan
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table
 

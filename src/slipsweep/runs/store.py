@@ -28,8 +28,8 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import TooLarge, history_of, rounded
 from slipsweep.files.outputs import appear, check_outputs, sync, writing
+from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.blocks import Block, block_lengths, grid_blocks, places
-from slipsweep.grid.plans import AnyPlan
 from slipsweep.grid.resources import available_memory, grid_text, size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.grid.tally import Tally

@@ -22,7 +22,7 @@ from slipsweep.grid import engine
 from slipsweep.grid.blocks import slabs
 from slipsweep.grid.engine import Problem
 from slipsweep.grid.plans import Plan, plan_sweep
-from slipsweep.grid.tables import Variable
+from slipsweep.grid.tables import Empty, Variable
 from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (
     LIMIT_RESULTS,
@@ -119,7 +119,7 @@ def solve(
     arrays: Mapping[str, Floats],
     wanted: tuple[str, ...],
     progress: Callable[[int], None] | None = None,
-    empty: engine.Empty = np.empty,
+    empty: Empty = np.empty,
 ) -> dict[str, NDArray[Any]]:
     """Find the limit amplitudes of a grid.
 

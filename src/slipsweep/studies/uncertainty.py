@@ -25,7 +25,7 @@ from slipsweep.grid.blocks import Block, slabs
 from slipsweep.grid.engine import Problem
 from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes, plan_sweep
 from slipsweep.grid.resources import check_memory, grid_text
-from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.model.options import MODELS, Newmark
 from slipsweep.model.parameters import (
@@ -491,7 +491,7 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
 class SamplePlan:
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
-    A plan as all others are (`plans.AnyPlan`); its parts have the draws of the whole.
+    A plan as all others are (`anyplan.AnyPlan`); its parts have the draws of the whole.
     """
 
     names = tuple(_STATISTICS)
@@ -569,7 +569,7 @@ class SamplePlan:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
         return self._table(lambda shape, dtype: np.broadcast_to(np.zeros((), dtype), shape))
 
-    def _table(self, empty: engine.Empty) -> Table:
+    def _table(self, empty: Empty) -> Table:
         """The statistics, in arrays that `empty` makes."""
         coordinates: dict[str, NDArray[Any]] = {
             "quantile": self.sampling.quantiles,
@@ -585,7 +585,7 @@ class SamplePlan:
         coords = {name: Variable((name,), values, STATISTIC_COORDINATES[name]) for name, values in coordinates.items()}
         return Table(self.coords | coords, results, self.attrs)
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: engine.Empty = np.empty) -> Table:
+    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
         """Solve the samples slab by slab, and reduce them to what `slipsweep.sample` returns.
 
         Parameters
