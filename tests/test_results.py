@@ -306,6 +306,26 @@ def test_edited_results_are_read_right_or_refused_in_one_line(
     ended.update((name, *outcome) for name in done)
 
 
+def test_a_file_is_named_once_in_what_is_refused(
+    sources: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = sources[0].with_name("statistics.nc")
+    assert main(["limit", str(path), "-d", "50mm"]) == 2
+    assert capsys.readouterr().err.count("statistics.nc") == 1
+
+
+def test_a_record_that_was_changed_in_its_result_is_refused_by_the_name_of_that(
+    sources: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = "[axes]\nscale = {values = [1, 2]}\ntheta = {values = [5]}\nmu_s = {values = [0.4]}\n"
+    (tmp_path / "a.toml").write_text(f'{sweep}[excitation]\nrecord = "{_motion(tmp_path)}"\nunits = "m/s2"\n')
+    assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.nc"), "-q"]) == 0
+    with netCDF4.Dataset(tmp_path / "a.nc", "a") as file:
+        file["record_acceleration"][3] = np.nan
+    assert main(["run", str(tmp_path / "a.nc"), "-o", str(tmp_path / "b.nc"), "-q"]) == 2
+    assert "a.nc: acceleration of sample 4 = nan: must be a finite number" in capsys.readouterr().err
+
+
 # -------------------------------------------------------------------------------------- damage
 
 

@@ -392,7 +392,11 @@ def _load_result(path: Path) -> SweepSpec:
     record = None
     if len(samples) == len(RECORD_SAMPLES):
         times, acceleration = samples.values()
-        record = Record(times, acceleration, about.get("record", str(path)), about)
+        name = about.get("record", str(path))
+        try:
+            record = Record(times, acceleration, name, about)
+        except InputError as error:  # changed by another program
+            raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
     spec = parse(str(attributes["sweep"]), str(path), path.parent, record)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     try:

@@ -63,7 +63,8 @@ class Job:
         try:
             yield
         except InputError as error:
-            raise InputError(f"{self.source}: {error}") from None
+            # a plan that is made late names the file itself
+            raise InputError(f"{self.source}: {str(error).removeprefix(f'{self.source}: ')}") from None
 
 
 def sweep_job(spec: SweepSpec) -> Job:
