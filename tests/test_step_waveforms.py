@@ -9,6 +9,8 @@ import xarray as xr
 from cases import choices
 
 import slipsweep
+from slipsweep.errors import InputError
+from slipsweep.grid import resources
 
 ORDERS = {"rectangle": 1, "trapezoid": 2, "simpson": 4}
 RULES = pytest.mark.parametrize("rule", ORDERS)
@@ -164,3 +166,12 @@ def test_a_slide_that_begins_at_the_end_of_a_piece(rule: str, steps: int) -> Non
         found = slipsweep.sweep(**choices(**block, solver="step", rule=rule, steps_per_cycle=steps))
         error = abs(float(found.permanent_displacement / exact.permanent_displacement) - 1)
         assert error <= (3 / steps if rule == "rectangle" else 1e-13), left
+
+
+def test_a_table_of_steps_that_memory_does_not_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every cycle of a ramp has steps of its own."""
+    monkeypatch.setattr(resources, "available_memory", lambda: 2 * 10**9)
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency": 1.0, "cycles": 200}
+    block |= {"ramp_in": 100.0, "ramp_out": 100.0, "solver": "step", "steps_per_cycle": 2**24}
+    with pytest.raises(InputError, match="steps_per_cycle = 16777216: takes 108 GB, but 2 GB of memory is free"):
+        slipsweep.sweep(**choices(**block))

@@ -227,6 +227,8 @@ def plan_sweep(
 
     tasks = []
     motion = tuple(name for name in MOTION_RESULTS if name in wanted)
+    if motion and isinstance(problem.solver, Step):
+        _check_steps(problem.solver, problem.excitation)
     if motion:
         tasks.append(Task(engine.solve, problem, motion, sizes, aligned(inputs, sizes)))
     # one that was given is a coordinate already
@@ -244,6 +246,14 @@ def plan_sweep(
         about("Permanent displacement of a rigid block, swept", problem),
         cost_of(problem),
     )
+
+
+def _check_steps(solver: Step, excitation: Any) -> None:
+    """Refuse steps whose table memory cannot hold: w at every half step of a cycle, and of each with a ramp."""
+    own = 1 + math.ceil(excitation.ramp_in) + math.ceil(excitation.ramp_out)
+    # piece by piece, then together
+    needed = 2 * own * 2 * 8 * solver.steps_per_cycle
+    check_memory(f"steps_per_cycle = {solver.steps_per_cycle}", needed, "take fewer steps, or shorter ramps")
 
 
 def plan_friction_parameters(*, model: Any = "mendez", **given: Any) -> Plan:
