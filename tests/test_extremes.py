@@ -229,3 +229,28 @@ def test_ends_of_the_ranges_are_served(solver: str) -> None:
         found = slipsweep.sweep(**choices(**block, amplitude=3.0, frequency=frequency))
         moved = float(found.permanent_displacement) * frequency * frequency
         assert moved == pytest.approx(float(common_one.permanent_displacement))
+
+
+@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+@pytest.mark.parametrize("rise", ["monotone", "literal"])
+@pytest.mark.parametrize("wave", [*WAVES, {"waveform": "triangle"}, {"waveform": "sine", "ramp_out": 1.0}], ids=str)
+def test_size_changes_nothing(wave: dict[str, Any], rise: str, recoupling: str) -> None:
+    """All accelerations and g 1e±290 times as large: so is u.  Squares of accelerations are no doubles there."""
+    block: dict[str, Any] = {"theta": 4.0, "mu_s": 0.6, "frequency": 1.0, "cycles": 4, "solver": "cycle"}
+    block |= {**wave, "rise": rise, "recoupling": recoupling}
+    accelerations = {"amplitude": 4.2, "yield_acceleration": 0.9, "g": 9.81}
+    usual = float(slipsweep.sweep(**choices(**block, **accelerations)).permanent_displacement)
+    assert usual > 0.0
+    for size in (1e-290, 1e-160, 1e160, 1e290):
+        scaled = {name: value * size for name, value in accelerations.items()}
+        found = float(slipsweep.sweep(**choices(**block, **scaled)).permanent_displacement)
+        assert found / size == pytest.approx(usual, rel=1e-11), f"{size:g}"
+    record = slipsweep.Record(np.array([0.0, 0.25, 0.75, 1.25, 1.5]), np.array([0.0, 4.2, -4.2, 4.2, 0.0]))
+    recorded: dict[str, Any] = {"theta": 4.0, "mu_s": 0.6, "rise": rise, "recoupling": recoupling}
+    usual = float(
+        slipsweep.sweep(**choices(**recorded, yield_acceleration=0.9, excitation=record)).permanent_displacement
+    )
+    for size in (1e-290, 1e-160, 1e160, 1e290):
+        large = slipsweep.Record(record.times, record.acceleration * size)
+        given = choices(**recorded, yield_acceleration=0.9 * size, g=9.81 * size, excitation=large)
+        assert float(slipsweep.sweep(**given).permanent_displacement) / size == pytest.approx(usual, rel=1e-11)

@@ -317,7 +317,7 @@ def hold(
         # V turns where x = b; one that starts from rest there only seems to fall, by rounding
         if straight:
             turn = start - rate / slope
-            extreme = velocity - 0.5 * rate * rate / slope
+            extreme = velocity - 0.5 * rate * (rate / slope)
         else:
             turn = offset_at(pieces, p, amplitude, held)
             extreme = velocity + held_gain(pieces, p, amplitude, held, start, turn)

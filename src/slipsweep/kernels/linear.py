@@ -57,10 +57,14 @@ def held_stop(velocity: float, rate: float, slope: float) -> float:
 
     The roots of v + rate t + slope t²/2, each taken from the form that does not cancel.
     """
-    square = rate * rate - 2.0 * slope * velocity
+    # accelerations over their size: their squares may be no doubles
+    size = max(abs(rate), math.sqrt(abs(slope)) * math.sqrt(velocity))
+    if size == 0.0:
+        return math.inf
+    square = (rate / size) * (rate / size) - 2.0 * (slope / size) * (velocity / size)
     if rate > 0.0:
-        return (rate + math.sqrt(square)) / -slope if slope < 0.0 else math.inf
+        return (rate + size * math.sqrt(square)) / -slope if slope < 0.0 else math.inf
     if square < 0.0:
         return math.inf
-    fall = math.sqrt(square) - rate
+    fall = size * math.sqrt(square) - rate
     return 2.0 * velocity / fall if fall > 0.0 else math.inf

@@ -200,7 +200,7 @@ def newmark(cell: Cell, options: Options, wave: Wave, codes: np.ndarray, j: int)
                 if rate < 0.0 or rate_end < 0.0:
                     slope = (rate_end - rate) / step
                     if rate > 0.0:
-                        peak = max(peak, velocity - 0.5 * rate * rate / slope)
+                        peak = max(peak, velocity - 0.5 * rate * (rate / slope))
                     stop = held_stop(velocity, rate, slope)
                     if stop <= step:
                         slides = False
