@@ -349,8 +349,9 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
 
 def _record_cut(record: Record, polarity: float) -> Wave:
     times, values = record.times, polarity * record.acceleration
-    interval, change = np.diff(times), np.diff(values)
-    slope = change / interval
+    with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
+        interval, change = np.diff(times), np.diff(values)
+        slope = change / interval
     # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
     own = np.repeat(np.arange(interval.size), 1 + crosses)
