@@ -67,14 +67,15 @@ def limit(
             results.append(path)
         else:
             raise InputError(f"{path}: the name must end in one of {', '.join(('.nc', *_FIGURES))}")
-    if len(results) > 1:
-        raise InputError(f"{results[1]}: a second netCDF output, beside {results[0]}; give one")
     for option in blocks.given() if not results else []:
         raise InputError(f"{option}: needs -o OUT.nc, whose blocks are solved and written one after the other")
 
     from slipsweep.files import outputs, spec
     from slipsweep.runs.jobs import limit_job
 
+    if len(results) > 1:
+        outputs.check_outputs(results, overwrite, reads=())  # one name given twice is refused as such
+        raise InputError(f"{results[1]}: a second netCDF output, beside {results[0]}; give one")
     checked = spec.load(sweep)
     outputs.check_outputs(figures, overwrite, reads=checked.files)
     job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
