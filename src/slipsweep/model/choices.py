@@ -7,6 +7,7 @@ to a class appears in all of them.
 """
 
 import dataclasses
+import functools
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -125,6 +126,12 @@ class Choice:
 
 def declared(choice: type[Choice]) -> tuple[Option, ...]:
     """The options of a choice, in the order of its fields."""
+    key: Any = choice  # mypy takes the hash of its objects for that of the class
+    return _declared(key)
+
+
+@functools.cache  # every object made asks for them, and hints take long to look up
+def _declared(choice: Any) -> tuple[Option, ...]:
     hints = get_type_hints(choice)
     return tuple(_option(field, hints[field.name]) for field in dataclasses.fields(choice))
 
