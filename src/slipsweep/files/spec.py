@@ -20,6 +20,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from slipsweep.errors import InputError
 from slipsweep.files.outputs import Read
+from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.tables import Variable
 from slipsweep.model.choices import Family, declared
 from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
@@ -39,7 +40,6 @@ from slipsweep.motion.records import Record, read_record
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.anyplan import AnyPlan
     from slipsweep.studies.uncertainty import Sampling
 
 Floats = NDArray[np.float64]
