@@ -5,14 +5,14 @@ measures where double precision ends (a few 30-digit solutions, seconds).
 """
 
 import csv
-import sys
 from typing import Any
 
 import numpy as np
 
 import slipsweep
 from benchmarks.grids import G
-from benchmarks.machine import DOCS, RESULTS, ROOT, measured_on, number, table
+from benchmarks.machine import DOCS, RESULTS, measured_on, number, table
+from tests.support.reference import solve
 
 WANTED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
 RULES = ("rectangle", "trapezoid", "simpson")
@@ -63,8 +63,6 @@ def cycle_errors(found: list[dict[str, Any]]) -> str:
 
 def near_yield() -> str:
     """Error of the cycle solver at A = Üy (1 + 10⁻ᵏ), beside what one ulp of each input does to the answer."""
-    sys.path.insert(0, str(ROOT / "tests"))
-    from reference import solve
 
     def exact(cell: dict[str, Any]) -> float:
         return float(solve(**cell, frequency=1.0, cycles=1).permanent_displacement)
@@ -95,7 +93,7 @@ def main() -> None:
 Which solver, how many steps, and where the digits end. {measured_on()}
 Every number and figure here is written by `python -m benchmarks.accuracy` from the results of
 `python -m benchmarks.speed_vs_error` and `python -m benchmarks.model_choices`. Errors are relative
-errors of the permanent displacement against solutions of 30 digits (tests/reference.py), over a fixed
+errors of the permanent displacement against solutions of 30 digits (tests/support/reference.py), over a fixed
 random sample of 64 cells a regime (benchmarks/data/sample.csv), one cycle of loading; "hard" cells lie
 just above yield, near static failure, at the mode limit, under sharply decaying friction or on a level
 plane.

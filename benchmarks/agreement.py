@@ -1,26 +1,22 @@
 """The solvers held to each other: ``python -m benchmarks.agreement`` writes agreement.md.
 
-Draws cells as tests/agreement.py does, under all options and waveforms, and solves each in every way that there is.
-``.ci/include-report`` puts the table into docs/waveforms.md.  Nothing is timed; it ends with an error where
-two ways disagree.
+Draws cells as tests/support/agreement.py does, under all options and waveforms, and solves each in every way
+that there is.  ``.ci/include-report`` puts the table into docs/waveforms.md.  Nothing is timed; it ends with an
+error where two ways disagree.
 """
 
 import random
-import sys
 from collections import Counter, defaultdict
 from statistics import median
-from typing import TYPE_CHECKING
 
-from benchmarks.machine import ROOT, arguments, measured_on, number, table
-
-if TYPE_CHECKING:
-    from agreement import Comparison
+from benchmarks.machine import arguments, measured_on, number, table
+from tests.support.agreement import FLOORS, Comparison, compare, group_of
 
 #: Cells drawn, and in a group.
 CELLS, SIZE = 10_000, 32
 
 
-def rows_of(found: "dict[str, list[Comparison]]") -> list[list[object]]:
+def rows_of(found: dict[str, list[Comparison]]) -> list[list[object]]:
     """A line a kind: counts, median and worst difference, the worst over its bound."""
     rows: list[list[object]] = []
     for kind, comparisons in found.items():
@@ -38,9 +34,6 @@ HEADER = ["the cycle solver against", "cells", "agreed", "median difference", "l
 def main() -> None:
     """Draw, compare, write agreement.md."""
     given = arguments(__doc__, counts={"cells": CELLS, "seed": -1})
-    sys.path.insert(0, str(ROOT / "tests"))
-    from agreement import FLOORS, compare, group_of
-
     seed = given.seed if given.seed >= 0 else random.randrange(2**31)
     cells = 2 * SIZE if given.tiny else given.cells
     print(f"seed {seed}", flush=True)

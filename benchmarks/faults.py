@@ -1,15 +1,15 @@
 """Faults tried and survived: ``python -m benchmarks.faults`` writes faults.md.
 
-Does rounds of every kind in tests/fault_rounds.py; the first fault that is not survived ends it with
+Does rounds of every kind in tests/support/fault_rounds.py; the first fault that is not survived ends it with
 an error.  ``.ci/include-report`` puts the table into docs/large-sweeps.md.  Nothing is timed.
 """
 
 import random
-import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.machine import ROOT, arguments, measured_on, table
+from benchmarks.machine import arguments, measured_on, table
+from tests.support.fault_rounds import FAULTS, can_be_done, damaged, rounds, run, values
 
 #: Rounds of each kind; those in this process are cheap.
 ROUNDS, CHEAP_ROUNDS = 10, 200
@@ -18,9 +18,6 @@ ROUNDS, CHEAP_ROUNDS = 10, 200
 def main() -> None:
     """Do all rounds, write faults.md."""
     given = arguments(__doc__)
-    sys.path.insert(0, str(ROOT / "tests"))
-    from fault_rounds import FAULTS, can_be_done, damaged, rounds, run, values
-
     seed = 1 if given.tiny else random.randrange(2**31)
     print(f"seed {seed}", flush=True)
     names = [name for name in FAULTS if FAULTS[name] is damaged or not given.tiny]

@@ -1,34 +1,25 @@
 """The hard cases and how each solver fares: ``python -m benchmarks.hard_cases``.
 
-Solves the cells of tests/hard_cells.py and all their neighbours one ulp away in multiple
+Solves the cells of tests/support/hard_cells.py and all their neighbours one ulp away in multiple
 precision into tests/data/hard_cases.csv, and writes docs/hard-cases.md.  Nothing is timed.
 """
 
 import csv
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from benchmarks.machine import DOCS, ROOT, cores, number, table
-
-if TYPE_CHECKING:
-    from hard_cells import HardCase
+from benchmarks.machine import DOCS, cores, number, table
+from tests.support.cases import OPTIONAL_INPUTS, PARAMETERS, solve
+from tests.support.hard_cells import CATEGORIES, HARD_CASES, G, HardCase, conditioning, read_hard_cases
 
 STEPPED = [(rule, steps) for rule in ("trapezoid", "simpson") for steps in (1024, 4096)]
 
 
-def _tests() -> None:
-    """Make the modules of tests/ importable, here and in worker processes."""
-    sys.path.insert(0, str(ROOT / "tests"))
-
-
 def row_of(work: tuple[int, str, str, dict[str, Any]]) -> dict[str, Any]:
     """One line of hard_cases.csv."""
-    from hard_cells import G, conditioning
-
     number_of_case, category, dtype, cell = work
     defaults = {"model": "mendez", "rise": "monotone", "recoupling": "eq12", "g": G}
     return {"case": number_of_case, "category": category, **defaults, **cell, **conditioning(cell, dtype)}
@@ -36,12 +27,9 @@ def row_of(work: tuple[int, str, str, dict[str, Any]]) -> dict[str, Any]:
 
 def write_cases() -> None:
     """Solve every cell and its neighbours, and write hard_cases.csv."""
-    from cases import OPTIONAL_INPUTS, PARAMETERS
-    from hard_cells import CATEGORIES, HARD_CASES
-
     cells = [(category, cell) for category in CATEGORIES for cell in category.cells()]
     work = [(i, category.name, category.dtype, cell) for i, (category, cell) in enumerate(cells)]
-    with ProcessPoolExecutor(cores(), initializer=_tests) as pool:
+    with ProcessPoolExecutor(cores()) as pool:
         rows = list(pool.map(row_of, work))
     columns = [
         *("case", "category", "model", "rise", "recoupling", *PARAMETERS, "cycles", "g", *OPTIONAL_INPUTS),
@@ -72,10 +60,8 @@ def relative_conditioning(case: "HardCase") -> float:
     return float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement)))
 
 
-def errors_table(cases: "list[HardCase]", answers: dict[str, dict[int, tuple[float, float, int, int]]]) -> str:
+def errors_table(cases: list[HardCase], answers: dict[str, dict[int, tuple[float, float, int, int]]]) -> str:
     """A line a category: conditioning, and the errors of every solver in units of it."""
-    from hard_cells import CATEGORIES
-
     rows = []
     for category in CATEGORIES:
         own = [case for case in cases if case.category == category.name]
@@ -94,8 +80,6 @@ def errors_table(cases: "list[HardCase]", answers: dict[str, dict[int, tuple[flo
 
 def dangers() -> str:
     """What could go wrong, category by category."""
-    from hard_cells import CATEGORIES
-
     return table(
         ["hard because of", "what could go wrong"],
         [[category.name.replace("_", " "), category.danger] for category in CATEGORIES],
@@ -104,11 +88,7 @@ def dangers() -> str:
 
 def main() -> None:
     """Write tests/data/hard_cases.csv and docs/hard-cases.md."""
-    _tests()
     write_cases()
-    from cases import solve
-    from hard_cells import read_hard_cases
-
     cases = read_hard_cases()
     answers = {"cycle": solve(cases, solver="cycle")}
     for rule, steps in STEPPED:
@@ -116,8 +96,8 @@ def main() -> None:
     (DOCS / "hard-cases.md").write_text(f"""# Hard cases
 
 Where the model is hardest to solve, and how the solvers fare there. Written by
-`python -m benchmarks.hard_cases`; the cells are made in tests/hard_cells.py, and stand with their
-answers in tests/data/hard_cases.csv ({len(cases)} cells). tests/test_hard_cases.py holds the solvers to
+`python -m benchmarks.hard_cases`; the cells are made in tests/support/hard_cells.py, and stand with their
+answers in tests/data/hard_cases.csv ({len(cases)} cells). tests/kernels/test_hard_cases.py holds the solvers to
 what is said here.
 
 ## What could go wrong
@@ -128,7 +108,7 @@ what is said here.
 *Conditioning* is how far the exact displacement moves, relatively, when one of the doubles given (θ, μs, A,
 f, g, and Üy, λ, Δμ where given) moves by one ulp, the greatest of all such moves, plus half an ulp of the
 displacement itself. It is computed, not estimated: every neighbour of every cell is solved in multiple
-precision (tests/reference.py). The column gives the least and the greatest over the cells of a category
+precision (tests/support/reference.py). The column gives the least and the greatest over the cells of a category
 that move. A solver that is given doubles cannot promise an error below 1 in these units.
 
 Errors of the permanent displacement are over that bound, cell by cell: median, then worst. For the step

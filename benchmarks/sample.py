@@ -7,7 +7,6 @@ categories of tests/data/cases.csv that the default options can take.
 """
 
 import csv
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,8 @@ from numpy.typing import NDArray
 
 import slipsweep
 from benchmarks.grids import G
-from benchmarks.machine import ROOT
+from tests.support.cases import read_cases
+from tests.support.reference import solve
 
 SAMPLE = Path(__file__).parent / "data" / "sample.csv"
 SIZE = 64
@@ -110,8 +110,6 @@ def _draw(regime: str, random: np.random.Generator) -> dict[str, Any]:
 
 
 def _hard() -> list[dict[str, Any]]:
-    from cases import read_cases
-
     return [
         {
             "regime": "hard",
@@ -127,9 +125,6 @@ def _hard() -> list[dict[str, Any]]:
 
 def main() -> None:
     """Draw the sample, solve it to 30 digits, write it."""
-    sys.path.insert(0, str(ROOT / "tests"))
-    from reference import solve
-
     random = np.random.default_rng(SEED)
     cells = [_draw(regime, random) for regime in REGIMES[:-1] for _ in range(SIZE)] + _hard()
     SAMPLE.parent.mkdir(exist_ok=True)

@@ -24,7 +24,6 @@ WRITES = {
 
 @pytest.fixture(autouse=True)
 def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(ROOT))
     monkeypatch.chdir(ROOT)
 
 
@@ -62,9 +61,8 @@ def test_other_waves_of_the_papers_peaks() -> None:
 
 def test_the_sample_is_the_references() -> None:
     """A few cells of benchmarks/data/sample.csv, solved again."""
-    from reference import solve
-
     from benchmarks import sample
+    from tests.support.reference import solve
 
     for groups in sample.read().values():
         group = groups[-1]

@@ -1,0 +1,197 @@
+"""Streams: sweeps from pipes, output in alphabets of one byte, output that nobody reads or that is lost."""
+
+import os
+import subprocess
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.processes import SLIPSWEEP, TIMEOUT, on_a_terminal, slipsweep
+
+CELL = "".join(
+    f"[axes.{name}]\nvalues = {values}\n"
+    for name, values in (("theta", [0, 5]), ("mu_s", [0.4]), ("amplitude", [3, 6]), ("frequency", [1, 2]))
+)
+SIMULATE = ("simulate", "--theta", "5", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1")
+COMMANDS = ("run", "info", "export", "limit", "simulate", "chart", "record", "explore")
+
+posix = pytest.mark.skipif(os.name != "posix", reason="opens pipes and devices the POSIX way")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "a.toml").write_text(CELL)
+    (folder / "m.csv").write_text("0,0\n0.1,0.5\n0.2,-0.5\n0.3,0\n")
+    assert slipsweep(folder, "run", "a.toml", "--quiet").returncode == 0
+    return folder
+
+
+def shell(folder: Path, command: str, **environment: str) -> "subprocess.CompletedProcess[bytes]":
+    """Run a command of the shell in which `$S` is slipsweep."""
+    line = command.replace("$S", " ".join(SLIPSWEEP))
+    return subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {line}"],
+        cwd=folder, env={**os.environ, **environment}, capture_output=True, timeout=TIMEOUT, check=False,
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------------------ what is printed
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "latin-1", "utf-8"])
+def test_every_help_in_every_alphabet(made: Path, encoding: str) -> None:
+    for command in [("simulate",)] if encoding in ("latin-1", "utf-8") else [(), *((name,) for name in COMMANDS)]:
+        done = subprocess.run(
+            [*SLIPSWEEP, *command, "--help"], capture_output=True, timeout=TIMEOUT, check=False,
+            env={**os.environ, "PYTHONIOENCODING": encoding},
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, b""), command
+        text = done.stdout.decode(encoding)
+        assert "Usage: slipsweep" in text
+        if command == ("simulate",):
+            assert {"utf-8": "decay λ", "latin-1": "decay lambda"}.get(encoding, "decay lambda") in text
+            assert ("m/s2" if encoding == "ascii" else "m/s²") in text
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_every_command_in_every_alphabet(made: Path, encoding: str) -> None:
+    for number, command in enumerate(
+        (
+            ("run", "a.toml", "-o", "new.nc"), ("info", "a.nc"), ("export", "a.nc", "-o", "new.csv"),
+            ("limit", "a.nc", "-d", "5mm", "-o", "limit.nc"), (*SIMULATE, "-o", "h.csv"),
+            ("chart", "a.nc", "-k", "contours", "-o", "λ.png"),
+            ("record", "m.csv", "--units", "g", "--theta", "5", "--mu-s", "0.4", "-o", "r.nc"),
+            ("explore", "a.nc", "-o", "new.html"), ("info", "λ.nc"),
+        )
+    ):  # fmt: skip
+        overwrite = ("--overwrite",) if "-o" in command else ()
+        done = slipsweep(made, *command, *overwrite, environment={"PYTHONIOENCODING": encoding})
+        assert done.returncode == (2 if number == 8 else 0), done
+        assert "Traceback" not in done.stderr
+        assert done.stdout.isascii()
+
+
+def test_help_on_a_terminal_without_such_letters(tmp_path: Path) -> None:
+    text = on_a_terminal(tmp_path, "simulate", "--help", environment={"PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"})
+    assert "lambda" in text
+    assert text.isascii()
+
+
+@posix
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-", "| head -c 1 | wc -c", "| true"])
+def test_output_that_nobody_reads(made: Path, tmp_path: Path, closed: str) -> None:
+    """All files are made all the same, and there is nothing to say."""
+    for command, wanted in (
+        (f"$S run {made}/a.toml -o a.nc", {"a.nc"}),
+        (
+            f"$S chart {made}/a.nc",
+            {f"a-{kind}.png" for kind in ("contours", "modes", "families", "dimensionless", "newmark")},
+        ),
+        ("$S --help", set()),
+    ):
+        before = {*os.listdir(tmp_path)}
+        done = shell(tmp_path, f"{command} {closed}")
+        assert (done.returncode, done.stderr) == (0, b""), command
+        assert {*os.listdir(tmp_path)} - before == wanted
+    assert shell(tmp_path, f"$S info nothing.nc {closed}").returncode == 2
+    # what is written is what would have been, and no message is in it
+    done = shell(tmp_path, "$S info a.nc")
+    assert done.returncode == 0
+    assert done.stdout.startswith(b"a.nc")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="has no device that is full")
+def test_output_that_is_lost(made: Path, tmp_path: Path) -> None:
+    """All files are made, and one line says that something is missing."""
+    line = b"slipsweep: error: what is printed could not be written: No space left on device\n"
+    for command in (f"$S run {made}/a.toml -o a.nc", f"$S chart {made}/a.nc", "$S --help", "$S run --help"):
+        done = shell(tmp_path, f"{command} > /dev/full")
+        assert (done.returncode, done.stderr) == (1, line)
+    assert len(os.listdir(tmp_path)) == 6
+    assert shell(tmp_path, "$S info nothing.nc > /dev/full").returncode == 2
+    for command, status in (("$S info a.nc", 0), ("$S info nothing.nc", 2)):
+        assert shell(tmp_path, f"{command} 2> /dev/full").returncode == status
+
+
+# ---------------------------------------------------------------------- sweeps from pipes
+
+
+@pytest.fixture
+def pipe(tmp_path: Path) -> Iterator[Path]:
+    """A FIFO in the working folder that somebody writes a sweep into."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    writer = threading.Thread(target=path.write_text, args=(CELL,), daemon=True)
+    writer.start()
+    yield path
+    if writer.is_alive():
+        path.read_text()
+    writer.join()
+
+
+@posix
+def test_a_sweep_from_a_named_pipe(pipe: Path) -> None:
+    done = slipsweep(pipe.parent, "run", "pipe", "-o", "a.nc")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@posix
+@pytest.mark.parametrize("source", ["- < a.toml", "/dev/stdin < a.toml", "<(cat a.toml)", "-", "/dev/stdin"])
+def test_a_sweep_from_standard_input(made: Path, tmp_path: Path, source: str) -> None:
+    (tmp_path / "a.toml").write_text(CELL)
+    before = "" if "a.toml" in source else "cat a.toml | "
+    done = shell(tmp_path, f"{before}$S run {source} -o a.nc")
+    assert (done.returncode, done.stderr) == (0, b"")
+    done = shell(tmp_path, f"{before}$S limit {source} -d 5mm -o limit.nc")
+    assert (done.returncode, done.stderr) == (0, b"")
+    # it has no name that one could make another of
+    done = shell(tmp_path, f"{before}$S run {source}")
+    assert done.returncode == 2
+    assert b"give the output's with -o or output.path" in done.stderr
+    (tmp_path / "a.toml").write_text(CELL + '[output]\npath = "own.nc"\n')
+    assert shell(tmp_path, f"{before}$S run {source} --quiet").returncode == 0
+    assert {*os.listdir(tmp_path)} == {"a.toml", "a.nc", "limit.nc", "own.nc"}
+    again = shell(tmp_path, "$S run own.nc -o again.nc")
+    assert again.returncode == 0
+
+
+@posix
+def test_a_record_beside_a_sweep_from_a_pipe_is_that_of_the_working_folder(made: Path, tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_bytes((made / "m.csv").read_bytes())
+    text = '[excitation]\nrecord = "m.csv"\nunits = "g"\n[axes.theta]\nvalues = [5]\n[axes.mu_s]\nvalues = [0.4]\n'
+    (tmp_path / "r.toml").write_text(text)
+    for source in ("cat r.toml | $S run - ", "$S run /dev/stdin < r.toml ", "$S run <(cat r.toml) "):
+        assert shell(tmp_path, source + " -o r.nc --overwrite").returncode == 0
+    done = shell(tmp_path, "$S record <(cat m.csv) --units g --theta 5 --mu-s 0.4 -o s.nc")
+    assert done.returncode == 0
+
+
+@posix
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("$S run - -o b.nc < a.nc", "is a netCDF file, which cannot be read from a pipe; give it by name"),
+        ("cat a.nc | $S run /dev/stdin -o b.nc", "is a netCDF file, which cannot be read from a pipe"),
+        ("$S run - -o b.nc < /dev/null", "axes.theta: missing"),
+        ("$S run - -o b.nc <&-", "axes.theta: missing"),
+        ("$S run . -o b.nc", ".: cannot be read: Is a directory"),
+        ("$S run /dev/zero -o b.nc", "/dev/zero: not a sweep file: it has more than 200000000 bytes"),
+        ("$S record /dev/zero --theta 5 --mu-s 0.4", "/dev/zero: more than 200000000 bytes"),
+        ("$S info pipe.nc", "is not a file"),
+        ("$S export pipe.nc -o b.csv", "is not a file"),
+        ("$S explore pipe.nc -o b.html", "is not a file"),
+        ("cat a.nc | $S info /dev/stdin", "is not a file"),
+    ],
+)
+def test_what_is_no_sweep_or_result_is_said_to_be_none(made: Path, command: str, message: str) -> None:
+    if not (made / "pipe.nc").exists():
+        os.mkfifo(made / "pipe.nc")
+    done = shell(made, command)
+    assert done.returncode == 2
+    assert done.stderr.startswith(b"slipsweep: error: ")
+    assert done.stderr.count(b"\n") == 1
+    assert message in done.stderr.decode()
+    assert not (made / "b.nc").exists()

@@ -1,0 +1,129 @@
+"""Terminal manners: help, completion, plain output where nobody looks, suggestions."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.support.processes import on_a_terminal, slipsweep
+
+COMMANDS = ("run", "info", "export", "simulate")
+SWEEP = "".join(
+    f"[axes.{name}]\nvalues = [{value}]\n"
+    for name, value in (("theta", 5), ("mu_s", 0.4), ("amplitude", 3), ("frequency", 1))
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_is_plain_in_a_pipe_and_has_examples(tmp_path: Path, command: str) -> None:
+    done = slipsweep(tmp_path, command, "--help", environment={"FORCE_COLOR": "1", "COLUMNS": "80"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not re.search("[\x1b─-╿]", done.stdout)  # neither escape codes nor boxes
+    examples = done.stdout.partition("Examples:\n")[2].splitlines()
+    assert len(examples) >= 2
+    for line in examples:  # each whole, in a line of its own
+        assert line.startswith(f"    slipsweep {command} ")
+
+
+def test_help_on_a_terminal(tmp_path: Path) -> None:
+    text = on_a_terminal(tmp_path, "export", "--help")
+    assert "\x1b[" in text
+    assert "╭" in text
+    assert "Examples:" in text
+    plain = on_a_terminal(tmp_path, "export", "--help", environment={"NO_COLOR": "1"})
+    assert "Examples:" in plain
+    assert "\x1b" not in plain
+
+
+def test_the_examples_are_good_commands(tmp_path: Path) -> None:
+    """Every option of the examples is one that the command has."""
+    for command in COMMANDS:
+        text = slipsweep(tmp_path, command, "--help").stdout
+        options, _, examples = text.partition("Examples:")
+        for option in re.findall(r" (--?[a-z][\w-]*)", examples):
+            assert re.search(rf"(^|\s|,){option}\b", options), f"{command}: {option}"
+
+
+def test_progress_has_no_colour_when_none_is_wanted(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(SWEEP)
+    coloured = on_a_terminal(tmp_path, "run", "a.toml", "-o", "a.nc")
+    plain = on_a_terminal(tmp_path, "run", "a.toml", "-o", "b.nc", environment={"NO_COLOR": "1"})
+    colour = r"\x1b\[[\d;]*3[0-9](;[\d;]+)?m"
+    assert re.search(colour, coloured)
+    assert "100%" in plain
+    assert not re.search(colour, plain)
+
+
+def test_compilation_is_said_and_told_apart(tmp_path: Path) -> None:
+    """A first run has to be waited for: a terminal says why, and its speed is that of solving."""
+    (tmp_path / "a.toml").write_text(SWEEP + '[output]\nvariables = ["delta_mu"]\n')
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    first = on_a_terminal(tmp_path, "run", "a.toml", "-o", "a.nc", environment=cache)
+    assert "compiling for this processor, once: 1 of 1" in first
+    found = re.search(r"1 cells .* in ([\d.]+) s \(([\d.]+) s to compile, once\), (\S+) cells/s", first)
+    assert found
+    total, compiling, speed = map(float, found.groups())
+    assert 0.0 < compiling <= total
+    assert speed > 1.01 / total
+    again = on_a_terminal(tmp_path, "run", "a.toml", "-o", "b.nc", environment=cache)
+    assert "compil" not in again
+    assert re.search(r"1 cells .* in [\d.]+ s, \S+ cells/s", again)
+
+
+def test_errors_are_plain(tmp_path: Path) -> None:
+    for text in (on_a_terminal(tmp_path, "info"), slipsweep(tmp_path, "info", environment={"FORCE_COLOR": "1"}).stderr):
+        assert text.strip() == "slipsweep: error: Missing argument 'OUT.nc'."
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("run", "a.toml", "--ouput", "a.nc"), "No such option: --ouput; did you mean --output?"),
+        (("run", "a.toml", "--overwrit"), "No such option: --overwrit; did you mean --overwrite?"),
+        (("simulate", "--yield-aceleration", "1"), "did you mean --yield-acceleration?"),
+        (("exprot", "a.nc"), "No such command 'exprot'. Did you mean 'export', 'explore'?"),
+        (("run", "a.toml", "--solver", "cycl"), "'cycl' is not one of 'auto', 'step', 'cycle'"),
+        (("run", "a.toml"), 'axes.thet: unknown key; did you mean "theta"?'),
+        (("simulate", "--theta", "steep"), "Invalid value for '--theta': 'steep' should be a valid number"),
+        (("simulate", "--points", "2"), "Invalid value for '--points': '2' should be greater than or equal to 4"),
+    ],
+)
+def test_what_is_nearest_is_suggested(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+    (tmp_path / "a.toml").write_text(SWEEP.replace("theta", "thet"))
+    done = slipsweep(tmp_path, *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion(tmp_path: Path, shell: str) -> None:
+    script = slipsweep(
+        tmp_path, "--show-completion", shell, environment={"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    ).stdout
+    assert "_SLIPSWEEP_COMPLETE" in script
+    typed = "slipsweep ex"
+    environment = {
+        "_SLIPSWEEP_COMPLETE": f"complete_{shell}",
+        "COMP_WORDS": typed, "COMP_CWORD": "1",  # bash
+        "_TYPER_COMPLETE_ARGS": typed, "_TYPER_COMPLETE_FISH_ACTION": "get-args",  # zsh and fish
+    }  # fmt: skip
+    done = slipsweep(tmp_path, environment=environment)
+    assert "export" in done.stdout
+    assert "simulate" not in done.stdout
+
+
+def test_simulate_takes_a_displacement_and_a_structure(tmp_path: Path) -> None:
+    case = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2", "--structure-frequency", "2")
+    by_displacement = slipsweep(tmp_path, *case, "--displacement-amplitude", "0.025")
+    acceleration = str((4 * 3.141592653589793) ** 2 * 0.025)
+    by_acceleration = slipsweep(tmp_path, *case, "--amplitude", acceleration)
+    assert by_displacement.returncode == 0
+    assert by_displacement.stdout == by_acceleration.stdout
+    assert "flexible_block" in by_displacement.stdout
+    assert slipsweep(tmp_path, *case, "--amplitude", "3", "--quiet", "-o", "a.csv").stdout == ""
+    assert (tmp_path / "a.csv").exists()
+    both = slipsweep(tmp_path, *case, "--amplitude", "3", "--displacement-amplitude", "0.1")
+    assert (both.returncode, both.stderr.strip()) == (
+        2, "slipsweep: error: amplitude, displacement_amplitude: exactly one of them must be given",
+    )  # fmt: skip

@@ -1,0 +1,490 @@
+"""The page that `slipsweep explore` writes: what is in it, and what it does in Chromium."""
+
+import base64
+import html.parser
+import json
+import math
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep import InputError, Sine, SlidingMode, Validity, simulate, sweep
+from slipsweep.cli.explore import parse_size
+from slipsweep.explore.page import evenly, thinned_lengths, write_page
+from tests.support.processes import slipsweep
+
+pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
+
+#: Stuck, stick-slip, continuous, flagged and statically unstable cells.
+SWEEP = """
+[axes.theta]
+values = [0, 5, 20]
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.amplitude]
+start = 1
+stop = 12
+num = 23
+[axes.frequency]
+start = 0.2
+stop = 10
+num = 18
+spacing = "log"
+[excitation]
+cycles = 4
+[output]
+path = "small.nc"
+"""
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+
+
+def make(folder: Path, text: str) -> Path:
+    """Run a sweep in `folder`."""
+    (folder / "sweep.toml").write_text(text)
+    done = slipsweep(folder, "run", "sweep.toml", "-o", "small.nc", "--quiet")
+    assert done.returncode == 0, done.stderr
+    return folder / "small.nc"
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make(tmp_path_factory.mktemp("explore"), SWEEP)
+
+
+@pytest.fixture(scope="module")
+def written(result: Path) -> Path:
+    output = result.with_suffix(".html")
+    write_page(result, output)
+    return output
+
+
+class Elements(html.parser.HTMLParser):
+    """The text of scripts by their id, and every address that an element refers to."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.scripts: dict[str, str] = {}
+        self.addresses: list[str] = []
+        self._id: str | None = None
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self._id = given.get("id") if tag == "script" else None
+        self.addresses += [value for key, value in attrs if key in ("src", "href") and value]
+
+    def handle_data(self, data: str) -> None:
+        if self._id:
+            self.scripts[self._id] = self.scripts.get(self._id, "") + data
+
+
+def contents(page: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """What a page tells of itself, and its arrays."""
+    scripts = Elements(page.read_text(encoding="utf-8")).scripts
+    meta = json.loads(scripts["meta"])
+    arrays = {
+        name: np.frombuffer(base64.b64decode(scripts[f"array-{name}"]), "<" + kind["dtype"]).reshape(kind["shape"])
+        for name, kind in meta["arrays"].items()
+    }
+    return meta, arrays
+
+
+def axes_of(meta: dict[str, Any]) -> dict[str, list[float]]:
+    return {dim["name"]: dim["values"] for dim in meta["dims"]}
+
+
+# ------------------------------------------------------------------------------- thinning
+
+
+def test_thinning_keeps_within_its_bound_and_both_ends() -> None:
+    lengths = {"theta": 41, "mu_s": 30, "amplitude": 400, "frequency": 300}
+    for cells in (10, 1000, 123_456, 50_000_000):
+        left = thinned_lengths(lengths, cells, ("amplitude", "frequency"))
+        assert math.prod(left.values()) <= cells
+        # not much less than allowed: one more cut of a twentieth would do
+        assert cells > 10_000_000 or math.prod(left.values()) > 0.5 * cells
+        for dim, kept in left.items():
+            indices = evenly(lengths[dim], kept)
+            assert len(indices) == kept
+            assert indices[0] == 0
+            if kept > 1:
+                assert indices[-1] == lengths[dim] - 1
+                assert np.ptp(np.diff(indices)) <= 1
+    assert thinned_lengths(lengths, math.prod(lengths.values())) == lengths
+    assert thinned_lengths({"amplitude": 9, "frequency": 9}, 1, ("amplitude", "frequency")) == {
+        "amplitude": 2,
+        "frequency": 2,
+    }
+
+
+# -------------------------------------------------------------------- what is in the page
+
+
+def test_page_holds_the_dataset(result: Path, written: Path) -> None:
+    meta, arrays = contents(written)
+    with xr.open_dataset(result, mask_and_scale=False) as data:
+        expected = data.sel(axes_of(meta))
+        assert axes_of(meta)["theta"] == [0.0, 5.0, 20.0]
+        for name, kind in (("permanent_displacement", "f4"), ("sliding_mode", "i1"), ("validity", "i2")):
+            values = expected[name].transpose(*axes_of(meta)).values.astype(kind)
+            np.testing.assert_array_equal(np.broadcast_to(arrays[name], values.shape), values)
+    # neither depends on frequency here: stored once
+    assert arrays["sliding_mode"].shape == arrays["validity"].shape == (3, 2, 23, 1)
+    assert [dim["log"] for dim in meta["dims"]] == [False, False, False, True]
+    assert "All 2,484 cells of the file are here." in written.read_text()
+
+
+def test_page_refers_to_nothing_outside(written: Path) -> None:
+    page = Elements(written.read_text(encoding="utf-8"))
+    assert page.addresses == ["data:,"]
+
+
+def test_histories_are_those_of_simulate(written: Path) -> None:
+    meta, arrays = contents(written)
+    axes, told = axes_of(meta), meta["histories"]
+    assert list(told["keep"]) == ["theta", "mu_s", "amplitude"]
+    frequency = 1.7
+    omega = 2.0 * math.pi * frequency
+    seen = set()
+    for place in np.ndindex(*(len(kept) for kept in told["keep"].values())):
+        case = {dim: axes[dim][kept[at]] for (dim, kept), at in zip(told["keep"].items(), place, strict=True)}
+        scale = arrays["history_scale"][place]
+        if case["amplitude"] % 2 != 0 or case["theta"] == 0.0:
+            continue
+        times = np.array(told["phase"]) / omega
+        expected = simulate(**case, frequency=frequency, times=times, excitation=Sine(cycles=4))
+        if np.isnan(scale).any():
+            assert expected.validity & Validity.STATICALLY_UNSTABLE
+            continue
+        seen.add(int(expected.sliding_mode))
+        np.testing.assert_allclose(
+            expected.ground_acceleration, case["amplitude"] * np.array(told["ground"]), atol=1e-12 * case["amplitude"]
+        )
+        for row, name, factor in (
+            (0, "block_acceleration", 1.0),
+            (1, "relative_velocity", 1.0 / omega),
+            (2, "relative_displacement", 1.0 / omega**2),
+        ):
+            kept = arrays["histories"][(*place, row)] * float(scale[row]) * factor
+            largest = float(np.abs(expected[name]).max())
+            if name == "block_acceleration":
+                # it jumps where braking begins, which rounding of t = φ/ω may put on either side
+                differs = np.abs(kept - expected[name].values) > largest / 60_000
+                assert np.count_nonzero(differs) <= told["cycles"]
+            else:
+                np.testing.assert_allclose(kept, expected[name], rtol=0, atol=largest / 60_000)
+    assert seen == {SlidingMode.STUCK, SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS}
+
+
+def test_large_result_is_thinned_to_the_size_and_says_how(tmp_path: Path) -> None:
+    grid = SWEEP.replace("num = 23", "num = 460").replace("num = 18", "num = 180")
+    result, output = make(tmp_path, grid), tmp_path / "page.html"
+    excerpt = write_page(result, output, size=2_500_000)
+    assert 2_000_000 < output.stat().st_size <= 2_500_000
+    meta, arrays = contents(output)
+    axes = axes_of(meta)
+    kept = {dim: len(values) for dim, values in axes.items()}
+    assert kept == excerpt.table["permanent_displacement"].sizes != excerpt.lengths
+    assert kept["amplitude"] < 460
+    with xr.open_dataset(result) as data:
+        for dim in ("amplitude", "frequency"):
+            assert axes[dim][0] == data[dim][0]
+            assert axes[dim][-1] == data[dim][-1]
+        expected = data.permanent_displacement.sel(axes).values.astype("f4")
+    np.testing.assert_array_equal(arrays["permanent_displacement"], expected)
+    text = output.read_text(encoding="utf-8")
+    assert f"Thinned: {math.prod(kept.values()):,} of the file's 496,800 cells" in text
+    assert f"amplitude: {kept['amplitude']} of 460 values" in text
+    assert f"{axes['amplitude'][1]:.5g}" in text
+
+
+def test_unsorted_axes_are_sorted(tmp_path: Path) -> None:
+    """As a Dataset that somebody saves may have them."""
+    data = sweep(5, [0.5, 0.3], [9.0, 3.0, 6.0], [1.0, 4.0, 2.0])
+    data.to_netcdf(tmp_path / "own.nc")
+    write_page(tmp_path / "own.nc", tmp_path / "page.html")
+    meta, arrays = contents(tmp_path / "page.html")
+    assert axes_of(meta) == {"mu_s": [0.3, 0.5], "amplitude": [3.0, 6.0, 9.0], "frequency": [1.0, 2.0, 4.0]}
+    expected = data.sortby(["mu_s", "amplitude", "frequency"]).permanent_displacement.values.astype("f4")
+    np.testing.assert_array_equal(arrays["permanent_displacement"], expected)
+
+
+def test_further_dimensions_and_ground_displacement(tmp_path: Path) -> None:
+    """A = ω²d varies with frequency, and so do the histories and the mode; Üy has a slider."""
+    text = """
+    [axes.theta]
+    values = [5]
+    [axes.displacement_amplitude]
+    values = [0.005, 0.01, 0.02]
+    [axes.frequency]
+    values = [1, 2, 4]
+    [axes.yield_acceleration]
+    values = [0.5, 1.0]
+    [axes.mu_s]
+    values = [0.4]
+    """
+    result, output = make(tmp_path, text), tmp_path / "page.html"
+    write_page(result, output)
+    meta, arrays = contents(output)
+    assert [*axes_of(meta)] == ["theta", "mu_s", "displacement_amplitude", "frequency", "yield_acceleration"]
+    assert (meta["map"]["y"], meta["map"]["x"]) == ("displacement_amplitude", "frequency")
+    assert arrays["sliding_mode"].shape[3] == 3
+    amplitude = np.reshape(meta["coords"]["amplitude"]["values"], meta["coords"]["amplitude"]["shape"])
+    np.testing.assert_allclose(amplitude[2, 1], (4.0 * math.pi) ** 2 * 0.02, rtol=1e-15)
+    expected = simulate(
+        5, 0.4, amplitude[2, 1], 2.0, yield_acceleration=0.5, times=np.array(meta["histories"]["phase"]) / (4 * math.pi)
+    ).relative_displacement
+    at = (0, 0, 2, 1, 0)
+    kept = arrays["histories"][at][2] * float(arrays["history_scale"][at][2]) / (4 * math.pi) ** 2
+    np.testing.assert_allclose(kept, expected, rtol=0, atol=float(expected.max()) / 60_000)
+
+
+# ---------------------------------------------------------------------- errors and outputs
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SWEEP.replace("start = 1\nstop = 12\nnum = 23", "values = [3]"), "no map to draw"),
+        (SWEEP + 'variables = ["sliding_mode"]', "holds no permanent_displacement"),
+        (
+            "[[cases]]\ntheta = 5\nmu_s = 0.4\namplitude = 4\nfrequency = 2\n[[cases]]\ntheta = 5\nmu_s = 0.5\n"
+            "amplitude = 4\nfrequency = 2\n",
+            "the dimensions are: case (2)",
+        ),
+    ],
+)
+def test_result_without_a_map_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    result, output = make(tmp_path, text), tmp_path / "page.html"
+    with pytest.raises(InputError, match=re.escape(message)):
+        write_page(result, output)
+    assert not output.exists()
+
+
+def test_command(result: Path, tmp_path: Path) -> None:
+    done = slipsweep(tmp_path, "explore", str(result), "-o", "page.html")
+    assert done.returncode == 0, done.stderr
+    assert "23 values" in done.stdout
+    page = (tmp_path / "page.html").read_bytes()
+    for arguments, message in (
+        ((str(result), "-o", "page.html"), "exists already"),
+        ((str(result), "-o", "other.html", "--size", "20"), "--size = '20': must be"),
+        ((str(result), "-o", "other.html", "--size", "100kB"), "--size = 100 kB: must be"),
+        (("page.html", "-o", "other.html"), "not a netCDF file"),
+        (("absent.nc", "-o", "other.html"), "no such file"),
+    ):
+        done = slipsweep(tmp_path, "explore", *arguments)
+        assert done.returncode == 2
+        assert done.stderr.startswith("slipsweep: error: ")
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1
+    assert (tmp_path / "page.html").read_bytes() == page
+    assert os.listdir(tmp_path) == ["page.html"]
+
+
+def test_bokeh_missing_is_told(result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "bokeh", None)
+    monkeypatch.setitem(sys.modules, "bokeh.resources", None)
+    with pytest.raises(InputError, match=r"pip install \"slipsweep\[explore\]\""):
+        write_page(result, tmp_path / "page.html")
+    assert not list(tmp_path.iterdir())
+
+
+def test_failure_leaves_nothing(result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", fails)
+    with pytest.raises(OSError, match="No space"):
+        write_page(result, tmp_path / "page.html")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("text", "size"), [("25MB", 25_000_000), ("1.5 GB", 1_500_000_000), ("900kB", 900_000)])
+def test_size(text: str, size: int) -> None:
+    assert parse_size(text) == size
+
+
+# ------------------------------------------------------------------------- in the browser
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    webdriver = pytest.importorskip("selenium.webdriver")
+    if not CHROMIUM or not DRIVER:
+        pytest.skip("chromium and chromedriver are not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--window-size=1340,1000",
+        f"--user-data-dir={tmp_path_factory.mktemp('chromium')}",
+    ):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+def wait_for(driver: Any, script: str) -> Any:
+    """Wait until a script returns something true."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    return WebDriverWait(driver, 60, 0.05).until(lambda d: d.execute_script(f"return {script}"))
+
+
+@pytest.fixture
+def opened(browser: Any, written: Path) -> Any:
+    for log in ("browser", "performance"):
+        browser.get_log(log)
+    browser.get(written.as_uri())
+    wait_for(browser, "document.body.dataset.ready")
+    wait_for(browser, "Bokeh.documents[0].is_idle")
+    return browser
+
+
+def move(driver: Any, theta: int, mu_s: int) -> None:
+    """Move both sliders to a position."""
+    for name, position in (("theta", theta), ("mu_s", mu_s)):
+        driver.execute_script(
+            "const slider = document.getElementById(arguments[0]);"
+            "slider.value = arguments[1]; slider.dispatchEvent(new Event('input'))",
+            f"slider-{name}",
+            position,
+        )
+
+
+def point(driver: Any, x: float, y: float, click: bool = False) -> None:
+    """Put the pointer on a place of the map, in shares of its width and height from the upper left."""
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+
+    frame = driver.execute_script(
+        "const m = Bokeh.documents[0].get_model_by_name('map'); const b = Bokeh.index.find_one(m).frame.bbox;"
+        "return [b.left, b.top, b.width, b.height]"
+    )
+    host = driver.find_element(By.ID, "map")
+    left = frame[0] + x * frame[2] - host.size["width"] / 2
+    top = frame[1] + y * frame[3] - host.size["height"] / 2
+    actions = ActionChains(driver, duration=0).move_to_element_with_offset(host, round(left), round(top))
+    (actions.click() if click else actions).perform()
+
+
+def told(driver: Any, name: str) -> str:
+    return str(driver.execute_script("return document.getElementById('readout-' + arguments[0]).textContent", name))
+
+
+def test_page_loads_without_errors_and_without_network(opened: Any) -> None:
+    move(opened, 0, 1)
+    point(opened, 0.3, 0.2, click=True)
+    wrong = [entry for entry in opened.get_log("browser") if entry["level"] not in ("INFO", "DEBUG")]
+    assert wrong == []
+    events = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
+    sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+    # the browser's own start page, which it may be loading still, is not ours
+    urls = [request["request"]["url"] for request in sent if not request["documentURL"].startswith("chrome")]
+    assert urls
+    assert {url.split(":")[0] for url in urls} <= {"file", "data", "blob"}
+
+
+def test_sliders_change_the_picture(opened: Any) -> None:
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    chart = opened.find_element(By.ID, "map")
+    pictures = set()
+    move(opened, 0, 0)
+    for keys in ("", Keys.ARROW_RIGHT, Keys.ARROW_RIGHT):
+        opened.find_element(By.ID, "slider-theta").send_keys(keys)
+        time.sleep(0.3)  # Bokeh paints with the next frames
+        pictures.add(chart.screenshot_as_png)
+    assert opened.find_element(By.CSS_SELECTOR, "#slider-theta + output").text == "20°"
+    assert len(pictures) == 3
+    # θ = 20° is more than the friction angle of μs = 0.3
+    assert "no value" in opened.find_element(By.ID, "legend").text
+
+
+def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
+    with xr.open_dataset(result, mask_and_scale=False) as data:
+        seen = set()
+        for theta, mu_s, x, y in (
+            (0, 0, 0.1, 0.1), (0, 1, 0.5, 0.3), (1, 0, 0.92, 0.6), (1, 0, 0.2, 0.97),
+            (1, 1, 0.33, 0.05), (2, 0, 0.5, 0.5), (2, 1, 0.7, 0.4), (1, 1, 0.6, 0.45),
+        ):  # fmt: skip
+            move(opened, theta, mu_s)
+            point(opened, x, y)
+            wait_for(opened, "document.getElementById('readout-title').textContent === 'Cell under the pointer'")
+            amplitude = float(told(opened, "amplitude").split()[0])
+            frequency = float(told(opened, "frequency").split()[0])
+            # the cell is where the pointer is: axes from half a cell before the first value to half a cell after
+            assert abs(amplitude - (12.25 - 11.5 * y)) <= 0.27
+            step = math.log(50) / 17
+            assert abs(math.log(frequency / 0.2) - (-0.5 + 18 * x) * step) <= 0.54 * step
+            cell = data.sel(theta=[0, 5, 20][theta], mu_s=[0.3, 0.5][mu_s]).sel(
+                amplitude=amplitude, frequency=frequency, method="nearest"
+            )
+            displacement = float(cell.permanent_displacement)
+            text = told(opened, "displacement")
+            if math.isnan(displacement):
+                assert text == "no value"
+            else:
+                assert text.endswith(" mm")
+                assert float(text.removesuffix(" mm")) == pytest.approx(displacement * 1000, rel=5.1e-4, abs=1e-30)
+            mode = SlidingMode(int(cell.sliding_mode)).name.lower()
+            assert told(opened, "mode") == mode
+            flags = [(flag.name or "").lower() for flag in Validity(int(cell.validity))]
+            assert re.findall(r"(\w+):", "; " + told(opened, "flags"))[: len(flags)] == flags
+            assert flags or told(opened, "flags") == "none"
+            seen |= {mode, *flags}
+        assert {"stuck", "stick_slip", "continuous", "missing", "statically_unstable"} <= seen
+
+
+def test_history_is_of_the_cell_that_was_chosen(opened: Any, result: Path) -> None:
+    move(opened, 1, 0)
+    point(opened, 0.4, 0.25, click=True)
+    wait_for(opened, "document.getElementById('readout-title').textContent !== ''")
+    index = json.loads(opened.execute_script("return document.getElementById('readout').dataset.index"))
+    axes: list[Any] = [[0, 5, 20], [0.3, 0.5], np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)]
+    theta, mu_s, amplitude, frequency = (float(axis[at]) for axis, at in zip(axes, index, strict=True))
+    assert (theta, mu_s) == (5, 0.3)
+    note = opened.execute_script("return document.getElementById('history-note').textContent")
+    assert "First 3 of 4 cycles, of this cell." in note
+    drawn = opened.execute_script(
+        "const d = Bokeh.documents[0].get_model_by_name('history').data; return [[...d.t], [...d.v], [...d.u]]"
+    )
+    expected = simulate(theta, mu_s, amplitude, frequency, times=drawn[0], excitation=Sine(cycles=4))
+    assert drawn[0][-1] == pytest.approx(3 / frequency, rel=1e-12)
+    for values, exact in ((drawn[1], expected.relative_velocity), (drawn[2], expected.relative_displacement * 1000)):
+        assert float(exact.max()) > 0.0
+        np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
+
+
+def test_map_colours_are_the_dataset(opened: Any) -> None:
+    """The picture itself: every pixel has the displacement of the cell it lies in."""
+    move(opened, 1, 0)
+    image = opened.execute_script(
+        "const d = Bokeh.documents[0].get_model_by_name('colours').data.image[0]; return [d.shape, [...d]]"
+    )
+    pixels = np.reshape(np.array(image[1], float), image[0])
+    amplitude, frequency = np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)
+    mm = 1000 * sweep(5, 0.3, amplitude, frequency, excitation=Sine(cycles=4)).permanent_displacement.values
+    rows = ((np.arange(23) + 0.5) * image[0][0] / 23).astype(int)
+    columns = ((np.arange(18) + 0.5) * image[0][1] / 18).astype(int)
+    np.testing.assert_allclose(pixels[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)

@@ -1,0 +1,288 @@
+"""Long tables hold every cell once, exactly; flags come apart as the bits say."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import slipsweep
+from slipsweep.errors import InputError
+from slipsweep.files import export, spec
+from slipsweep.model.variables import VALIDITY_TEXT, Validity
+from slipsweep.runs import store
+from slipsweep.runs.jobs import sweep_job
+from tests.support.processes import slipsweep as command
+
+GRID = """
+[axes.theta]
+values = [0, 5, 20]
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.displacement_amplitude]
+values = [0.01, 0.05, 0.1]
+[axes.frequency]
+values = [1, 2]
+[axes.decay_rate]
+values = [1.0, 2.5]
+[output]
+variables = ["permanent_displacement", "sliding_mode", "validity", "limiting_acceleration"]
+dtype = "float32"
+"""
+
+CASES = """
+[[cases]]
+label = "mild ± slope, wet"
+theta = 5
+mu_s = 0.38
+amplitude = 3.55
+[[cases]]
+label = "steep"
+theta = 25
+mu_s = 0.38
+amplitude = 3.55
+[axes.frequency]
+values = [1, 2, 3]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a grid and a list of cases, solved."""
+    folder = tmp_path_factory.mktemp("export")
+    for name, text in (("grid", GRID), ("cases", CASES)):
+        store.run(sweep_job(spec.parse(text, name)), folder / f"{name}.nc", command="x")
+    return folder
+
+
+def read(path: Path) -> pd.DataFrame:
+    return pd.read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+
+
+def bare(frame: pd.DataFrame) -> pd.DataFrame:
+    """The table with the names of the variables alone."""
+    return frame.rename(columns=lambda header: header.partition(" (")[0])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("block_cells", [7, export.BLOCK_CELLS])
+def test_a_table_has_every_cell_once(folder: Path, tmp_path: Path, suffix: str, block_cells: int) -> None:
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    done: list[int] = []
+    path = tmp_path / f"t{suffix}"
+    rows = export.export(folder / "grid.nc", path, block_cells=block_cells, progress=done.append)
+    table = bare(read(path))
+    assert rows == sum(done) == len(table) == 3 * 2 * 3 * 2 * 2
+    axes = ["theta", "mu_s", "displacement_amplitude", "frequency", "decay_rate"]
+    with xr.open_dataset(folder / "grid.nc", mask_and_scale=False) as data:
+        expected = data.to_dataframe(dim_order=axes).reset_index()
+        expected["sliding_mode"] = expected["sliding_mode"].where(expected["sliding_mode"] >= 0)
+    table, expected = (frame.sort_values(axes, ignore_index=True) for frame in (table, expected))
+    assert {*table.columns} == {*expected.columns}
+    if block_cells == export.BLOCK_CELLS:
+        assert list(bare(read(path))["decay_rate"][:4]) == [1.0, 2.5, 1.0, 2.5]  # the last one runs fastest
+    for name in table:
+        # exact: as many digits as bring the value back
+        read_back = table[name].to_numpy(np.float32 if expected[name].dtype == np.float32 else np.float64)
+        np.testing.assert_array_equal(read_back, expected[name].to_numpy(read_back.dtype))
+
+
+def test_units_stand_in_the_header(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    export.export(folder / "grid.nc", path, variables=["validity", "permanent_displacement"])
+    assert path.read_text().splitlines()[0] == (
+        "theta (degree),mu_s (1),displacement_amplitude (m),frequency (Hz),decay_rate (1),"
+        "validity,permanent_displacement (m)"
+    )
+
+
+def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
+    text = GRID.replace("displacement_amplitude", "amplitude").replace("decay_rate", "structure_frequency")
+    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    assert export.count_rows(tmp_path / "a.nc", ["limiting_acceleration"]) == 18
+    assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", variables=["limiting_acceleration"]) == 18
+    table = bare(pd.read_csv(tmp_path / "a.csv"))
+    assert list(table) == ["theta", "mu_s", "amplitude", "limiting_acceleration"]
+    tangent = np.tan(np.radians(table.theta))
+    coulomb = 9.81 * (table.mu_s - tangent) / (1 + table.mu_s * tangent)
+    eq7 = (coulomb + 9.81 * table.mu_s) / (1 - tangent * (table.mu_s - tangent))
+    np.testing.assert_allclose(table.limiting_acceleration, eq7, rtol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_words(folder: Path, tmp_path: Path, suffix: str) -> None:
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    codes, words = tmp_path / f"codes{suffix}", tmp_path / f"words{suffix}"
+    for path, wanted in ((codes, False), (words, True)):
+        export.export(folder / "cases.nc", path, words=wanted)
+    coded, worded = bare(read(codes)), bare(read(words))
+    assert list(worded["label"]) == ["mild ± slope, wet", "steep"] * 3
+    modes = [slipsweep.SlidingMode(int(c)).name.lower() if c == c else None for c in coded["sliding_mode"]]
+    assert modes[-1] is None
+    assert [None if pd.isna(mode) else mode for mode in worded["sliding_mode"]] == modes
+    flags = [" ".join((flag.name or "").lower() for flag in Validity(code)) for code in coded["validity"]]
+    assert "statically_unstable" in flags
+    assert ["" if pd.isna(flag) else flag for flag in worded["validity"]] == flags
+
+
+def test_a_parquet_file_tells_how_it_was_made(folder: Path, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    export.export(folder / "cases.nc", tmp_path / "t.parquet")
+    schema = parquet.read_schema(tmp_path / "t.parquet")
+    assert schema.metadata[b"sweep"].decode() == CASES
+    assert schema.field("permanent_displacement (m)").metadata[b"units"] == b"m"
+    assert schema.field("validity").metadata[b"flag_meanings"].startswith(b"statically_unstable uplift")
+
+
+def test_memory_stays_that_of_a_block(tmp_path: Path) -> None:
+    """A table of 600 000 rows is written in the memory of a few thousand."""
+    import tracemalloc
+
+    text = "".join(
+        f"[axes.{name}]\nstart = {start}\nstop = {stop}\nnum = {num}\n"
+        for name, start, stop, num in (
+            ("theta", 0, 20, 30), ("mu_s", 0.2, 0.9, 20), ("amplitude", 1, 9, 50), ("frequency", 1, 9, 20),
+        )
+    )  # fmt: skip
+    store.run(sweep_job(spec.parse(text + '[output]\nvariables = ["validity"]', "x")), tmp_path / "a.nc", command="x")
+    tracemalloc.start()
+    try:
+        assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", block_cells=5000) == 600_000
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 0.1 * (tmp_path / "a.csv").stat().st_size
+
+
+def test_the_command(folder: Path) -> None:
+    done = command(folder, "export", "cases.nc", "-o", "cases.csv", "--words", "--variable", "sliding_mode")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("cases.csv  6 rows, ")
+    text = (folder / "cases.csv").read_text(encoding="utf-8")
+    assert text.splitlines()[1] == '5.0,0.38,3.55,1.0,"mild ± slope, wet",stick_slip'
+    again = command(folder, "export", "cases.nc", "-o", "cases.csv")
+    assert again.returncode == 2
+    assert "cases.csv: exists already; give --overwrite" in again.stderr
+    assert (folder / "cases.csv").read_text(encoding="utf-8") == text
+    assert command(folder, "export", "cases.nc", "-o", "cases.csv", "--overwrite", "-q").stdout == ""
+
+
+def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "other.nc").write_text("nothing")
+    for arguments, options, message in (
+        (("grid.nc", "t.txt"), {}, "the name must end in one of .csv, .parquet"),
+        (("grid.nc", "t.csv"), {"variables": ["permanent_displacment"]}, 'did you mean "permanent_displacement"'),
+        (("none.nc", "t.csv"), {}, "none.nc: no such file"),
+        ((str(tmp_path / "other.nc"), "t.csv"), {}, "not a netCDF file"),
+    ):
+        with pytest.raises(InputError, match=message):
+            export.export(folder / arguments[0], tmp_path / arguments[1], **options)  # type: ignore[arg-type]
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.delitem(sys.modules, "pyarrow.parquet", raising=False)
+    with pytest.raises(InputError, match=r"Parquet needs pyarrow: pip install 'slipsweep\[parquet\]'"):
+        export.export(folder / "grid.nc", tmp_path / "t.parquet")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
+
+
+# ----------------------------------------------------------------------------------- flags
+
+
+@pytest.mark.parametrize("chunks", [None, {}])
+def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None:
+    with xr.open_dataset(folder / "grid.nc", chunks=chunks) as data:
+        flags = slipsweep.flags(data)
+        assert list(flags.data_vars) == [(flag.name or "").lower() for flag in Validity]
+        assert flags.uplift.dims == data.validity.dims
+        assert bool(flags.chunks) == (chunks is not None)  # lazy data stay lazy
+        assert flags.statically_unstable.any()
+        together = sum(int(flag) * flags[(flag.name or "").lower()].astype(int) for flag in Validity)
+        xr.testing.assert_equal(together, data.validity.astype(int))
+        xr.testing.assert_identical(flags, slipsweep.flags(data.validity))
+        for flag, text in VALIDITY_TEXT.items():
+            assert flags[(flag.name or "").lower()].dtype == bool
+            assert flags[(flag.name or "").lower()].attrs == {"long_name": text}
+        assert not slipsweep.flags(data).sel(theta=20, mu_s=0.5).statically_unstable.any()
+
+
+def test_flags_go_by_the_words_of_the_file() -> None:
+    mask = xr.DataArray([0, 3, 4], dims="x", attrs={"flag_masks": [1, 4], "flag_meanings": "wet cold"})
+    flags = slipsweep.flags(mask)
+    assert flags.wet.values.tolist() == [False, True, False]
+    assert flags.cold.values.tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (xr.Dataset({"depth": 1.0}), "validity: not in this dataset, which has depth"),
+        (xr.DataArray(3, name="depth"), "depth: no bit mask, 0 flag_masks and 0 flag_meanings"),
+        (
+            xr.DataArray(3.0, name="m", attrs={"flag_masks": [1], "flag_meanings": "wet"}),
+            "m: float64 values; must be whole numbers",
+        ),
+    ],
+)
+def test_what_has_no_flags(data: xr.Dataset | xr.DataArray, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        slipsweep.flags(data)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_packed_numbers_are_unpacked(folder: Path, tmp_path: Path, suffix: str) -> None:
+    """By scale_factor and add_offset, as programs that pack leave them."""
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    packed, path = tmp_path / "packed.nc", tmp_path / f"t{suffix}"
+    with xr.open_dataset(folder / "cases.nc") as data:
+        encoding = {"dtype": ">i2", "scale_factor": 0.001, "add_offset": -1.0, "_FillValue": -32768}
+        expected = data.permanent_displacement.values.ravel()
+        data.drop_encoding().to_netcdf(packed, encoding={"permanent_displacement": encoding})
+    export.export(packed, path, words=True)
+    table = bare(read(path))
+    np.testing.assert_allclose(table["permanent_displacement"], expected, atol=0.0005)
+    assert np.isnan(expected).any()
+    assert set(table["sliding_mode"].dropna()) <= {"stuck", "stick_slip", "continuous"}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_words_of_one_cell(folder: Path, tmp_path: Path, suffix: str) -> None:
+    """A file without dimensions is a table of one row."""
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    cell, path = tmp_path / "cell.nc", tmp_path / f"t{suffix}"
+    with xr.open_dataset(folder / "cases.nc", mask_and_scale=False) as data:
+        data.isel(case=0, frequency=1).to_netcdf(cell)
+    assert export.export(cell, path, words=True) == 1
+    row = bare(read(path)).iloc[0]
+    assert (row.label, row.sliding_mode, row.frequency) == ("mild ± slope, wet", "stick_slip", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "attribute", "value", "refusal"),
+    [
+        ("permanent_displacement", "units", np.arange(3), None),
+        ("validity", "flag_masks", 2.0 ** np.arange(8), None),
+        ("validity", "flag_masks", "all", "flag_meanings has 8 words and flag_masks 0 whole numbers"),
+        ("sliding_mode", "flag_values", np.array([0, 1], np.int8), "3 words and flag_values 2 whole numbers"),
+        ("sliding_mode", "flag_meanings", 7, "1 words and flag_values 3 whole numbers"),
+    ],
+)
+def test_attributes_that_another_program_has_changed(
+    folder: Path, tmp_path: Path, name: str, attribute: str, value: object, refusal: str | None
+) -> None:
+    changed = tmp_path / "changed.nc"
+    with xr.open_dataset(folder / "grid.nc", mask_and_scale=False) as data:
+        data[name].attrs[attribute] = value
+        data.to_netcdf(changed)
+    if refusal is not None:
+        with pytest.raises(InputError, match=refusal):
+            export.export(changed, tmp_path / "t.csv", words=True)
+        return
+    for source in (folder / "grid.nc", changed):
+        export.export(source, tmp_path / f"{source.stem}.csv", words=True)
+    tables = [bare(pd.read_csv(tmp_path / f"{stem}.csv")) for stem in ("grid", "changed")]
+    pd.testing.assert_frame_equal(*tables)

@@ -1,0 +1,539 @@
+"""`sweep` and its siblings as functions: what goes in, what comes out, what is refused, what it costs."""
+
+import itertools
+import math
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import slipsweep
+from slipsweep._version import __version__
+from slipsweep.errors import InputError
+from slipsweep.grid import engine, plans
+from slipsweep.grid.blocks import slabs
+from slipsweep.model.variables import (
+    DEFAULT_RESULTS,
+    FRICTION_PARAMETERS,
+    PARAMETERS,
+    RESULT_DTYPES,
+    RESULTS,
+    Validity,
+)
+from slipsweep.motion.amplitude import peak_acceleration
+from tests.support.cases import choices
+
+AXES: dict[str, Any] = {
+    "theta": [0.0, 5.0, 12.0],
+    "mu_s": [0.3, 0.6],
+    "amplitude": [0.5, 2.0, 4.0, 8.0],
+    "frequency": [0.5, 1.0, 2.0, 4.0, 8.0],
+}
+
+PUBLIC = ("friction_parameters", "limit_amplitude", "simulate", "sweep")
+
+
+@pytest.fixture
+def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Cells of each call of a motion kernel."""
+    solved: list[int] = []
+
+    def counting(kernel: Any) -> Any:
+        def call(grid: Any, first: int, last: int, *rest: Any) -> Any:
+            solved.append(last - first)
+            return kernel(grid, first, last, *rest)
+
+        call.expect = kernel.expect  # type: ignore[attr-defined]
+        return call
+
+    monkeypatch.setattr(engine, "CYCLE_KERNEL", counting(engine.CYCLE_KERNEL))
+    kernels = {rule: counting(kernel) for rule, kernel in engine.STEP_KERNELS.items()}
+    monkeypatch.setattr(engine, "STEP_KERNELS", kernels)
+    return solved
+
+
+# -------------------------------------------------------------------------- public names
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(PUBLIC)), ids="-".join)
+def test_public_functions_are_functions_in_every_order(order: tuple[str, ...]) -> None:
+    program = "; ".join(
+        ["import slipsweep", *(f"assert callable(slipsweep.{name})" for name in order + order), "print('well')"]
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stdout == "well\n", done.stderr
+
+
+def test_no_module_bears_the_name_of_a_function() -> None:
+    import pkgutil
+
+    assert not {module.name for module in pkgutil.iter_modules(slipsweep.__path__)} & {*slipsweep.__all__}
+    assert {*PUBLIC} <= {*dir(slipsweep)}
+
+
+# ------------------------------------------------------------------- dimensions and shapes
+
+
+def test_arrays_are_crossed_in_the_order_of_the_results() -> None:
+    result = slipsweep.sweep(**dict(reversed(AXES.items())))
+    assert tuple(result.data_vars) == DEFAULT_RESULTS
+    for name in DEFAULT_RESULTS:
+        assert result[name].dims == ("theta", "mu_s", "amplitude", "frequency")
+        assert result[name].shape == (3, 2, 4, 5)
+        assert result[name].dtype == RESULT_DTYPES.get(name, "float64")
+        assert isinstance(result[name].data, np.ndarray)
+        assert result[name].attrs == RESULTS[name]
+    for name, values in AXES.items():
+        np.testing.assert_array_equal(result[name], values)
+        assert result[name].attrs == PARAMETERS[name]
+
+
+def test_scalars_become_scalar_coordinates() -> None:
+    result = slipsweep.sweep(5, 0.38, 3.55, 1.8, yield_acceleration=0.59)
+    assert result.sizes == {}
+    assert result.permanent_displacement.shape == ()
+    assert {name: result[name].item() for name in result.coords} == {
+        "theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8, "yield_acceleration": 0.59,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.array, lambda x: np.array(x, np.float32)[::-1][::-1], range])
+def test_any_row_of_numbers_is_an_axis(kind: Any) -> None:
+    row = kind(3) if kind is range else kind([0, 1, 2])
+    result = slipsweep.sweep(row, 0.38, 3.5, 2.0)
+    assert result.theta.dtype == np.float64
+    np.testing.assert_array_equal(result.theta, [0, 1, 2])
+    expected = [slipsweep.sweep(theta, 0.38, 3.5, 2.0).permanent_displacement.item() for theta in (0, 1, 2)]
+    np.testing.assert_array_equal(result.permanent_displacement, expected)
+
+
+def test_optional_parameters_come_after_the_four() -> None:
+    result = slipsweep.sweep(**AXES, delta_mu=[0.1, 0.2], yield_acceleration=[0.5, 1.0, 2.0])
+    assert result.validity.dims == ("theta", "mu_s", "amplitude", "frequency", "yield_acceleration", "delta_mu")
+
+
+def test_arrays_on_one_dimension_are_zipped() -> None:
+    theta = xr.DataArray([2.0, 6.0, 9.0], dims="case", coords={"case": ["a", "b", "c"]})
+    mu_s = xr.DataArray([0.3, 0.5, 0.4], dims="case", attrs={"made_by": "hand"})
+    result = slipsweep.sweep(theta, mu_s, [2.0, 4.0], xr.DataArray([1.0, 2.0, 3.0], dims="case"))
+    assert result.permanent_displacement.dims == ("amplitude", "case")
+    assert list(result["case"].values) == ["a", "b", "c"]
+    assert result.mu_s.attrs == {"made_by": "hand", **PARAMETERS["mu_s"]}
+    for at in range(3):
+        one = slipsweep.sweep(float(theta[at]), float(mu_s[at]), [2.0, 4.0], at + 1.0)
+        xr.testing.assert_equal(result.isel(case=at).drop_vars("case"), one)
+
+
+def test_an_array_of_two_dimensions_keeps_them() -> None:
+    frequency = xr.DataArray([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], dims=("site", "mode"))
+    result = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency)
+    assert result.permanent_displacement.dims == ("theta", "site", "mode")
+    assert result.frequency.dims == ("site", "mode")
+    expected = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency.values.ravel())
+    np.testing.assert_array_equal(
+        result.permanent_displacement.values.reshape(2, 6), expected.permanent_displacement.values
+    )
+
+
+def test_a_lazy_parameter_is_computed() -> None:
+    theta = xr.DataArray([0.0, 5.0], dims="case").chunk(1)
+    result = slipsweep.sweep(theta, 0.38, 4.0, 1.0)
+    assert isinstance(result.theta.data, np.ndarray)
+    assert result.permanent_displacement.dims == ("case",)
+
+
+def test_parameters_are_copied() -> None:
+    theta = np.array([0.0, 5.0])
+    result = slipsweep.sweep(theta, 0.38, 4.0, 1.0)
+    theta[:] = 1.0
+    np.testing.assert_array_equal(result.theta, [0.0, 5.0])
+
+
+def test_displacement_amplitude() -> None:
+    frequency, displacement = np.array([0.5, 1.0, 2.0]), np.array([0.01, 0.05])
+    wanted = ["permanent_displacement", "acceleration_ratio", "amplitude"]
+    result = slipsweep.sweep(5.0, 0.38, frequency=frequency, displacement_amplitude=displacement, variables=wanted)
+    assert result.permanent_displacement.dims == ("displacement_amplitude", "frequency")
+    np.testing.assert_allclose(result.amplitude, np.multiply.outer(displacement, (2 * np.pi * frequency) ** 2))
+    assert result.amplitude.attrs == PARAMETERS["amplitude"]
+    for i, j in np.ndindex(2, 3):
+        one = slipsweep.sweep(5.0, 0.38, result.amplitude.values[i, j], frequency[j], variables=wanted)
+        for name in wanted[:2]:
+            assert one[name].item() == result[name].values[i, j]
+
+
+@pytest.mark.parametrize(
+    ("displacement", "frequency", "dims"),
+    [
+        ([0.01, 0.02], 1.0, ("displacement_amplitude",)),
+        (0.01, [1.0, 2.0], ("frequency",)),
+        (0.01, 1.0, ()),
+        (xr.DataArray([0.01, 0.02], dims="case"), xr.DataArray([1.0, 2.0], dims="case"), ("case",)),
+        ([0.01, 0.02], [1.0, 2.0], None),
+    ],
+)
+def test_the_amplitude_is_a_coordinate_where_it_costs_nothing(
+    displacement: Any, frequency: Any, dims: tuple[str, ...] | None
+) -> None:
+    """On a grid of d and f it would take as much as a result: it is one then, for those who ask."""
+    given: dict[str, Any] = {"displacement_amplitude": displacement, "frequency": frequency}
+    result = slipsweep.sweep([0.0, 5.0], 0.38, **given)
+    assert (result.amplitude.dims if "amplitude" in result.coords else None) == dims
+    asked = slipsweep.sweep([0.0, 5.0], 0.38, **given, variables=["validity", "amplitude"])
+    assert asked.amplitude.dims == (("displacement_amplitude", "frequency") if dims is None else dims)
+    expected = (2 * np.pi * asked.frequency) ** 2 * asked.displacement_amplitude
+    np.testing.assert_allclose(asked.amplitude, expected.transpose(*asked.amplitude.dims))
+
+
+def test_slabs_of_amplitudes_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {
+        "theta": [0.0, 5.0], "mu_s": 0.38, "displacement_amplitude": np.linspace(0.01, 0.4, 7),
+        "frequency": np.linspace(0.3, 3.0, 5), "structure_frequency": [1.0, 4.0],
+    }  # fmt: skip
+    whole = slipsweep.sweep(**given)
+    shapes = []
+
+    def watched(d: Any, f: Any) -> Any:
+        shapes.append(np.broadcast_shapes(d.shape, f.shape))
+        return peak_acceleration(d, f)
+
+    monkeypatch.setattr(engine, "peak_acceleration", watched)
+    monkeypatch.setattr(engine, "_AMPLITUDES", 12)
+    counts: list[int] = []
+    xr.testing.assert_identical(slipsweep.sweep(**given, progress=counts.append), whole)
+    assert max(map(math.prod, shapes)) <= 12
+    assert sum(counts) == whole.validity.size
+
+
+def test_a_grid_of_displacement_amplitudes_is_lazy() -> None:
+    """4e10 amplitudes would take 320 GB."""
+    given: dict[str, Any] = {
+        "theta": 5.0, "mu_s": 0.38,
+        "displacement_amplitude": np.linspace(0.01, 0.4, 200_000), "frequency": np.linspace(0.1, 3.0, 200_000),
+    }  # fmt: skip
+    with pytest.raises(InputError, match="of memory is free"):
+        slipsweep.sweep(**given)
+    lazy = slipsweep.sweep(**given, chunks="auto", variables=["permanent_displacement", "amplitude"])
+    assert sum(coordinate.nbytes for coordinate in lazy.coords.values()) < 4e6
+    assert lazy.amplitude.shape == lazy.permanent_displacement.shape == (200_000, 200_000)
+
+
+def test_structure_frequency_sets_a_flag_and_no_more() -> None:
+    fs = np.array([0.5, 1.0, 4.0, 50.0])
+    plain = slipsweep.sweep(**AXES)
+    result = slipsweep.sweep(**AXES, structure_frequency=fs)
+    ratio = result.frequency / result.structure_frequency
+    flexible = (ratio >= 0.2) & (ratio <= 1.3)
+    expected = plain.validity | (flexible * int(Validity.FLEXIBLE_BLOCK))
+    xr.testing.assert_equal(result.validity, expected.transpose(*result.validity.dims).astype("int16"))
+    for name in ("permanent_displacement", "sliding_mode"):
+        assert (result[name].isel(structure_frequency=0).values == plain[name].values).sum() == np.isfinite(
+            plain[name]
+        ).sum()
+    assert "validity" not in slipsweep.sweep(**AXES, structure_frequency=fs, variables=["sliding_mode"])
+
+
+def test_structure_frequency_along_every_dimension() -> None:
+    sample = np.linspace(0.1, 2.0, 200_000)
+    frequency, fs = xr.DataArray(sample, dims="sample"), xr.DataArray(sample[::-1].copy(), dims="sample")
+    result = slipsweep.sweep(5.0, 0.38, 3.0, frequency, structure_frequency=fs, variables=["validity"])
+    ratio = sample / sample[::-1]
+    np.testing.assert_array_equal(result.validity & 128 != 0, (ratio >= 0.2) & (ratio <= 1.3))
+
+
+# ------------------------------------------------------------------------ what is computed
+
+
+def test_variables_are_returned_as_asked() -> None:
+    result = slipsweep.sweep(**AXES, variables=["limiting_acceleration", "validity", "permanent_displacement"])
+    assert tuple(result.data_vars) == ("permanent_displacement", "validity", "limiting_acceleration")
+    # Eqs. 7-11 do not know of the frequency
+    assert result.limiting_acceleration.dims == ("theta", "mu_s", "amplitude")
+    found = slipsweep.friction_parameters(*(AXES[name] for name in ("theta", "mu_s", "amplitude")))
+    np.testing.assert_array_equal(result.limiting_acceleration, found.limiting_acceleration)
+    everything = slipsweep.sweep(**AXES)
+    np.testing.assert_array_equal(result.validity, everything.validity)
+    # without the peak velocity the kernel may sum in another order
+    np.testing.assert_allclose(result.permanent_displacement, everything.permanent_displacement, rtol=1e-13)
+
+
+def test_what_is_given_is_a_coordinate_and_no_result() -> None:
+    result = slipsweep.sweep(**AXES, delta_mu=0.1, variables=["delta_mu", "decay_rate"])
+    assert tuple(result.data_vars) == ("decay_rate",)
+    assert result.delta_mu.item() == 0.1
+
+
+@pytest.mark.parametrize("solver", ["step", "cycle"])
+def test_the_frequency_axis_costs_no_kernel_calls(solver: str, cells_solved: list[int]) -> None:
+    slipsweep.sweep(**AXES, solver=solver)
+    assert sum(cells_solved) == 3 * 2 * 4
+    plan = plans.plan_sweep(**AXES)
+    inputs = engine.cell_inputs(plan.tasks[0].inputs, 4)
+    assert engine.cells_to_solve((3, 2, 4, 5), inputs, plan.tasks[0].inputs["frequency"]) == 3 * 2 * 4
+
+
+def test_cells_to_solve_of_other_grids(cells_solved: list[int]) -> None:
+    zipped = xr.DataArray([1.0, 2.0], dims="case")
+    for arguments, cells in [
+        # A = omega^2 d: every frequency is another motion
+        ({"theta": [0.0, 5.0], "displacement_amplitude": 0.05, "frequency": AXES["frequency"]}, 10),
+        # zipped with another parameter, the frequency is no dimension of its own
+        ({"theta": zipped, "amplitude": [2.0, 4.0, 6.0], "frequency": zipped}, 6),
+        # the longer of two dimensions
+        ({"theta": 0.0, "amplitude": 3.0, "frequency": xr.DataArray(np.ones((2, 7)), dims=("x", "y"))}, 2),
+    ]:
+        cells_solved.clear()
+        slipsweep.sweep(mu_s=0.38, **arguments)
+        assert sum(cells_solved) == cells
+
+
+def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
+    result = slipsweep.sweep(**AXES, variables=FRICTION_PARAMETERS)
+    assert tuple(result.data_vars) == tuple(name for name in RESULTS if name in FRICTION_PARAMETERS)
+    assert not cells_solved
+    plan = plans.plan_sweep(**AXES, variables=["sliding_mode"])
+    assert [task.names for task in plan.tasks] == [("sliding_mode",)]
+    assert plan.tasks[0].solve().keys() == {"sliding_mode"}
+
+
+def test_progress_counts_every_cell_once() -> None:
+    seen: list[int] = []
+    slipsweep.sweep(np.linspace(0, 15, 40), np.linspace(0.2, 0.9, 40), [1.0, 3.0], [1.0, 2.0], progress=seen.append)
+    assert sum(seen) == 40 * 40 * 2 * 2
+    assert len(seen) > 1
+
+
+@pytest.mark.parametrize("chunks", ["auto", 2, {"theta": 1, "amplitude": 3}, (1, 2, 4, 5), (3, 2, (1, 3), -1)])
+@pytest.mark.parametrize("scheduler", ["threads", "processes", "synchronous"])
+def test_chunked_is_eager_to_the_bit(chunks: Any, scheduler: str) -> None:
+    if scheduler == "processes" and chunks != 2:
+        pytest.skip("slow to start, and no different")
+    options: dict[str, Any] = {**AXES, "structure_frequency": 4.0, "variables": [*DEFAULT_RESULTS, "decay_rate"]}
+    lazy = slipsweep.sweep(**options, chunks=chunks)
+    assert all(hasattr(lazy[name].data, "dask") for name in lazy.data_vars)
+    eager = slipsweep.sweep(**options)
+    assert {name: lazy[name].dtype for name in lazy} == {name: eager[name].dtype for name in eager}
+    xr.testing.assert_identical(lazy.compute(scheduler=scheduler, num_workers=2), eager)
+
+
+def test_lazy_scalars() -> None:
+    lazy = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, chunks="auto", variables=["permanent_displacement", "delta_mu"])
+    eager = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, variables=["permanent_displacement", "delta_mu"])
+    xr.testing.assert_identical(lazy.compute(), eager)
+
+
+def test_a_lazy_sweep_computes_nothing(cells_solved: list[int]) -> None:
+    big = np.linspace(0.1, 10, 300)
+    lazy = slipsweep.sweep(big, big, big, big, chunks="auto")
+    assert lazy.nbytes > 1e11
+    assert not cells_solved
+    lazy.permanent_displacement[3, 4, 5, 6].compute()
+    assert 0 < sum(cells_solved) < 1e7
+
+
+def test_parts_of_a_task_are_the_whole() -> None:
+    shape = (7, 1, 300, 40)
+    for most in (1, 13, 300, 12_000, 10**9):
+        seen = np.zeros(shape, int)
+        for slab in slabs(shape, most):
+            seen[slab] += 1
+            assert seen[slab].size <= most
+        assert (seen == 1).all()
+    assert list(slabs((), 5)) == [()]
+
+
+# ------------------------------------------------------------------------------ attributes
+
+
+def test_attributes_tell_how_it_was_made() -> None:
+    attrs = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, excitation=slipsweep.Sine(cycles=3)).attrs
+    assert attrs["title"] == "Permanent displacement of a rigid block, swept"
+    assert attrs["source"] == f"slipsweep {__version__}"
+    assert "10.1016/j.soildyn.2011.08.007" in attrs["references"]
+    chosen = {name: attrs[name] for name in ("g", "model", "waveform", "cycles", "rise", "recoupling", "solver")}
+    assert chosen == {
+        "g": 9.81, "model": "mendez", "waveform": "sine", "cycles": 3, "rise": "monotone", "recoupling": "eq12",
+        "solver": "cycle",
+    }  # fmt: skip
+    assert not {"rule", "steps_per_cycle"} & {*attrs}
+    stepped = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
+    assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
+    assert not {"rise", "recoupling"} & {*stepped}
+    assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
+        "title", "source", "references", "model", "rise", "recoupling", "g"
+    }  # fmt: skip
+
+
+def test_a_history_has_the_results_of_the_sweep() -> None:
+    history = slipsweep.simulate(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, excitation=slipsweep.Sine(cycles=5))
+    assert history.relative_displacement.dims == ("time",)
+    swept = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, excitation=slipsweep.Sine(cycles=5))
+    xr.testing.assert_identical(
+        history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"), swept.assign_attrs(history.attrs)
+    )
+    assert history.relative_displacement[-1].item() == pytest.approx(swept.permanent_displacement.item(), rel=1e-13)
+
+
+# ---------------------------------------------------------------------------------- errors
+
+GOOD: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency": 1.0}
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"theta": 90.0}, "theta = 90: must be 0 <= theta < 90 degrees"),
+    ({"theta": [0.0, -1.0]}, "theta = -1: must be 0 <= theta < 90 degrees"),
+    ({"theta": math.nan}, "theta = nan: must be 0 <= theta < 90 degrees"),
+    ({"mu_s": 0.0}, "mu_s = 0: must be a finite number > 0"),
+    ({"mu_s": [0.3, math.inf]}, "mu_s = inf: must be a finite number > 0"),
+    ({"amplitude": -0.5}, "amplitude = -0.5: must be a finite number >= 0"),
+    ({"frequency": 0.0}, "frequency = 0: must be a finite number > 0"),
+    ({"amplitude": None, "displacement_amplitude": -1.0}, "displacement_amplitude = -1: must be a finite number >= 0"),
+    ({"yield_acceleration": math.nan}, "yield_acceleration = nan: must be a finite number"),
+    ({"decay_rate": -1.0}, "decay_rate = -1: must be a finite number >= 0"),
+    ({"delta_mu": -0.1}, "delta_mu = -0.1: must be a finite number >= 0"),
+    ({"minimum_friction": 0.0}, "minimum_friction = 0: must be a finite number > 0"),
+    ({"structure_frequency": 0.0}, "structure_frequency = 0: must be a finite number > 0"),
+    ({"g": 0.0}, "g = 0: must be a finite number > 0"),
+    ({"g": [9.8, 9.81]}, "g = [9.8, 9.81]: must be a single number"),
+    ({"theta": "steep"}, "theta = 'steep': must be a number, or an array of numbers"),
+    ({"theta": [[1.0], [2.0, 3.0]]}, "theta = [[1.0], [2.0, 3.0]]: must be a number, or an array of numbers"),
+    ({"mu_s": 0.3j}, "mu_s = 0.3j: must be a number, or an array of numbers"),
+    ({"theta": np.zeros((2, 2))}, "theta: an array of 2 dimensions; must be a scalar, a 1-D array, or a DataArray"),
+    ({"theta": []}, "theta = []: must hold at least one value"),
+    ({"amplitude": None}, "amplitude, displacement_amplitude: exactly one of them must be given"),
+    ({"displacement_amplitude": 0.1}, "amplitude, displacement_amplitude: exactly one of them must be given"),
+    ({"frequency": None}, "frequency: must be given"),
+    (
+        {"amplitude": None, "displacement_amplitude": [1e300, 1.0], "frequency": [1.0, 9e4]},
+        "displacement_amplitude = 1e+300: with frequency = 90000 its amplitude A = (2 pi f)^2 d must be a finite",
+    ),
+    ({"cycles": 0}, "cycles = 0: must be a whole number >= 1"),
+    ({"cycles": 2.5}, "cycles = 2.5: must be a whole number >= 1"),
+    ({"cycles": True}, "cycles = True: must be a whole number >= 1"),
+    ({"cycles": math.inf}, "cycles = inf: must be a whole number >= 1"),
+    ({"cycles": 10**20}, "cycles = 100000000000000000000: must be a whole number <= 1000000000"),
+    ({"solver": "step", "steps_per_cycle": 10}, "steps_per_cycle = 10: must be a multiple of 4 >= 8"),
+    ({"solver": "step", "steps_per_cycle": 4}, "steps_per_cycle = 4: must be a multiple of 4 >= 8"),
+    (
+        {"solver": "step", "steps_per_cycle": 40_000_000},
+        "steps_per_cycle = 40000000: must be a multiple of 4 <= 16777216",
+    ),
+    ({"model": "coulomb"}, "model = 'coulomb': must be one of 'mendez', 'newmark', or Mendez(...), Newmark(...)"),
+    ({"rise": "slow"}, "rise = 'slow': must be one of 'monotone', 'literal'"),
+    ({"recoupling": "eq13"}, "recoupling = 'eq13': must be one of 'eq12', 'integrate'"),
+    ({"waveform": "saw"}, "excitation = 'saw': must be one of 'sine'"),
+    ({"solver": "fast"}, "solver = 'fast': must be one of 'auto', 'cycle', 'step', or Cycle(...), Step(...)"),
+    ({"solver": "step", "rule": "euler"}, "rule = 'euler': must be one of 'rectangle', 'trapezoid', 'simpson'"),
+    ({"variables": "validity"}, "variables = 'validity': must be a list of names"),
+    ({"variables": ["displacement"]}, "variables = 'displacement': must be one of 'permanent_displacement', "),
+    ({"variables": []}, "variables = []: must name one of 'permanent_displacement', "),
+    (
+        {"theta": xr.DataArray([1.0, 2.0], dims="case"), "mu_s": xr.DataArray([0.3, 0.4, 0.5], dims="case")},
+        "mu_s: 3 values along 'case', where another parameter has 2",
+    ),
+    (
+        {
+            "theta": xr.DataArray([1.0, 2.0], dims="case", coords={"case": [1, 2]}),
+            "mu_s": xr.DataArray([0.3, 0.4], dims="case", coords={"case": [1, 3]}),
+        },
+        "mu_s: its coordinate 'case' differs from that of another parameter",
+    ),
+    (
+        {"theta": [0.0, 10.0], "mu_s": xr.DataArray([0.3, 0.4], dims="theta", coords={"theta": [0.0, 5.0]})},
+        "mu_s: its coordinate 'theta' differs from that of another parameter",
+    ),
+    ({"chunks": {"thet": 1}}, "chunks = {'thet': 1}: 'thet' is not a dimension; they are "),
+    ({"theta": [1.0, 2.0], "chunks": ((1, 2),)}, "chunks = ((1, 2),): "),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), BAD, ids=[message[:40] for _, message in BAD])
+def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as error:
+        slipsweep.sweep(**choices(**{**GOOD, **change}))
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"theta": [1.0, 2.0]}, "theta: simulate takes one case; must be a single number"),
+        ({"mu_s": xr.DataArray([0.3], dims="case")}, "mu_s: simulate takes one case; must be a single number"),
+        ({"theta": 95.0}, "theta = 95: must be 0 <= theta < 90 degrees"),
+        ({"points_per_cycle": 3}, "points_per_cycle = 3: must be a whole number >= 4"),
+        ({"points_per_cycle": 10**9, "cycles": 10**9}, "a history of 1e+18 points: takes "),
+        ({"times": [0.0, 2.0, 1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
+        ({"times": [-1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
+        ({"times": [0.0, math.nan]}, "times: must be one row of finite, increasing numbers >= 0"),
+        ({"times": [[0.0, 1.0]]}, "times: must be one row of finite, increasing numbers >= 0"),
+    ],
+)
+def test_bad_histories_are_named(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as error:
+        slipsweep.simulate(**choices(**{**GOOD, **change}))
+    assert str(error.value).startswith(message)
+
+
+def test_bad_friction_parameters_are_named() -> None:
+    with pytest.raises(InputError, match="mu_s = -1: must be a finite number > 0"):
+        slipsweep.friction_parameters(5.0, -1.0, 3.0)
+
+
+def test_unknown_arguments_are_errors() -> None:
+    with pytest.raises(TypeError, match="colour"):
+        slipsweep.sweep(**{**GOOD, "colour": "red"})
+
+
+def test_a_grid_too_large_for_memory_is_refused() -> None:
+    axis = np.linspace(0.1, 10.0, 3000)
+    with pytest.raises(InputError, match=r"grid of 3000 theta x .* x 3000 frequency, 8\.1e\+13 cells: takes .* TB"):
+        slipsweep.sweep(axis, axis, axis, axis)
+
+
+# ---------------------------------------------------------------------------------- memory
+
+MEMORY = """
+import resource, sys
+import numpy as np, xarray as xr
+import slipsweep
+
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+def run(sizes):
+    return {call}
+
+run((3, 3, 3, 3))  # imports, machine code and thread stacks
+before = peak()
+result = run((100, 100, 200, 20))
+print((peak() - before) / result.nbytes)
+"""
+
+AXES_OF = (
+    "np.linspace(0, 20, sizes[0]), np.linspace(0.2, 0.9, sizes[1]), np.linspace(0.5, 13, sizes[2]), "
+    "np.linspace(0.1, 20, sizes[3])"
+)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="measures memory the POSIX way")
+@pytest.mark.parametrize(
+    "call",
+    [
+        f"slipsweep.sweep({AXES_OF}, variables=['permanent_displacement'])",
+        f"slipsweep.sweep({AXES_OF}, variables=['validity'], structure_frequency=3.0)",
+        f"slipsweep.sweep({AXES_OF}, variables=['permanent_displacement', 'limiting_acceleration'])",
+        "slipsweep.sweep(5.0, 0.5, displacement_amplitude=np.linspace(0.01, 0.3, sizes[0] * sizes[3]), "
+        "frequency=np.linspace(0.1, 4, 1 + sizes[1] * sizes[2] // 10))",
+        "slipsweep.sweep(5.0, 0.5, 4.0, np.linspace(0.1, 9, sizes[0] * sizes[3]), variables=['validity'], "
+        "structure_frequency=np.linspace(0.1, 9, sizes[1] * sizes[2]))",
+    ],
+    ids=["displacement", "flags", "friction", "displacement_amplitude", "structure_frequency"],
+)
+def test_peak_memory_is_that_of_the_result(call: str) -> None:
+    """At most 1.2 times its bytes, beyond what a small sweep takes."""
+    done = subprocess.run([sys.executable, "-c", MEMORY.format(call=call)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1.2

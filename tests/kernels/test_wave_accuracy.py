@@ -1,0 +1,251 @@
+"""Every waveform against the multiple-precision reference, closed forms and what must hold between them."""
+
+from math import pi, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import nstr
+
+import slipsweep
+from slipsweep import Validity
+from tests.support.cases import choices
+from tests.support.strategies import reproducible
+from tests.support.wave_cases import REGIMES, WaveCase, read_wave_cases
+from tests.support.wave_cases import solve as reference
+
+CASES = read_wave_cases()
+RICH = {"amplitudes": [1.0, 0.6, 0.35], "multiples": [1, 2, 5], "phases": [0.0, 40.0, 100.0]}
+WAVES: dict[str, dict[str, Any]] = {
+    "sine": {},
+    "cosine": {"waveform": "cosine"},
+    "triangle": {"waveform": "triangle"},
+    "square": {"waveform": "square"},
+    "harmonics": {"waveform": "harmonics", "harmonics": RICH},
+    "ramped triangle": {"waveform": "triangle", "ramp_in": 1.3, "ramp_out": 0.5},
+    "ramped square": {"waveform": "square", "ramp_in": 1.3, "ramp_out": 0.5},
+    "ramped harmonics": {"waveform": "harmonics", "harmonics": RICH, "ramp_in": 2},
+}
+CELLS: dict[str, dict[str, Any]] = {
+    "coulomb": {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55},
+    "continuous": {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.1, "yield_acceleration": 0.08},
+    "measured": {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "yield_acceleration": 0.59, "decay_rate": 2.7},
+    "newmark": {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "model": "newmark"},
+}
+every_wave = pytest.mark.parametrize("wave", WAVES)
+
+
+def displacement(**given: Any) -> float:
+    return float(slipsweep.sweep(**choices(**{"frequency": 1.0, **given})).permanent_displacement)
+
+
+def miss(case: WaveCase) -> str | None:
+    """What is wrong with the cycle solver's answer: 1e-11 |u| + 1e-12 A/ω², peak velocity likewise."""
+    found = slipsweep.sweep(**choices(**case.arguments, solver="cycle"))
+    if (int(found.sliding_mode), int(found.validity)) != (case.sliding_mode, case.validity):
+        return f"{case}: mode {int(found.sliding_mode)}, {Validity(int(found.validity))!r}, not {case.sliding_mode}, "
+    if case.sliding_mode < 0:
+        return None
+    scale = case.displacement_scale
+    for name, unit in (("permanent_displacement", scale), ("peak_relative_velocity", scale * 2 * pi)):
+        value, right = float(found[name]), float(getattr(case, name))
+        times = abs(value - right) / (1e-11 * abs(right) + 1e-12 * unit)
+        if not times <= 1:
+            return f"{case}: {name} {value!r}, not {right!r} ({times:.1e} times allowed)"
+    return None
+
+
+@pytest.mark.parametrize("regime", REGIMES)
+def test_cycle_solver_on_every_case(regime: str) -> None:
+    cases = [case for case in CASES if case.regime == regime]
+    assert {case.waveform for case in cases} == {"sine", "cosine", "triangle", "square", "harmonics"}
+    assert not [wrong for case in cases if (wrong := miss(case))]
+
+
+def test_just_above_yield_keeps_its_digits() -> None:
+    """Relative to u itself: an ulp of A moves it by 3 ulp / excess at most."""
+    cases = [case for case in CASES if case.regime == "just_above_yield" and case.sliding_mode == 1]
+    moved = 0
+    for case in cases:
+        right = float(case.permanent_displacement)
+        assert case.yield_acceleration is not None
+        excess = case.amplitude / case.yield_acceleration - 1
+        if right > 1e-4 * excess**3 * case.displacement_scale:
+            moved += 1
+            error = abs(displacement(**case.arguments) / right - 1)
+            assert error <= 100 * 3 * np.finfo(float).eps / excess, f"{case}: {error:.1e} at excess {excess:.1e}"
+    assert moved > 10
+
+
+@pytest.mark.parametrize("waveform", ["sine", "cosine", "triangle", "square"])
+def test_cases_are_the_reference(waveform: str) -> None:
+    """The first case of each waveform, solved again."""
+    case = next(case for case in CASES if case.waveform == waveform)
+    found = reference(case)
+    assert nstr(found.permanent_displacement, 15) == nstr(
+        type(found.permanent_displacement)(case.permanent_displacement), 15
+    )
+    assert (found.sliding_mode, found.validity) == (case.sliding_mode, case.validity)
+
+
+# Closed forms
+
+
+@reproducible
+@given(share=st.floats(0.18, 0.999), theta=st.floats(0, 15), cycles=st.integers(1, 10**6))
+def test_newmark_under_a_triangle(share: float, theta: float, cycles: int) -> None:
+    """Üy/A ≥ 1 − 2/(1 + √2): parabolas from Üy to the peak and down; the block stops on the same line."""
+    amplitude = 4.0
+    a = (1 - share) * pi / 2
+    stop = a * (1 + sqrt(2))
+    slope = 2 * amplitude / pi
+    pulse = slope * (a**3 / 6 + a**2 * stop / 2 + a * stop**2 / 2 - stop**3 / 6)
+    found = displacement(
+        theta=theta, mu_s=0.8, amplitude=amplitude, yield_acceleration=share * amplitude, model="newmark",
+        waveform="triangle", cycles=cycles,
+    )  # fmt: skip
+    assert found == pytest.approx(cycles * pulse / (2 * pi) ** 2, rel=1e-11 + 1e-15 / (1 - share))
+
+
+@reproducible
+@given(share=st.floats(0.01, 0.999), theta=st.floats(0, 15), cycles=st.integers(1, 10**6))
+def test_newmark_under_a_square_wave(share: float, theta: float, cycles: int) -> None:
+    """A − Üy for half a cycle, −A − Üy to the stop: (A − Üy) π² A/(A + Üy) a cycle."""
+    amplitude, onset = 4.0, share * 4.0
+    pulse = (amplitude - onset) * pi**2 * amplitude / (amplitude + onset)
+    found = displacement(
+        theta=theta, mu_s=0.8, amplitude=amplitude, yield_acceleration=onset, model="newmark", waveform="square",
+        cycles=cycles,
+    )  # fmt: skip
+    assert found == pytest.approx(cycles * pulse / (2 * pi) ** 2, rel=1e-12 + 1e-15 / (1 - share))
+
+
+# What must hold between waveforms
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+def test_one_harmonic_is_the_sine(cell: str, recoupling: str) -> None:
+    """The walk over pieces against the sine's lanes and its symmetry."""
+    options = {**CELLS[cell], "recoupling": recoupling, "cycles": 7}
+    sine = displacement(**options)
+    one = displacement(**options, waveform="harmonics", harmonics={"amplitudes": [3.0], "multiples": [1]})
+    assert one == pytest.approx(sine, rel=1e-12)
+
+
+@pytest.mark.parametrize("multiple", [2, 50])
+def test_a_multiple_is_a_higher_frequency(multiple: int) -> None:
+    """sin mφ over 3 cycles is a sine of m times the frequency over 3 m cycles."""
+    harmonics = {"amplitudes": [1.0], "multiples": [multiple]}
+    for cell in CELLS.values():
+        found = displacement(**cell, cycles=3, waveform="harmonics", harmonics=harmonics)
+        assert found == pytest.approx(displacement(**cell, cycles=3 * multiple, frequency=multiple), rel=1e-11)
+
+
+@pytest.mark.parametrize("cell", ["coulomb", "newmark"])
+def test_later_cycles_of_the_cosine_are_those_of_the_sine(cell: str) -> None:
+    """Where the block comes to rest within each; only its first pulse begins with a jump."""
+    cosine = [displacement(**CELLS[cell], waveform="cosine", cycles=n) for n in (2, 3, 12)]
+    pulse = displacement(**CELLS[cell], cycles=1)
+    assert cosine[1] - cosine[0] == pytest.approx(pulse, rel=1e-11)
+    assert cosine[2] - cosine[0] == pytest.approx(10 * pulse, rel=1e-11)
+
+
+def test_peak_below_zero_decides_the_mode_alone() -> None:
+    """A wave whose positive peak stays below Üy moves no block, however large A is."""
+    harmonics = {"amplitudes": [1.0, 0.5], "multiples": [1, 2], "phases": [0.0, 90.0]}  # 0.75 up, 1.5 down
+    cell: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "waveform": "harmonics", "harmonics": harmonics}
+    still = slipsweep.sweep(**choices(**cell, amplitude=3.55, frequency=1.0, yield_acceleration=1.8))
+    assert float(still.permanent_displacement) == 0.0
+    assert int(still.sliding_mode) == 1
+    assert displacement(**cell, amplitude=3.55, yield_acceleration=1.7) > 0.0
+
+
+@every_wave
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_million_cycles(wave: str, cell: str) -> None:
+    """u grows with the cycles as a line (rest in each) or a parabola (velocity carried on): read off three of them."""
+    if "ramped" in wave:
+        pytest.skip("the pieces of the ramp come once")
+    options = {**CELLS[cell], **WAVES[wave]}
+    counts = np.array([40, 41, 42])
+    few = np.array([displacement(**options, cycles=int(n)) for n in counts])
+    bend = few[2] - 2 * few[1] + few[0]
+    n = 10**6 - 40
+    expected = few[0] + n * (few[1] - few[0]) + bend * n * (n - 1) / 2
+    # rounding of a second difference, times n²/2
+    assert displacement(**options, cycles=10**6) == pytest.approx(expected, rel=1e-9, abs=1e-15 * few[0] * n**2)
+
+
+@every_wave
+def test_frequency_enters_by_the_scaling_law_alone(wave: str) -> None:
+    for cell in CELLS.values():
+        found = slipsweep.sweep(**choices(**cell, **WAVES[wave], frequency=[0.3, 1.0, 7.0], cycles=5))
+        np.testing.assert_allclose(
+            found.permanent_displacement * found.frequency**2, found.permanent_displacement[1], rtol=1e-14
+        )
+
+
+@every_wave
+def test_a_ramp_of_nothing_is_no_ramp(wave: str) -> None:
+    """Exactly at zero cycles, and in the limit."""
+    if "ramped" in wave:
+        pytest.skip("it has one")
+    for cell in CELLS.values():
+        options = {**cell, **WAVES[wave], "cycles": 4}
+        plain = displacement(**options)
+        assert displacement(**options, ramp_in=0, ramp_out=0.0) == plain
+        if cell.get("yield_acceleration", 1.0) > 0.1:  # continuous sliding begins where the ramp passes Üy
+            short = displacement(**options, ramp_in=1e-7, ramp_out=1e-7)
+            assert short == pytest.approx(plain, rel=1e-5)
+
+
+@every_wave
+@pytest.mark.parametrize("cell", CELLS)
+def test_history_is_that_of_the_sweep(wave: str, cell: str) -> None:
+    """v integrates Üg − Ü, u integrates v, and u ends where the sweep does."""
+    options = {**CELLS[cell], **WAVES[wave], "frequency": 1.0, "cycles": 4}
+    found = slipsweep.simulate(**choices(**options, points_per_cycle=2048))
+    step = float(found.time[1])
+    excess = (found.ground_acceleration - found.block_acceleration).values
+    v, u = found.relative_velocity.values, found.relative_displacement.values
+    assert u[-1] == pytest.approx(displacement(**options), rel=1e-12)
+    # at a jump the trapezoid is off by half a step
+    jumps = 20 * step * CELLS[cell]["amplitude"]
+    assert np.abs(np.cumsum(0.5 * (excess[1:] + excess[:-1])) * step - (v - v[0])[1:]).max() < jumps
+    moved = np.cumsum(0.5 * (v[1:] + v[:-1])) * step
+    np.testing.assert_allclose(moved, u[1:], rtol=0, atol=1e-4 * np.abs(u).max() + 1e-9)
+    if "ramped" not in wave:
+        largest = np.abs(found.ground_acceleration).max()
+        assert largest == pytest.approx(CELLS[cell]["amplitude"], rel=1e-4)
+
+
+def test_step_solver_goes_to_the_cycle_solver() -> None:
+    """Simpson with 4096 steps on every waveform and cell: 1e-7, jumps and kinks included."""
+    for wave in WAVES.values():
+        for cell in CELLS.values():
+            options = {**cell, **wave, "cycles": 5}
+            exact = displacement(**options, solver="cycle")
+            assert displacement(**options, solver="step", rule="simpson", steps_per_cycle=4096) == pytest.approx(
+                exact, rel=1e-7
+            )
+
+
+def test_a_grid_is_its_cells() -> None:
+    """A sweep of a waveform, lazy or at once, gives what each cell gives by itself."""
+    axes: dict[str, Any] = {
+        "theta": [0.0, 5.0],
+        "mu_s": [0.3, 0.5],
+        "amplitude": [2.0, 4.0, 7.0],
+        "frequency": [1.0, 2.0],
+    }
+    grid = slipsweep.sweep(**choices(**axes, **WAVES["ramped harmonics"], cycles=5))
+    lazy = slipsweep.sweep(**choices(**axes, **WAVES["ramped harmonics"], cycles=5, chunks={"amplitude": 1})).compute()
+    assert lazy.equals(grid)
+    one = displacement(theta=5.0, mu_s=0.3, amplitude=4.0, frequency=2.0, **WAVES["ramped harmonics"], cycles=5)
+    assert float(grid.permanent_displacement.sel(theta=5, mu_s=0.3, amplitude=4, frequency=2)) == one
+    terms = {"amplitudes": (1.0, 0.6, 0.35), "multiples": (1, 2, 5), "phases": (0.0, 40.0, 100.0)}
+    assert {name: grid.attrs[name] for name in terms} == terms
+    assert grid.attrs["ramp_in"] == 2

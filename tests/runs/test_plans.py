@@ -1,0 +1,303 @@
+"""Every plan, every way: in parts, in blocks, in folders, by workers, killed and gone on with, to the same bits."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep.cli import main
+from slipsweep.errors import InputError
+from slipsweep.files import spec
+from slipsweep.grid.anyplan import AnyPlan
+from slipsweep.grid.blocks import block_lengths, grid_blocks, places
+from slipsweep.runs import solving, store
+from slipsweep.runs.jobs import Job, limit_job, sweep_job
+from tests.support.processes import TIMEOUT
+from tests.support.processes import slipsweep as command
+
+AXES = """
+[axes.amplitude]
+values = [1, 2, 4, 7, 11]
+[axes.frequency]
+values = [0.5, 1, 3]
+"""
+
+#: Rows after the frequency: what a block of some of them gives lies in many places of the file.
+CASES = "".join(
+    f'[[cases]]\nlabel = "no. {i}"\ntheta = {2 * i}\nmu_s = {0.3 + 0.05 * i}\nstructure_frequency = 2\n'
+    for i in range(7)
+)
+
+DRAWN = """
+[uncertainty]
+samples = 32
+correlation = [["amplitude", "yield_acceleration", 0.4]]
+[uncertainty.amplitude]
+kind = "factor"
+distribution = "lognorm"
+s = 0.3
+[uncertainty.yield_acceleration]
+kind = "factor"
+distribution = "lognorm"
+s = 0.1
+"""
+
+#: The frequency decides on the amplitude, and on the samples with it.
+BY_DISPLACEMENT = AXES.replace("[1, 2, 4", "[0.1, 1, 4") + CASES + DRAWN
+BY_DISPLACEMENT = BY_DISPLACEMENT.replace("amplitude", "displacement_amplitude")
+
+#: No dimension but those that samples serve all of, and a parameter that is drawn alone.
+SINGLE = f"[axes.mu_s]\nvalues = [0.4]\n{AXES}{DRAWN}[uncertainty.theta]\ndistribution = 'uniform'\n"
+
+VARIABLES = '[output]\nvariables = ["permanent_displacement", "sliding_mode", "validity", "limiting_acceleration"]\n'
+
+PLANS: dict[str, Callable[[], Job]] = {
+    "sweep": lambda: sweep_job(spec.parse(AXES + CASES + VARIABLES, "a.toml")),
+    "samples": lambda: sweep_job(spec.parse((AXES + CASES + DRAWN).replace("structure_frequency = 2\n", ""), "a.toml")),
+    "samples by displacement": lambda: sweep_job(
+        spec.parse(BY_DISPLACEMENT.replace("structure_frequency = 2\n", ""), "a.toml")
+    ),
+    "single samples": lambda: sweep_job(spec.parse(SINGLE, "a.toml")),
+    "limits": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), [0.001, 0.01, 0.1, 1.0]),
+    "one limit": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), 0.02, 8.0),
+}
+
+
+def assert_part(plan: AnyPlan, block: dict[str, slice], found: Any, whole: Any) -> None:
+    """A table of a block is the block of the table, bit for bit."""
+    assert list(found.data_vars) == list(whole.data_vars) == list(plan.names)
+    for name, one in (whole.data_vars | whole.coords).items():
+        part = found[name]
+        expected = one.values[tuple(places(block, one.sizes).values())]
+        assert (part.dims, part.values.dtype, part.values.shape) == (one.dims, one.values.dtype, expected.shape)
+        assert part.values.tobytes() == np.ascontiguousarray(expected).tobytes(), (name, block)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_parts_give_the_bits_of_the_whole(name: str) -> None:
+    plan = PLANS[name]().plan
+    whole = plan.solve()
+    empty = plan.empty()
+    assert [(one.dims, one.values.shape, one.values.dtype, one.attrs) for one in empty.data_vars.values()] == [
+        (one.dims, one.values.shape, one.values.dtype, one.attrs) for one in whole.data_vars.values()
+    ]
+    assert empty.attrs == whole.attrs
+    for most in (1, 4, 6, 20):
+        for block in grid_blocks(plan.sizes, most, plan.together):
+            part = plan.part(block)
+            assert part.sizes == {dim: cut.stop - cut.start for dim, cut in block.items()}
+            # as it is, and as a worker gets it
+            assert_part(plan, block, part.solve(), whole)
+        assert_part(plan, block, pickle.loads(pickle.dumps(part)).solve(), whole)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_blocks_keep_together_what_is_solved_once(name: str) -> None:
+    plan = PLANS[name]().plan
+    assert {*plan.together} <= {*plan.sizes}
+    lengths = block_lengths(plan.sizes, 12, plan.together)
+    assert [lengths[dim] for dim in plan.together] == [plan.sizes[dim] for dim in plan.together]
+    # progress counts all that there is to solve, once, whatever the blocks
+    counted: list[int] = []
+    for block in grid_blocks(plan.sizes, 12, plan.together):
+        plan.part(block).solve(counted.append)
+    assert sum(counted) == plan.cells
+
+
+def stored(path: Path) -> dict[str, tuple[tuple[str, ...], bytes]]:
+    """All variables of a file, as stored."""
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        return {name: (one.dimensions, np.asarray(one[...]).tobytes()) for name, one in file.variables.items()}
+
+
+@pytest.mark.parametrize("cells", [1, 6, 20])
+@pytest.mark.parametrize("name", PLANS)
+def test_blocks_and_folders_give_what_one_piece_gives(tmp_path: Path, name: str, cells: int) -> None:
+    job = PLANS[name]()
+    one = store.run(job, tmp_path / "one.nc", command="x")
+    blocks = store.run(job, tmp_path / "blocks.nc", command="x", block_cells=cells)
+    assert stored(tmp_path / "blocks.nc") == stored(tmp_path / "one.nc")
+    # what several blocks have, as they lack a dimension, is counted once
+    assert blocks.tally == one.tally
+    split = store.run(job, tmp_path / "split", command="x", block_cells=cells, split=True)
+    assert split.tally == one.tally
+    whole = job.plan.solve()
+    for path in (tmp_path / "blocks.nc", tmp_path / "split"):
+        table = store.stored_table(job.plan, path, cells, job.plan.names)
+        assert_part(job.plan, {}, table, whole)
+
+
+def stopped(job: Job, path: Path, after: int, **options: Any) -> None:
+    """Interrupt a run after some blocks."""
+
+    def solved(*arguments: Any) -> Any:
+        for number, found in enumerate(solving.solve_here(*arguments)):
+            if number == after:
+                raise KeyboardInterrupt
+            yield found
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        store.run(job, path, command="x", solved=solved, **options)
+    assert caught.value.__notes__[0].startswith(f"{after} of ")
+
+
+@pytest.mark.parametrize("split", [False, True])
+@pytest.mark.parametrize("name", PLANS)
+def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path: Path, name: str, split: bool) -> None:
+    job = PLANS[name]()
+    store.run(job, tmp_path / "whole", command="x", block_cells=6, split=split)
+    stopped(job, tmp_path / "a", 2, block_cells=6, split=split)
+    solved: list[int] = []
+
+    def counted(*arguments: Any) -> Any:
+        for found in solving.solve_here(*arguments):
+            solved.append(found[0])
+            yield found
+
+    store.run(job, tmp_path / "a", command="x", resume=True, split=split, solved=counted)
+    assert solved[0] == 2
+    for path in sorted((tmp_path / "whole").iterdir()) if split else [tmp_path / "whole"]:
+        assert stored(tmp_path / "a" / path.name if split else tmp_path / "a") == stored(path)
+
+
+def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
+    sweep = spec.parse(AXES + CASES, "a.toml")
+    stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 2, block_cells=6)
+    for other, message in (
+        (limit_job(sweep, 0.06), r"--displacement was 0\.05, is 0\.06"),
+        (limit_job(sweep, 0.05, 20.0), r"--maximum-amplitude was none, is 20"),
+        (sweep_job(sweep), "--displacement was 0.05, is none"),
+    ):
+        with pytest.raises(InputError, match=message):
+            store.run(other, tmp_path / "a.nc", command="x", resume=True)
+    # the solver that a sweep names is none of the limits'
+    from slipsweep import Step
+
+    store.run(limit_job(sweep.with_solver(Step()), 0.05), tmp_path / "a.nc", command="x", resume=True)
+
+
+def test_blocks_of_what_takes_long_are_small() -> None:
+    """No more than seconds of work are lost with a block, however much memory there is."""
+    text = "[axes.theta]\nstart = 0\nstop = 9\nnum = 1000\n[axes.mu_s]\nvalues = [0.4]\n" + AXES + DRAWN
+    plan = sweep_job(spec.parse(text.replace("samples = 32", "samples = 65536"), "a.toml")).plan
+    # 65536 samples serve three frequencies
+    assert solving.default_cells(plan) == 4_000_000 * 3 // 65536
+    assert solving.cells_within(10**11, plan) == 4_000_000 * 3 // 65536
+    # draws and a million samples are there whatever the blocks
+    with pytest.raises(InputError, match=r"--memory = 400 MB: must be 4\d\d MB at least"):
+        solving.cells_within(400 * 10**6, plan)
+    limits = limit_job(spec.parse("[axes.theta]\nvalues = [1]\n[axes.mu_s]\nvalues = [0.4]\n" + AXES, "a"), 0.05).plan
+    assert 4_000 < solving.default_cells(limits) < 40_000
+
+
+# ------------------------------------------------------------------------------ command line
+
+#: As large as it has to be to be killed in the middle.
+LARGE = """
+[axes.theta]
+start = 0
+stop = 20
+num = 30
+[axes.mu_s]
+start = 0.3
+stop = 0.9
+num = 20
+[axes.amplitude]
+start = 0.5
+stop = 14
+num = 10
+[axes.frequency]
+values = [0.5, 1, 2]
+"""
+
+COMMANDS = {
+    "samples": (LARGE + DRAWN, ("run", "a.toml"), 400),
+    "limits": (LARGE, ("limit", "a.toml", "-d", "1cm", "-d", "10cm"), 20_000),
+}
+
+#: A command with blocks of so many cells of the cycle solver.
+SMALL = """
+import sys
+from slipsweep.grid import blocks
+blocks.BLOCK_CELLS = int(sys.argv[1])
+from slipsweep.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills the POSIX way")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_killed_command_goes_on_to_the_same_bits(tmp_path: Path, name: str) -> None:
+    text, arguments, cells = COMMANDS[name]
+    (tmp_path / "a.toml").write_text(text)
+    expected = command(tmp_path, *arguments, "-o", "whole.nc")
+    assert (expected.returncode, expected.stderr) == (0, "")
+    journal = tmp_path / "a.nc.parts" / "journal"
+    small = [sys.executable, "-c", SMALL, str(cells), *arguments, "-o", "a.nc"]
+    with subprocess.Popen(small, cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
+        end = time.monotonic() + TIMEOUT
+        while process.poll() is None and not (journal.exists() and journal.read_text().count("\n") > 2):
+            assert time.monotonic() < end, "nothing happens"
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    refused = command(tmp_path, *arguments, "-o", "a.nc")
+    assert (refused.returncode, "go on with --resume" in refused.stderr) == (2, True)
+    # what is left is done by others
+    done = command(tmp_path, *arguments, "-o", "a.nc", "--resume", "--workers", "2")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert stored(tmp_path / "a.nc") == stored(tmp_path / "whole.nc")
+    assert not journal.parent.exists()
+    # also of the counts, which are of all cells
+    assert tallies(done.stdout) == tallies(expected.stdout)
+
+
+def tallies(output: str) -> list[str]:
+    """Lines of a summary but for those that tell times, names and sizes."""
+    return [line for line in output.splitlines() if not line.endswith("/s") and ".nc" not in line]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_memory_and_split_serve_every_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    text, arguments, cells = COMMANDS[name]
+    Path("a.toml").write_text(text)
+    monkeypatch.setattr("slipsweep.grid.blocks.BLOCK_CELLS", cells * 5)
+    assert main([*arguments, "-q", "-o", "a.nc", "--memory", "1GB"]) == 0
+    assert main([*arguments, "-q", "-o", "b", "--split"]) == 0
+    assert len(list(Path("b").iterdir())) > 5
+    with xr.open_dataset("a.nc") as whole:
+        for path in Path("b").iterdir():
+            with xr.open_dataset(path) as part:
+                places = {dim: part[dim] for dim in part.dims}
+                xr.testing.assert_identical(part.drop_attrs(), whole.sel(places).drop_attrs())
+
+
+def test_blocks_of_limits_need_an_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(LARGE)
+    for options, message in (
+        (("--resume",), "--resume: needs -o OUT.nc"),
+        (("--memory", "1GB", "-o", "a.png"), "--memory: needs -o OUT.nc"),
+        (("--workers", "2"), "--workers: needs -o OUT.nc"),
+        (("-o", "a.nc", "-o", "b.nc"), "b.nc: a second netCDF output"),
+        (("-o", "a.nc", "--resume", "--overwrite"), "--resume, --overwrite: either"),
+    ):
+        assert main(["limit", "a.toml", "-d", "1cm", *options]) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.toml"]

@@ -1,0 +1,97 @@
+"""Time histories of slides that last long after the shaking: few points, and all of the slide."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import slipsweep
+from slipsweep import Cosine, Harmonics, Sine
+from slipsweep.errors import InputError
+from tests.support.processes import slipsweep as command
+
+#: Shaking that leaves Newmark's block with a velocity.
+SHAKEN: dict[str, Any] = {
+    "cosine": Cosine(),
+    "ramp": Sine(cycles=3, ramp_out=0.7),
+    "harmonics": Harmonics([1, 0.5], [1, 2], phases=[0, 90]),
+}
+
+
+def history(yield_acceleration: float, excitation: Any) -> Any:
+    return slipsweep.simulate(
+        0, 0.4, 3, 1.5, model="newmark", excitation=excitation, yield_acceleration=yield_acceleration,
+        points_per_cycle=16,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("shaken", SHAKEN)
+@pytest.mark.parametrize("yield_acceleration", [0.3, 1e-2, 1e-4, 1e-7, 1e-12, 1e-30])
+def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_acceleration: float) -> None:
+    whole = history(yield_acceleration, SHAKEN[shaken])
+    cycles = SHAKEN[shaken].cycles
+    time = whole.time.values
+    assert time.size <= 16 * (cycles + 100) + 2
+    assert (np.diff(time) > 0).all()
+    shaking = time[: 16 * cycles + 1]
+    np.testing.assert_allclose(shaking, np.arange(16 * cycles + 1) / 16 / 1.5, rtol=1e-14)
+    # at rest, where the sweep says, and at no time before
+    assert whole.relative_velocity.values[-1] == 0.0
+    assert whole.relative_displacement.values[-1] == pytest.approx(whole.permanent_displacement.item(), rel=1e-12)
+    speed = whole.relative_velocity.values[16 * cycles]
+    if speed > 0.0:
+        assert whole.relative_velocity.values[-2] > 0.0
+        braked = whole.relative_velocity.values[16 * cycles :]
+        expected = speed - yield_acceleration * (time[16 * cycles :] - time[16 * cycles])
+        np.testing.assert_allclose(braked[:-1], expected[:-1], rtol=1e-6, atol=1e-9 * speed)
+        # the last interval ends with the slide
+        if time.size == 16 * (cycles + 100) + 1:
+            assert time[-1] - time[16 * cycles] == pytest.approx(speed / yield_acceleration, rel=1e-9)
+
+
+def test_all_points_within_a_hundred_cycles_are_those_of_the_shaking() -> None:
+    whole = history(0.02, Cosine())
+    assert 10 * 16 < whole.time.size < 110 * 16
+    np.testing.assert_allclose(np.diff(whole.time.values), 1 / 16 / 1.5, rtol=1e-9)
+
+
+def test_slides_beyond_double_precision_are_refused() -> None:
+    for least in (1e-308, 1e-320):
+        try:
+            whole = history(least, Cosine())
+        except InputError:
+            continue
+        assert math.isfinite(whole.time.values[-1])
+        assert whole.relative_velocity.values[-1] == 0.0
+    with pytest.raises(InputError):
+        history(5e-324, Cosine())
+
+
+def test_on_the_command_line(tmp_path: Any) -> None:
+    case = ("simulate", "--theta", "0", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1", "--waveform", "cosine")
+    for model in ("newmark", "mendez"):
+        for given in ("1e-7", "1e-20", "1e-300", "5e-324"):
+            done = command(
+                tmp_path, *case, "--model", model, "--yield-acceleration", given, "-o", f"{model}{given}.csv"
+            )
+            assert done.returncode in (0, 2), done
+            assert done.stderr.count("\n") == (done.returncode == 2)
+            assert "Traceback" not in done.stderr
+            assert "Warning" not in done.stderr
+    assert (tmp_path / "newmark1e-7.csv").read_text().count("\n") < 512 * 111
+
+
+@pytest.mark.parametrize("solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"])
+@pytest.mark.parametrize(
+    "excitation",
+    [*(Sine(cycles, ramp) for cycles in (10, 23) for ramp in (0.3, 1.3, 2.0, 2.3)), Cosine(12)],
+    ids=str,
+)
+def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | Cosine, solver: Any) -> None:
+    """A block that does not recouple comes out of the first cycles in motion: its pulses repeat from that velocity."""
+    cell: dict[str, Any] = {"theta": 0, "mu_s": 0.4, "amplitude": 3, "frequency": 1, "yield_acceleration": 1e-3}
+    swept = slipsweep.sweep(**cell, excitation=excitation, solver=solver)
+    history = slipsweep.simulate(**cell, excitation=excitation)
+    assert int(swept.validity) & slipsweep.Validity.NOT_RECOUPLED
+    assert float(swept.permanent_displacement) == pytest.approx(float(history.relative_displacement[-1]), rel=1e-10)

@@ -1,0 +1,322 @@
+"""The inverse of the sweep: limit amplitudes against the sweep itself, closed forms and dense scans."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.optimize import brentq
+
+import slipsweep
+from slipsweep.charts.limit_figures import limit_chart
+from slipsweep.errors import InputError
+from slipsweep.grid.tables import Variable
+from slipsweep.model.units import quantity
+from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
+from slipsweep.studies.limits import plan_limits
+from tests.support.cases import choices
+from tests.support.processes import slipsweep as command
+
+OPTIONS: list[dict[str, Any]] = [
+    {},
+    {"rise": "literal"},
+    {"recoupling": "integrate"},
+    {"model": "newmark"},
+    {"yield_acceleration": 0.6},
+]
+
+
+def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
+    given: dict[str, Any] = {
+        name: xr.DataArray(values, dims=name) if np.ndim(values) else values for name, values in inputs.items()
+    }
+    return slipsweep.sweep(
+        **choices(
+            amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
+        )
+    ).permanent_displacement
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
+    inputs: dict[str, Any] = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
+    displacement = [1e-3, 0.05, 0.8]
+    limits = slipsweep.limit_amplitude(displacement, **choices(**inputs, **options))
+    assert limits.limit_amplitude.dims == ("theta", "mu_s", "frequency", "displacement")
+    found = limits.limit_amplitude.notnull()
+    assert found.mean() > 0.5
+    target = xr.DataArray(displacement, dims="displacement")
+    at = sweep_at(limits.limit_amplitude, inputs, **options).transpose(*found.dims)
+    before = xr.apply_ufunc(np.nextafter, limits.limit_amplitude, 0.0)
+    below = sweep_at(before, inputs, **options).transpose(*found.dims)
+    assert bool((at >= target).where(found, True).all())
+    assert not bool(((below >= target) & found).any())
+    np.testing.assert_array_equal(at.where(found), limits.permanent_displacement)
+    # the status says which of the two kinds of NaN it is, and nothing else is NaN
+    np.testing.assert_array_equal(limits.limit_status >= LimitStatus.NOT_REACHED, ~found)
+
+
+def test_grows_with_displacement_and_with_frequency() -> None:
+    limits = slipsweep.limit_amplitude(np.geomspace(1e-4, 5, 40), 5, [0.3, 0.6], np.geomspace(0.2, 10, 20))
+    amplitude = limits.limit_amplitude.fillna(np.inf)
+    for dim in ("displacement", "frequency"):
+        one, other = amplitude.isel({dim: slice(None, -1)}), amplitude.isel({dim: slice(1, None)})
+        assert (other.values >= one.values).all()
+
+
+def test_scaling_law() -> None:
+    """At twice the frequency a quarter of the displacement has the same limit, bit for bit (powers of two)."""
+    one = slipsweep.limit_amplitude([0.02, 0.4, 1.6], [0, 8], [0.4, 0.7], 1.0)
+    other = slipsweep.limit_amplitude([0.005, 0.1, 0.4], [0, 8], [0.4, 0.7], 2.0)
+    np.testing.assert_array_equal(one.limit_amplitude, other.limit_amplitude)
+    np.testing.assert_array_equal(one.limit_status, other.limit_status)
+
+
+def test_newmark_closed_form() -> None:
+    """One pulse of Newmark's block, solved by Brent's method on the classical closed form."""
+    yielded, omega, g = 1.5, 2 * math.pi * 2.0, 9.81
+
+    def displacement(amplitude: float) -> float:
+        start = math.asin(yielded / amplitude)
+
+        def velocity(phase: float) -> float:
+            return amplitude * (math.cos(start) - math.cos(phase)) - yielded * (phase - start)
+
+        stop = brentq(velocity, math.pi - start, start + 2 * math.pi, xtol=1e-15)
+        slid = stop - start
+        travel = amplitude * (slid * math.cos(start) - math.sin(stop) + math.sin(start)) - yielded * slid * slid / 2
+        return travel / omega**2
+
+    for target in (1e-4, 0.004, 0.02):
+        expected = brentq(lambda a, target=target: displacement(a) - target, yielded * 1.0001, 5 * g, xtol=1e-14)
+        limits = slipsweep.limit_amplitude(
+            target,
+            3,
+            0.5,
+            2.0,
+            yield_acceleration=yielded,
+            maximum_amplitude=5 * g,
+            model="newmark",
+            excitation=slipsweep.Sine(cycles=1),
+        )
+        assert limits.limit_amplitude.item() == pytest.approx(expected, rel=1e-10)
+        assert limits.limit_status.item() == LimitStatus.REACHED
+
+
+def test_target_in_the_jump_of_the_mode_limit() -> None:
+    limit = slipsweep.friction_parameters(5, 0.3, 1.0).limiting_acceleration.item()
+    amplitudes = np.concatenate([np.linspace(2.0, limit, 20_001), [np.nextafter(limit, np.inf)]])
+    moved = slipsweep.sweep(5, 0.3, amplitudes, 2.0).permanent_displacement.values
+    below, above = moved[:-1].max(), moved[-1]
+    assert above > 1.5 * below
+    limits = slipsweep.limit_amplitude(np.linspace(below * 1.001, above * 0.999, 5), 5, 0.3, 2.0)
+    np.testing.assert_array_equal(limits.limit_amplitude, np.nextafter(limit, np.inf))
+    assert (limits.limit_status == LimitStatus.AT_MODE_JUMP).all()
+    assert (limits.sliding_mode == SlidingMode.CONTINUOUS).all()
+
+
+def test_gap_in_validity() -> None:
+    """With mu_s > 1 the calibrated decay rate is not positive below the mode limit, from xi = mu_s^-1/2 on."""
+    given: dict[str, Any] = {"theta": 10, "mu_s": 1.2, "frequency": 1.0, "yield_acceleration": 4.0}
+    limit = slipsweep.friction_parameters(10, 1.2, 1.0, yield_acceleration=4.0).limiting_acceleration.item()
+    edge = limit / math.sqrt(1.2)
+    amplitudes = np.linspace(4.0, edge * (1 - 1e-12), 20_001)
+    below = slipsweep.sweep(**choices(amplitude=amplitudes, **given)).permanent_displacement.max().item()
+    assert slipsweep.sweep(**choices(amplitude=edge * (1 + 1e-9), **given)).permanent_displacement.isnull()
+    limits = slipsweep.limit_amplitude([below * 0.5, below * 1.001], **choices(**given))
+    assert limits.limit_amplitude[0].item() < edge
+    assert limits.limit_amplitude[1].item() == np.nextafter(limit, np.inf)
+    assert limits.limit_status[1].item() == LimitStatus.AFTER_GAP
+
+
+def test_smallest_amplitude_of_a_dense_scan() -> None:
+    """Brute force: the first of 200 000 amplitudes of `sweep` that reaches the target lies just above the limit."""
+    amplitudes = np.linspace(0.3, 20, 200_001)
+    step = amplitudes[1] - amplitudes[0]
+    cases: list[tuple[float, float, dict[str, Any]]] = [
+        (5, 0.3, {}),
+        (12, 0.5, {"recoupling": "integrate"}),
+        (2, 0.4, {"rise": "literal"}),
+    ]
+    for theta, mu_s, options in cases:
+        moved = slipsweep.sweep(theta, mu_s, amplitudes, 1.5, **choices(**options)).permanent_displacement.values
+        targets = np.geomspace(1e-4, np.nanmax(moved), 60)[:-1]
+        limits = slipsweep.limit_amplitude(targets, theta, mu_s, 1.5, **choices(**options)).limit_amplitude.values
+        first = amplitudes[(moved[:, np.newaxis] >= targets).argmax(axis=0)]
+        assert ((first - limits >= 0) & (first - limits <= step)).all()
+
+
+def test_statuses_without_a_limit() -> None:
+    limits = slipsweep.limit_amplitude(1e6, [0, 20], 0.3, 1.0)
+    np.testing.assert_array_equal(limits.limit_status, [LimitStatus.NOT_REACHED, LimitStatus.INVALID])
+    assert limits.limit_amplitude.isnull().all()
+    assert limits.permanent_displacement.isnull().all()
+    assert (limits.sliding_mode == SlidingMode.MISSING).all()
+    assert limits.validity[1].item() & Validity.STATICALLY_UNSTABLE
+    # never beyond the end of the search: yield lies above it
+    assert slipsweep.limit_amplitude(0.01, 0, 0.5, 1.0, maximum_amplitude=1.0).limit_status == LimitStatus.NOT_REACHED
+
+
+def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cells that share a dimension, scanned in slabs of a few, give the bits of single calls."""
+    case: dict[str, Any] = {
+        "displacement": [0.01, 0.2, 0.05],
+        "theta": [2.0, 6.0, 9.0],
+        "mu_s": [0.3, 0.5, 0.4],
+        "frequency": [1.0, 2.0, 0.7],
+    }
+    monkeypatch.setattr("slipsweep.studies.limits._SCANNED", 1024)
+    zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
+    together = slipsweep.limit_amplitude(**choices(**zipped))
+    assert together.limit_amplitude.dims == ("case",)
+    for number in range(3):
+        single: dict[str, Any] = {name: row[number] for name, row in case.items()}
+        alone = slipsweep.limit_amplitude(**choices(**single))
+        for name in alone.data_vars:
+            np.testing.assert_array_equal(together[name][number], alone[name])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"displacement": 0.0}, "displacement = 0: must be a finite number > 0"),
+        ({"displacement": [0.1, math.nan]}, "displacement = nan"),
+        ({"displacement": []}, "displacement = []"),
+        ({"maximum_amplitude": -1.0}, "maximum_amplitude = -1"),
+        ({"amplitude_steps": 1}, "amplitude_steps = 1"),
+        ({"mu_s": 0.0}, "mu_s = 0"),
+        ({"model": "jibson"}, "model = 'jibson'"),
+    ],
+)
+def test_refusals(given: dict[str, Any], message: str) -> None:
+    asked: dict[str, Any] = {"displacement": 0.05, "theta": 5, "mu_s": 0.4, "frequency": 1.0, **given}
+    with pytest.raises(InputError) as refused:
+        slipsweep.limit_amplitude(**choices(**asked))
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "parameter", "expected"),
+    [
+        ("50mm", "displacement_amplitude", 0.05),
+        (" 5 cm ", "displacement_amplitude", 0.05),
+        ("2in", "displacement_amplitude", 0.0508),
+        ("5e-2", "displacement_amplitude", 0.05),
+        (".5 m", "displacement_amplitude", 0.5),
+        ("1.5g", "amplitude", 15.0),
+        ("15 m/s^2", "amplitude", 15.0),
+    ],
+)
+def test_quantity(text: str, parameter: str, expected: float) -> None:
+    assert quantity("--x", text, parameter, 10.0) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["", "mm", "5kg", "1,5 mm", "nan", "5 mm/s"])
+def test_no_quantity(text: str) -> None:
+    with pytest.raises(InputError, match=r"^--x = .*must be a number, with a unit that converts to m"):
+        quantity("--x", text, "displacement_amplitude", 9.81)
+
+
+# ------------------------------------------------------------------------- command line
+
+SWEEP = """
+[model]
+friction = "newmark"
+[axes.theta]
+values = [0, 5]
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.amplitude]
+values = [1, 4]
+[axes.frequency]
+values = [1, 2, 4]
+[excitation]
+cycles = 3
+"""
+
+
+def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(SWEEP)
+    assert command(tmp_path, "run", "small.toml", "-q").returncode == 0
+    # the file holds what `limit_amplitude` gives with the sweep's own options
+    expected = slipsweep.limit_amplitude(
+        [0.02, 0.05], [0, 5], [0.3, 0.5], [1, 2, 4], model="newmark", excitation=slipsweep.Sine(cycles=3)
+    )
+    for source, result in (("small.toml", "one.nc"), ("small.nc", "two.nc")):
+        done = command(tmp_path, "limit", source, "-d", "50mm", "-d", "2 cm", "-o", result, "-o", "l.svg")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "24 limits (2 theta x 2 mu_s x 3 frequency x 2 displacement)" in done.stdout
+        with xr.open_dataset(tmp_path / result) as dataset:
+            np.testing.assert_array_equal(dataset.limit_amplitude, expected.limit_amplitude)
+            np.testing.assert_array_equal(dataset.limit_status, expected.limit_status)
+            assert dataset.limit_status.attrs["flag_meanings"].split()[4] == "not_reached"
+        svg = (tmp_path / "l.svg").read_text()
+        assert "<svg" in svg
+        (tmp_path / "l.svg").unlink()
+    # nothing is overwritten unasked
+    refused = command(tmp_path, "limit", "small.nc", "-d", "50mm", "-o", "one.nc")
+    assert refused.returncode == 2
+    assert "one.nc" in refused.stderr
+
+
+def test_command_names_what_is_wrong(tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(SWEEP)
+    for arguments, message in (
+        (("-d", "5kg"), '--displacement = "5kg"'),
+        (("-d", "0"), "displacement = 0: must be a finite number > 0"),
+        (("-d", "5cm", "--maximum-amplitude", "2m"), '--maximum-amplitude = "2m"'),
+        (("-d", "5cm", "-o", "small.csv"), "small.csv: the name must end in one of .nc, .png, .svg, .pdf"),
+        (("-d", "5cm", "-o", "no/folder/l.nc"), "no/folder"),
+    ):
+        done = command(tmp_path, "limit", "small.toml", *arguments)
+        assert done.returncode == 2, done.stderr
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+CASES = """
+[[cases]]
+label = "dry ± joint"
+theta = 5
+mu_s = 0.38
+amplitude = 1
+[[cases]]
+label = "_wet $^joint^$"
+theta = 8
+mu_s = 0.3
+amplitude = 2
+[axes.frequency]
+values = [1, 2, 3]
+"""
+
+
+def test_cases_keep_their_names(tmp_path: Path) -> None:
+    """In the file, in a table of it, and in figures, whatever they mean to a plotting library."""
+    names = ["dry ± joint", "_wet $^joint^$"]
+    (tmp_path / "a.toml").write_text(CASES, encoding="utf-8")
+    done = command(tmp_path, "limit", "a.toml", "-d", "5mm", "-o", "l.nc", "-o", "l.svg")
+    assert (done.returncode, done.stderr) == (0, "")
+    with xr.open_dataset(tmp_path / "l.nc") as limits:
+        assert list(limits.limit_amplitude.coords["label"].values) == names
+    assert ", ".join(names) in command(tmp_path, "info", "l.nc").stdout
+    # rows that give amplitudes alone are no dimension of the limits
+    (tmp_path / "b.toml").write_text(
+        "[axes.theta]\nvalues = [5]\n[axes.mu_s]\nvalues = [0.4]\n[axes.frequency]\nvalues = [1]\n"
+        '[[cases]]\nlabel = "weak"\namplitude = 1\n[[cases]]\namplitude = 2\n'
+    )
+    assert command(tmp_path, "limit", "b.toml", "-d", "5mm", "-o", "m.nc").returncode == 0
+
+    zipped: dict[str, Any] = {
+        "theta": Variable(("case",), np.array([5.0, 8.0])),
+        "mu_s": Variable(("case",), np.array([0.38, 0.3])),
+    }
+    drawn = ["dry ± joint", r"_wet \$^joint^\$"]
+    for frequency in ([1.0, 2.0, 3.0], 1.0):
+        figure = limit_chart(plan_limits(displacement=0.005, **zipped, frequency=frequency).solve(), names)
+        figure.savefig(tmp_path / "l.png")
+        if frequency == 1.0:
+            assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == drawn
+        else:
+            assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"case {name}" for name in drawn]

@@ -1,0 +1,339 @@
+"""Recorded motions in sweep files: what a run writes, that it repeats itself, blocks, and what is refused."""
+
+import hashlib
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep import InputError, Record, RunError, read_record, sweep
+from slipsweep.files import export, spec
+from slipsweep.grid import blocks
+from slipsweep.grid.tables import Table
+from slipsweep.model.variables import RECORD_RESULTS
+from slipsweep.runs import solving, store
+from slipsweep.runs.jobs import sweep_job
+
+SWEEPS = Path(__file__).parents[2] / "sweeps"
+
+SWEEP = """
+[excitation]
+record = "motion.csv"
+units = "g"
+polarity = "both"
+[axes.theta]
+values = [0, 5, 25]
+[axes.mu_s]
+values = [0.3, 0.4]
+[axes.scale]
+start = 0.5
+stop = 3
+num = 4
+[axes.time_scale]
+values = [1, 2]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A sweep file and the record it names, five seconds of the sample."""
+    lines = (SWEEPS / "data" / "synthetic.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "motion.csv").write_text("time,acceleration\n" + "".join(lines[204:704]))
+    (tmp_path / "a.toml").write_text(SWEEP)
+    return tmp_path
+
+
+def run(sweep: Path, path: Path, **options: Any) -> store.Report:
+    return store.run(sweep_job(spec.load(sweep)), path, command="slipsweep run a.toml", **options)
+
+
+def stored(path: Path) -> dict[str, Any]:
+    """All variables of a file, as stored."""
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        return {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
+
+
+def assert_same_data(one: Path, other: Path) -> None:
+    first, second = stored(one), stored(other)
+    assert list(first) == list(second)
+    for name, values in first.items():
+        np.testing.assert_array_equal(values, second[name], err_msg=name)
+
+
+def command(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "slipsweep", *map(str, arguments)], capture_output=True, text=True, env=os.environ
+    )
+
+
+# ---------------------------------------------------------------------------- what is written
+
+
+def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
+    run(folder / "a.toml", folder / "a.nc")
+    record = read_record(folder / "motion.csv", units="g")
+    expected = sweep(
+        [0, 5, 25], [0.3, 0.4], scale=np.linspace(0.5, 3, 4), time_scale=[1, 2], polarity="both", excitation=record
+    )
+    assert 0 < float(expected.permanent_displacement.max()) < 100
+    assert (expected.number_of_slips == -1).any()
+    with xr.open_dataset(folder / "a.nc", mask_and_scale=False) as result:
+        assert list(result.permanent_displacement.dims) == ["theta", "mu_s", "scale", "time_scale", "polarity"]
+        for name in RECORD_RESULTS:
+            np.testing.assert_array_equal(result[name], expected[name], err_msg=name)
+            assert result[name].attrs.get("ancillary_variables") == (None if name == "validity" else "validity")
+        np.testing.assert_array_equal(result.record_acceleration, record.acceleration)
+        np.testing.assert_array_equal(result.record_time, record.times)
+        assert result.attrs["record_sha256"] == hashlib.sha256((folder / "motion.csv").read_bytes()).hexdigest()
+        kept = {name: result.attrs[name] for name in ("record", "record_format", "record_units", "baseline")}
+        assert kept == {"record": "motion.csv", "record_format": "csv", "record_units": "g", "baseline": "none"}
+
+
+def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
+    """What was taken off and converted before is not taken off or converted again."""
+    (folder / "a.toml").write_text(SWEEP.replace('"both"', '"both"\nbaseline = "linear"'))
+    run(folder / "a.toml", folder / "a.nc")
+    (folder / "motion.csv").unlink()
+    run(folder / "a.nc", folder / "b.nc")
+    assert_same_data(folder / "a.nc", folder / "b.nc")
+    with netCDF4.Dataset(folder / "a.nc") as one, netCDF4.Dataset(folder / "b.nc") as other:
+        names = [name for name in one.ncattrs() if name != "history"]
+        assert {name: one.getncattr(name) for name in names} == {name: other.getncattr(name) for name in names}
+    with pytest.raises(InputError, match=r"a\.toml: excitation\.record: .*motion\.csv: cannot be read"):
+        spec.load(folder / "a.toml")
+
+
+def test_variables_and_type_as_asked_for(folder: Path) -> None:
+    text = SWEEP + '[output]\nvariables = ["continuous_pulses", "peak_relative_velocity"]\ndtype = "float32"\n'
+    (folder / "b.toml").write_text(text)
+    run(folder / "a.toml", folder / "a.nc")
+    run(folder / "b.toml", folder / "b.nc")
+    whole, part = stored(folder / "a.nc"), stored(folder / "b.nc")
+    assert [name for name in RECORD_RESULTS if name in part] == ["peak_relative_velocity", "continuous_pulses"]
+    np.testing.assert_array_equal(part["continuous_pulses"], whole["continuous_pulses"])
+    assert part["continuous_pulses"].dtype == np.int32
+    np.testing.assert_array_equal(part["peak_relative_velocity"], whole["peak_relative_velocity"].astype(np.float32))
+
+
+def test_rows_of_cases_may_hold_the_scales(folder: Path) -> None:
+    text = """
+        [excitation]
+        record = "motion.csv"
+        units = "g"
+        [model]
+        friction = "newmark"
+        yield_acceleration = 0.5
+        [axes.mu_s]
+        values = [0.3, 0.4]
+        [[cases]]
+        theta = 0
+        scale = 2
+        time_scale = 1.5
+        [[cases]]
+        theta = 5
+        scale = 3
+        time_scale = 0.5
+        """
+    (folder / "b.toml").write_text(text)
+    run(folder / "b.toml", folder / "b.nc")
+    record = read_record(folder / "motion.csv", units="g")
+    found = stored(folder / "b.nc")["permanent_displacement"]
+    for at, (theta, scale, time_scale) in enumerate([(0, 2, 1.5), (5, 3, 0.5)]):
+        alone = sweep(
+            theta,
+            [0.3, 0.4],
+            scale=scale,
+            time_scale=time_scale,
+            yield_acceleration=0.5,
+            excitation=record,
+            model="newmark",
+        )
+        np.testing.assert_allclose(found[:, at], alone.permanent_displacement, rtol=1e-15)
+        assert (found[:, at] > 0).all()
+
+
+# -------------------------------------------------------------------------------------- blocks
+
+
+def test_blocks_and_folders_give_what_one_piece_gives(folder: Path) -> None:
+    run(folder / "a.toml", folder / "a.nc")
+    run(folder / "a.toml", folder / "b.nc", block_cells=7)
+    assert_same_data(folder / "a.nc", folder / "b.nc")
+    run(folder / "a.toml", folder / "split", block_cells=30, split=True)
+    whole = stored(folder / "a.nc")
+    for path in sorted((folder / "split").iterdir()):
+        with xr.open_dataset(path) as block, xr.open_dataset(folder / "a.nc") as one:
+            places = {dim: block[dim] for dim in block.permanent_displacement.dims}
+            np.testing.assert_array_equal(block.permanent_displacement, one.permanent_displacement.sel(places))
+        np.testing.assert_array_equal(stored(path)["record_acceleration"], whole["record_acceleration"])
+
+
+def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) -> None:
+    def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
+        for number, table in solving.solve_here(*arguments):
+            if number == 3:
+                raise RunError("the power went")
+            yield number, table
+
+    with pytest.raises(RunError, match="the power went"):
+        run(folder / "a.toml", folder / "a.nc", block_cells=7, solved=failing)
+    motion = (folder / "motion.csv").read_text()
+    (folder / "motion.csv").write_text(motion.replace("5.00,", "5.001,"))
+    with pytest.raises(InputError, match=r"cannot go on with the blocks in a\.nc\.parts: record was"):
+        run(folder / "a.toml", folder / "a.nc", resume=True)
+    (folder / "motion.csv").write_text(motion)
+    run(folder / "a.toml", folder / "a.nc", resume=True)
+    run(folder / "a.toml", folder / "b.nc")
+    assert_same_data(folder / "a.nc", folder / "b.nc")
+
+
+def test_blocks_of_a_record_are_seconds_of_work(folder: Path) -> None:
+    checked = spec.load(folder / "a.toml")
+    job = sweep_job(checked)
+    assert solving.default_cells(job.plan) < blocks.BLOCK_CELLS // 10
+    assert "record" in job.asked
+
+
+# ------------------------------------------------------------------------------------- refused
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"motion.csv"', '"no.csv"', "no.csv: cannot be read"),
+        ('units = "g"\n', "", "motion.csv: units: must be given"),
+        ('units = "g"', 'units = "feet"', "excitation.units = 'feet': must be one of 'm/s2'"),
+        ('units = "g"', 'units = "g"\nchannel = 2', "channel = 2: only COSMOS files"),
+        ('"both"', "0", "excitation.polarity = 0: must be 1, -1 or 'both'"),
+        ('"both"', '"both"\ncycles = 5', "excitation.cycles: not allowed with excitation.record"),
+        ('record = "motion.csv"\n', "", "excitation.polarity: only beside excitation.record"),
+        ("[excitation]", "[other]", "other: unknown key"),
+        ("[axes.time_scale]", "[axes.amplitude]", "axes.scale: not allowed beside amplitude: give one of them"),
+        (
+            "axes.scale",
+            "axes.displacement_amplitude",
+            "axes.displacement_amplitude: not allowed with excitation.record; give amplitude, or scale",
+        ),
+        ("axes.time_scale", "axes.frequency", "axes.frequency: not allowed with excitation.record"),
+        ("start = 0.5", "start = 0", "axes.scale.start = 0.0: must be a finite number > 0"),
+        ("[axes.mu_s]\nvalues = [0.3, 0.4]", "", "axes.mu_s: missing"),
+        (
+            "[axes.theta]",
+            "[solver]\nmethod = 'step'\n[axes.theta]",
+            "solver.method: not allowed with excitation.record",
+        ),
+        ("[axes.theta]", "[model]\nstructure_frequency = 2\n[axes.theta]", "model.structure_frequency: not allowed"),
+        (
+            "[axes.theta]",
+            '[model]\nfriction = "newmark"\ndelta_mu = 0.1\n[axes.theta]',
+            "model.delta_mu: not allowed with friction",
+        ),
+        ("[axes.theta]", '[output]\nvariables = ["sliding_mode"]\n[axes.theta]', "unknown variable"),
+    ],
+)
+def test_sweep_files_that_are_refused(folder: Path, old: str, new: str, message: str) -> None:
+    assert old in SWEEP
+    (folder / "a.toml").write_text(SWEEP.replace(old, new))
+    with pytest.raises(InputError, match=r"a\.toml: ") as error:
+        spec.load(folder / "a.toml")
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_sweep_file_may_scale_the_record_to_its_peak(folder: Path) -> None:
+    given = SWEEP.replace("[axes.scale]", "[axes.amplitude]").replace("num = 4\n", 'num = 4\nunits = "g"\n')
+    (folder / "a.toml").write_text(given)
+    run(folder / "a.toml", folder / "a.nc")
+    found = xr.load_dataset(folder / "a.nc", mask_and_scale=False)
+    record = read_record(folder / "motion.csv", units="g")
+    peak = np.abs(record.acceleration).max()
+    amplitude = np.linspace(0.5, 3, 4) * 9.81
+    np.testing.assert_allclose(found.amplitude, amplitude, rtol=1e-15)
+    scaled = sweep(
+        [0, 5, 25], [0.3, 0.4], excitation=record, scale=amplitude / peak, time_scale=[1, 2], polarity="both"
+    )
+    assert (scaled.permanent_displacement > 0).any()
+    for name in RECORD_RESULTS:
+        assert found[name].dims == tuple(
+            dim.replace("scale", "amplitude") if dim == "scale" else dim for dim in scaled[name].dims
+        )
+        np.testing.assert_array_equal(found[name].values, scaled[name].values)
+    again = folder / "again.nc"
+    store.run(sweep_job(spec.load(folder / "a.nc")), again, command="x")
+    xr.testing.assert_equal(found, xr.load_dataset(again, mask_and_scale=False))
+
+
+def test_scales_need_a_record(folder: Path) -> None:
+    text = SWEEP[SWEEP.index("[axes.theta]") :]
+    (folder / "a.toml").write_text(text)
+    with pytest.raises(InputError, match=r"axes\.scale: only with excitation\.record"):
+        spec.load(folder / "a.toml")
+
+
+def test_a_grid_too_large_for_memory_is_refused() -> None:
+    record = Record.sampled([0.0, 1.0, 0.0], 0.01)
+    many = np.linspace(0.1, 1.0, 30_000)
+    with pytest.raises(InputError, match="of memory is free"):
+        sweep(5.0, np.linspace(0.2, 0.9, 3000), scale=many, time_scale=many, excitation=record)
+
+
+# ------------------------------------------------------------------------------ other commands
+
+
+def test_other_commands_on_the_result(folder: Path) -> None:
+    """`info` and `export` know it; charts, pages and limits say that they are of harmonic motions."""
+    done = command("run", folder / "a.toml", "-o", folder / "a.nc")
+    assert done.returncode == 0, done.stderr
+    assert "96 cells (3 theta x 2 mu_s x 4 scale x 2 time_scale x 2 polarity)" in done.stdout
+    told = command("info", folder / "a.nc").stdout
+    assert "number of slips that begin at rest (int32)" in told
+    assert "recorded acceleration of the plane" in told
+    assert "statically_unstable" in told
+    assert export.export(folder / "a.nc", folder / "a.csv") == 96
+    header, first = (folder / "a.csv").read_text().splitlines()[:2]
+    assert header.startswith("theta (degree),mu_s (1),scale (1),time_scale (1),polarity (1),permanent_displacement (m)")
+    assert first.startswith("0.0,0.3,0.5,1.0,1,")
+    assert export.export(folder / "a.nc", folder / "samples.csv", variables=["record_acceleration"]) == 500
+    for arguments, message in (
+        (("chart", folder / "a.nc"), "is the response to a recorded motion"),
+        (("limit", folder / "a.toml", "--displacement", "0.1"), "limit looks for the amplitude of a harmonic motion"),
+        (("run", folder / "a.toml", "-o", folder / "b.nc", "--solver", "step"), "--solver step: not allowed"),
+    ):
+        done = command(*arguments)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1
+    assert not (folder / "b.nc").exists()
+
+
+# ---------------------------------------------------------------------------------- the sample
+
+
+def test_the_sample_is_what_its_script_makes() -> None:
+    path = SWEEPS / "data" / "synthetic.py"
+    module_spec = importlib.util.spec_from_file_location("synthetic", path)
+    assert module_spec is not None
+    assert module_spec.loader is not None
+    module = importlib.util.module_from_spec(module_spec)
+    module_spec.loader.exec_module(module)
+    assert path.with_suffix(".csv").read_text(encoding="utf-8") == module.text()
+
+
+def test_the_sweep_of_the_sample(tmp_path: Path) -> None:
+    """Slips of both modes, in one and the same cell too; the two polarities differ."""
+    run(SWEEPS / "records.toml", tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc") as result:
+        both_modes = (result.stick_slip_pulses > 0) & (result.continuous_pulses > 0)
+        assert both_modes.any()
+        assert (result.permanent_displacement.sel(polarity=1) != result.permanent_displacement.sel(polarity=-1)).any()
+        peak = np.abs(result.record_acceleration).max() / 9.80665
+        assert float(peak) == pytest.approx(0.35, rel=0.01)

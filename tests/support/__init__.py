@@ -1,0 +1,1 @@
+"""Reference solutions, cases, fault rounds and strategies, for tests and benchmarks alike."""

@@ -1,0 +1,375 @@
+"""The hard cases: where the model is hardest to solve, why, and what one ulp of an input does there.
+
+`CATEGORIES` makes their cells; ``python -m benchmarks.hard_cases`` solves them, and all
+their neighbours one ulp away, in multiple precision into data/hard_cases.csv, which
+`read_hard_cases` reads.
+"""
+
+import csv
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from typing import Any
+
+import numpy as np
+from mpmath import mp, mpf, nstr, workdps
+
+from tests.support import reference
+from tests.support.cases import DATA, PARAMETERS, Case, inputs_of, read_cases
+
+G = 9.81
+HARD_CASES = DATA / "hard_cases.csv"
+
+#: Keyword arguments of `reference.solve`, and of `slipsweep.sweep`.
+Cell = dict[str, Any]
+
+#: θ (degrees) and μs.
+PLANES = ((5.0, 0.38), (0.0, 0.5), (18.0, 0.4))
+
+
+@dataclass(frozen=True)
+class Category:
+    """Cells that are hard for one reason."""
+
+    name: str
+    danger: str
+    cells: Callable[[], Iterator[Cell]]
+    #: Type in which the results are kept.
+    dtype: str = "float64"
+
+
+@dataclass(frozen=True, kw_only=True)
+class HardCase(Case):
+    """A hard case with how far its answer moves, in m and m/s, and the (mode, validity) within one ulp of it."""
+
+    validity: int
+    displacement_bound: str
+    velocity_bound: str
+    outcomes: frozenset[tuple[int, int]]
+
+    def times_bound(self, answer: float) -> float:
+        """Error of a displacement in units of the conditioning bound."""
+        return _times(answer, self.permanent_displacement, self.displacement_bound)
+
+    def velocity_times_bound(self, answer: float) -> float:
+        """Error of a peak velocity in units of its conditioning bound."""
+        return _times(answer, self.peak_relative_velocity, self.velocity_bound)
+
+
+def _times(answer: float, exact: str, bound: str) -> float:
+    """|answer − exact| / bound in decimals: any of them may be subnormal; NaN counts as infinitely far."""
+    if not math.isfinite(answer):
+        return math.inf
+    with localcontext(prec=60):
+        error = abs(Decimal(answer) - Decimal(exact))
+        return float(error / Decimal(bound)) if error else 0.0
+
+
+def _cell(theta: float, mu_s: float, amplitude: float, **options: Any) -> Cell:
+    return {"theta": theta, "mu_s": mu_s, "amplitude": float(amplitude), "frequency": 1.0, "cycles": 1, **options}
+
+
+def _friction(theta: float, mu_s: float, amplitude: float = 1.0, **given: Any) -> reference.FrictionParameters:
+    return reference.friction_parameters(theta, mu_s, amplitude, **given)
+
+
+def _ulps(value: float, count: int) -> float:
+    """The double `count` places above (or below) `value`."""
+    for _ in range(abs(count)):
+        value = math.nextafter(value, math.copysign(math.inf, count))
+    return value
+
+
+def _just_above_yield() -> Iterator[Cell]:
+    for theta, mu_s in PLANES:
+        onset = _friction(theta, mu_s).yield_acceleration
+        for k in (2, 5, 8, 11, 14):
+            yield _cell(theta, mu_s, onset * (1 + mpf(10) ** -k))
+    for k in (4, 12):
+        yield _cell(5.0, 0.38, 0.59 * (1 + 10.0**-k), yield_acceleration=0.59)
+    yield _cell(5.0, 0.38, 0.59, yield_acceleration=0.59)
+    yield _cell(5.0, 0.38, _ulps(0.59, 1), yield_acceleration=0.59)
+    yield _cell(5.0, 0.38, _ulps(0.59, 1), yield_acceleration=0.59, model="newmark")
+
+
+def _mode_limit() -> Iterator[Cell]:
+    for theta, mu_s in PLANES:
+        limit = float(_friction(theta, mu_s).limiting_acceleration)
+        for amplitude in (limit * (1 - 1e-9), _ulps(limit, -1), limit, _ulps(limit, 1), limit * (1 + 1e-9)):
+            yield _cell(theta, mu_s, amplitude)
+
+
+def _near_failure() -> Iterator[Cell]:
+    for theta in (5.0, 18.0):
+        with workdps(40):
+            tangent = mp.tan(mp.radians(mpf(theta)))
+        for k in (3, 6, 9, 12, 15):
+            mu_s = float(tangent * (1 + mpf(10) ** -k))
+            for amplitude in (3 * _friction(theta, mu_s).yield_acceleration, 1.0):
+                yield _cell(theta, mu_s, amplitude, cycles=2)
+        yield _cell(theta, float(tangent * (1 + mpf(10) ** -9)), 1.0, cycles=2, recoupling="integrate")
+        yield _cell(theta, float(tangent * (1 + mpf(10) ** -9)), 1.0, cycles=2, model="newmark")
+
+
+def _level_plane() -> Iterator[Cell]:
+    for amplitude in (5.5, 9.0, 11.0, 14.0):
+        for cycles in (1, 1000):
+            yield _cell(0.0, 0.5, amplitude, cycles=cycles)
+    yield _cell(0.0, 0.5, 6.0, recoupling="integrate", yield_acceleration=2.0)
+    for theta in (1e-300, 1e-14, 1e-7):
+        yield _cell(theta, 0.5, 9.0)
+        yield _cell(theta, 0.5, 11.0, cycles=1000)
+
+
+def _uplift() -> Iterator[Cell]:
+    for theta, mu_s in ((20.0, 0.6), (30.0, 0.9)):
+        with workdps(40):
+            uplift = mpf(G) / mp.tan(mp.radians(mpf(theta)))
+        for k in (2, 5, 8, 11, 14):
+            yield _cell(theta, mu_s, uplift * (1 - mpf(10) ** -k), cycles=2)
+
+
+def _limit_undefined() -> Iterator[Cell]:
+    for theta in (45.0, 60.0):
+        with workdps(40):
+            tangent = mp.tan(mp.radians(mpf(theta)))
+            highest = tangent + 1 / tangent  # μs of a zero denominator
+        for k in (2, 5, 8, 11, 14):
+            mu_s = float(highest * (1 - mpf(10) ** -k))
+            onset = float(_friction(theta, mu_s).yield_acceleration)
+            uplift = float(G / tangent)
+            yield _cell(theta, mu_s, onset + 0.8 * (uplift - onset) if onset < uplift else 0.9 * uplift, cycles=2)
+            yield _cell(theta, mu_s, 0.9 * uplift, yield_acceleration=0.3 * uplift, cycles=2)
+
+
+def _friction_not_decaying() -> Iterator[Cell]:
+    for theta, mu_s in ((5.0, 1.2), (0.0, 1.5)):
+        limit = _friction(theta, mu_s).limiting_acceleration
+        for k in (2, 5, 8, 11, 14):
+            short = (1 - mpf(10) ** -k) / mp.sqrt(mpf(mu_s))
+            yield _cell(theta, mu_s, limit * short, cycles=2)
+            given = _friction(theta, mu_s, yield_acceleration=2.0).limiting_acceleration
+            yield _cell(theta, mu_s, given * short, cycles=2, yield_acceleration=2.0)
+    # beyond μs ξ² = 1 there is no value, but of Newmark's block, which slides
+    limit = _friction(0.0, 1.5, yield_acceleration=2.0).limiting_acceleration
+    for k in (2, 8, 14):
+        amplitude = limit * (1 + mpf(10) ** -k) / mp.sqrt(mpf(1.5))
+        yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0)
+        yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, model="newmark")
+    # with the default Δμ Eq. 4 holds these blocks back; without it the friction starts from μs, and on a level plane
+    # they slide as soon as it decays at all, which it does up to μs ξ = 1
+    for k in (2, 5, 8, 11, 14):
+        for side in (-1, 1):
+            amplitude = limit * (1 + side * mpf(10) ** -k) / mpf(1.5)
+            yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, delta_mu=0.0)
+
+
+def _sharp_decay() -> Iterator[Cell]:
+    for k in (2, 3, 4, 5, 6):
+        for amplitude, onset in ((3.0, 0.59), (5.1, 0.08), (5.1, 1e-5)):
+            friction = {"yield_acceleration": onset, "decay_rate": 10.0**k * G / amplitude, "delta_mu": 0.1}
+            yield _cell(5.0, 0.38, amplitude, cycles=2, **friction)
+    friction = {"yield_acceleration": 1e-5, "decay_rate": 1e6 * G / 3.0, "delta_mu": 0.1}
+    yield _cell(5.0, 0.38, 3.0, **friction)
+    yield _cell(5.0, 0.38, 3.0, rise="literal", **friction)
+
+
+def _tangential_onset() -> Iterator[Cell]:
+    # D(x) = x − Eq. 4 vanishes where μs + Δμ = F(x) = e^(λx/g) (μs − tan θ + g tan θ / n).  On a plane
+    # steeper than friction holds, F has a maximum: there Eq. 4 touches Üg from above.
+    theta, mu_s, onset, amplitude = 20.0, 0.2, 1.3 * G, 1.4 * G
+    given = {"yield_acceleration": onset}
+    with workdps(60):
+        tangent, g = mp.tan(mp.radians(mpf(theta))), mpf(G)
+        excess, touching = mu_s - tangent, mpf("1.5")  # n/g at the maximum
+        rate = tangent**2 / (touching * (touching * excess + tangent))
+        given["decay_rate"] = float(rate)
+        x = (touching - 1) * g / tangent
+        level = mp.exp(float(rate) * x / g) * (excess + tangent / touching) - mu_s
+        for k in (2, 4, 6, 8, 10, 12):
+            yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 - mpf(10) ** -k)))
+        yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 + mpf(10) ** -12)))
+        # or Eq. 4 falls to Üg at the very peak
+        theta, mu_s, amplitude, rate = 5.0, 0.38, 3.0, mpf(4)
+        tangent = mp.tan(mp.radians(mpf(theta)))
+        n = g + amplitude * tangent
+        level = mp.exp(rate * amplitude / g) * (mu_s - tangent + g * tangent / n) - mu_s
+        for k in (2, 5, 8, 11, 14):
+            friction = {"decay_rate": 4.0, "delta_mu": float(level * (1 - mpf(10) ** -k))}
+            yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, **friction)
+
+
+def _restick() -> Iterator[Cell]:
+    for case in read_cases():
+        if case.category == "restick":
+            cell = {**{name: getattr(case, name) for name in PARAMETERS}, **case.options}
+            yield cell
+            if case.case % 4 == 0:
+                yield {**cell, "recoupling": "integrate"}
+                yield {**cell, "rise": "literal"}
+
+
+def _stop_at_next_onset() -> Iterator[Cell]:
+    for theta, mu_s, model in ((18.0, 0.34, "mendez"), (5.0, 0.12, "mendez"), (10.0, 0.2, "mendez")):
+        onset = float(_friction(theta, mu_s).yield_acceleration)
+        low, high = onset, float(_friction(theta, mu_s).limiting_acceleration)
+        if reference.solve(**_cell(theta, mu_s, high, cycles=2, model=model)).recoupled:
+            continue
+        while _ulps(low, 1) < high:
+            middle = 0.5 * (low + high)
+            recoupled = reference.solve(**_cell(theta, mu_s, middle, cycles=2, model=model)).recoupled
+            low, high = (middle, high) if recoupled else (low, middle)
+        for amplitude in (low * (1 - 1e-9), low, high, high * (1 + 1e-9)):
+            yield _cell(theta, mu_s, amplitude, cycles=3, model=model)
+
+
+def _vanishing_kd() -> Iterator[Cell]:
+    theta, mu_s, amplitude, rate = 5.0, 0.38, 1.5, 4.0
+    with workdps(60):
+        tangent, g = mp.tan(mp.radians(mpf(theta))), mpf(G)
+        n = g + amplitude * tangent
+        for k in (1, 3, 6, 9, 12):
+            friction = mu_s - tangent - (amplitude * (1 - mpf(10) ** -k) - g * tangent) / n
+            given = {"decay_rate": rate, "delta_mu": float(friction * mp.exp(rate * amplitude / g) - mu_s)}
+            yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, rise="literal", **given)
+
+
+def _many_cycles() -> Iterator[Cell]:
+    for theta, mu_s, amplitude in ((5.0, 0.38, 3.55), (6.0, 0.38, 5.1), (0.0, 0.5, 11.0), (18.0, 0.34, 2.0)):
+        for model in ("mendez", "newmark"):
+            yield _cell(theta, mu_s, amplitude, cycles=10**6, model=model)
+    yield _cell(6.0, 0.38, 5.1, cycles=10**6, yield_acceleration=0.08)
+    yield _cell(1e-7, 0.5, 11.0, cycles=10**6)
+
+
+def _frequencies() -> Iterator[Cell]:
+    for theta, mu_s, amplitude in ((5.0, 0.38, 3.55), (6.0, 0.38, 7.0), (0.0, 0.5, 11.0)):
+        for frequency in (1e-6, 1e-3, 1e3, 1e6):
+            yield {**_cell(theta, mu_s, amplitude, cycles=3), "frequency": frequency}
+
+
+def _magnitudes() -> Iterator[Cell]:
+    for amplitude in (2e-323, 1e-200, 1e-100, 1e100, 1e200, 1e300):
+        yield _cell(5.0, 0.38, amplitude, yield_acceleration=0.5 * amplitude, model="newmark")
+    yield _cell(0.0, 0.5, 1e100)
+    for g in (1e-300, 1e-200, 1e-100, 1e100, 1e200, 1e300):
+        yield _cell(5.0, 0.38, 0.35 * g, g=g)
+    for g in (1e-100, 1e100):
+        yield _cell(18.0, 0.34, 0.05 * g, g=g, cycles=2)
+    for amplitude in (1e-200, 1e-100):
+        friction = {"yield_acceleration": 0.5 * amplitude, "decay_rate": 1.0, "delta_mu": 0.0}
+        yield _cell(5.0, 0.38, amplitude, **friction)
+
+
+def _beyond_squares() -> Iterator[Cell]:
+    yield _cell(5.0, 0.38, 1e-310, yield_acceleration=5e-311, model="newmark")
+    for amplitude in (1e200, 1e300):
+        yield _cell(0.0, 0.5, amplitude)
+    for g in (1e-300, 1e-200, 1e200, 1e300):
+        yield _cell(18.0, 0.34, 0.05 * g, g=g, cycles=2)
+
+
+def _float32() -> Iterator[Cell]:
+    for frequency in (1e-6, 1.0, 1e6):
+        yield {**_cell(5.0, 0.38, 3.55), "frequency": frequency}
+    for amplitude in (1e-43, 1e-38, 1e36):  # u is about as large: subnormal, the least normal, near the greatest
+        yield _cell(5.0, 0.38, amplitude, yield_acceleration=0.5 * amplitude, model="newmark")
+
+
+CATEGORIES = (
+    Category(
+        "just_above_yield",
+        "u goes with (A − Üy)²: differences of nearly equal numbers lose all digits; the slide is shorter than a step",
+        _just_above_yield,
+    ),
+    Category("mode_limit", "A within rounding of Üg,lim: the mode, and with it the answer, may jump", _mode_limit),
+    Category("near_failure", "μs within 10⁻ᵏ of tan θ: Üy is all cancellation, Kd small", _near_failure),
+    Category("level_plane", "θ = 0 or nearly: division by tan θ; the drift of a cycle must vanish", _level_plane),
+    Category("uplift", "A tan θ → g: the normal force vanishes in the cycle", _uplift),
+    Category("limit_undefined", "1 − tan θ (μs − tan θ) → 0: Üg,lim and Δμ grow without bound", _limit_undefined),
+    Category(
+        "friction_not_decaying", "μs ξ² → 1: λ is the logarithm of nearly 1, or there is none", _friction_not_decaying
+    ),
+    Category("sharp_decay", "λA/g up to 10⁶: friction gone in a layer of 10⁻⁶ of phase", _sharp_decay),
+    Category(
+        "tangential_onset", "Eq. 4 touches Üg: a double root, or none; the slide shrinks to a point", _tangential_onset
+    ),
+    Category("restick", "the block stops before the peak, and may start again", _restick),
+    Category("stop_at_next_onset", "V reaches 0 just as the next slide begins", _stop_at_next_onset),
+    Category("vanishing_kd", "Kd → 0 under the literal rise: u = v²/(2b) grows without bound", _vanishing_kd),
+    Category("many_cycles", "10⁶ cycles: rounding adds up, or a loop takes for ever", _many_cycles),
+    Category("frequencies", "f from 10⁻⁶ to 10⁶ Hz: 1/ω² over 24 decades", _frequencies),
+    Category("magnitudes", "subnormal and huge accelerations", _magnitudes),
+    Category(
+        "beyond_squares",
+        "V²/b and the like where V² is no double; D = Üg − Ü where Üg is 10¹⁹⁹ times as large",
+        _beyond_squares,
+    ),
+    Category("float32", "results kept in single precision: subnormal there, or near its greatest", _float32, "float32"),
+)
+DTYPES = {category.name: category.dtype for category in CATEGORIES}
+
+
+def neighbours(cell: Cell) -> Iterator[Cell]:
+    """`cell` with one of its doubles, g included, one ulp up or down."""
+    for name, value in {"g": G, **cell}.items():
+        if isinstance(value, float):
+            for toward in (-math.inf, math.inf):
+                moved = math.nextafter(value, toward)
+                if name == "yield_acceleration" or moved > 0 or (moved == 0 and name in ("theta", "amplitude")):
+                    yield {**cell, name: moved}
+
+
+def _half_ulp(value: mpf, dtype: str) -> mpf:
+    return mpf(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
+
+
+def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
+    """The reference's answer, and the conditioning bounds of displacement and peak velocity.
+
+    A bound is the greatest change of the exact answer as one of the inputs moves by one ulp,
+    neighbours that have no value left out, plus half an ulp of the answer itself.
+    """
+    answer = reference.solve(**cell)
+    others = [reference.solve(**other) for other in neighbours(cell)]
+    found = {"sliding_mode": str(answer.sliding_mode), "validity": str(answer.validity)}
+    with workdps(60):
+        for result, bound in (
+            ("permanent_displacement", "displacement_bound"),
+            ("peak_relative_velocity", "velocity_bound"),
+        ):
+            value = getattr(answer, result)
+            if mp.isnan(value):
+                found[result] = found[bound] = ""
+                continue
+            moves = [abs(getattr(other, result) - value) for other in others]
+            moved = max((move for move in moves if not mp.isnan(move)), default=mpf(0))
+            found[result] = nstr(value, 30)
+            found[bound] = nstr(moved + _half_ulp(value, dtype), 6)
+    outcomes = sorted({(other.sliding_mode, other.validity) for other in [answer, *others]})
+    return {**found, "outcomes": " ".join(f"{mode}:{validity}" for mode, validity in outcomes)}
+
+
+def read_hard_cases() -> list[HardCase]:
+    """All cases of hard_cases.csv."""
+    with HARD_CASES.open(newline="") as file:
+        return [
+            HardCase(
+                **inputs_of(row),
+                g=float(row["g"]),
+                permanent_displacement=row["permanent_displacement"],
+                peak_relative_velocity=row["peak_relative_velocity"],
+                sliding_mode=int(row["sliding_mode"]),
+                validity=int(row["validity"]),
+                recoupled=not int(row["validity"]) & reference.NOT_RECOUPLED,
+                eq4_below_yield=bool(int(row["validity"]) & reference.EQ4_BELOW_YIELD),
+                displacement_bound=row["displacement_bound"],
+                velocity_bound=row["velocity_bound"],
+                outcomes=frozenset(
+                    (int(mode), int(validity))
+                    for mode, validity in (outcome.split(":") for outcome in row["outcomes"].split())
+                ),
+            )
+            for row in csv.DictReader(file)
+        ]
