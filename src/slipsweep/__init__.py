@@ -2,7 +2,8 @@
 
 `sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
 inputs are uncertain, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history,
-`flags` takes a result's `validity` apart.  The shaking is a waveform (`Sine`, `Cosine`, `Triangle`,
+`flags` takes a result's `validity` apart.  `measured_friction` gives the paper's Eq. 1 on the accelerations
+of a test on a shaking table.  The shaking is a waveform (`Sine`, `Cosine`, `Triangle`,
 `Square`, `Harmonics`) or a `Record` (`read_record`); the model is that of Mendez, Romo and Botero
 (2012), `Mendez`, or `Newmark`; the solver `Cycle` or `Step`.  `Validity` and `SlidingMode` name the
 codes of the results.
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
     from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
+    from slipsweep.studies.shaking_tests import measured_friction
 
 __all__ = [
     "Cosine",
@@ -41,6 +43,7 @@ __all__ = [
     "flags",
     "friction_parameters",
     "limit_amplitude",
+    "measured_friction",
     "read_record",
     "sample",
     "simulate",
@@ -57,6 +60,7 @@ _LAZY = {
         ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
     ),
     "flags": "slipsweep.studies.decoding",
+    "measured_friction": "slipsweep.studies.shaking_tests",
 }
 
 

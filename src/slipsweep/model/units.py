@@ -12,6 +12,8 @@ _OWN_UNITS = {
     "m s-2": ("m s-2", "m/s2", "m/s^2", "m/s**2"),
     "Hz": ("Hz",),
     "m": ("m",),
+    "m s-1": ("m s-1", "m/s"),
+    "s": ("s",),
     "1": ("1",),
 }
 
@@ -27,7 +29,11 @@ def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
     "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
     meant against the gravity that the block feels.
     """
-    own = PARAMETERS[name]["units"]
+    return conversion(key, PARAMETERS[name]["units"], units, g)
+
+
+def conversion(key: str, own: str, units: str | None, g: float) -> float:
+    """Return what to multiply a number in `units` by, to have it in the unit `own`; as `unit_factor`."""
     if units is None or units in _OWN_UNITS[own]:
         return 1.0
     if own == "m s-2" and units == "g":
@@ -42,7 +48,7 @@ def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
     import pint  # only here: it takes 0.2 s to import
 
     registry = pint.get_application_registry()
-    target = "m/s**2" if own == "m s-2" else own
+    target = {"m s-2": "m/s**2", "m s-1": "m/s"}.get(own, own)
     try:
         quantity = registry.Quantity(1.0, text)
         root = quantity.to_root_units().units

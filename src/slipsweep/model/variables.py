@@ -287,3 +287,20 @@ HISTORY: dict[str, dict[str, Any]] = {
     "relative_velocity": {"units": "m s-1", "long_name": "relative velocity of the block"},
     "relative_displacement": {"units": "m", "long_name": "relative displacement of the block"},
 }
+
+#: What Eq. 1 makes of a test on a shaking table, along time.
+MEASURED_FRICTION: dict[str, dict[str, Any]] = {
+    "friction_coefficient": {"units": "1", "long_name": "friction coefficient by Eq. 1"},
+    "friction_ratio": {"units": "1", "long_name": "friction coefficient by Eq. 1 over the static one"},
+}
+
+#: The slides that a test shows.
+SLIDES: dict[str, dict[str, Any]] = {
+    "slide_onset": {"units": "s", "long_name": "time at which a slide begins"},
+    "slide_peak": {"units": "s", "long_name": "time of the largest table acceleration within a slide"},
+    "slide_stop": {"units": "s", "long_name": "time at which a slide stops; missing where the record ends before"},
+    "onset_acceleration": {"units": "m s-2", "long_name": "acceleration of the table where a slide begins"},
+    "peak_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the table within a slide"},
+    "peak_block_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the block within a slide"},
+    "least_friction": {"units": "1", "long_name": "least friction coefficient by Eq. 1 within a slide"},
+}

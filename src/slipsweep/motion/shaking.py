@@ -1,0 +1,263 @@
+"""Tests on a shaking table: what was measured over time, read with names and units from the header.
+
+A test has a row of times, the acceleration of the table, and any of the block's acceleration, its relative
+velocity and its relative displacement.  Sampling may be unequal.  A blank cell, or NaN, is a sample that one
+channel does not have.  Nothing is taken off a channel here but what is asked for (`ShakingTest.corrected`).
+"""
+
+import hashlib
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.model.parameters import check_finite, check_list, check_numbers, shown
+from slipsweep.model.units import conversion
+from slipsweep.model.variables import HISTORY
+from slipsweep.motion.records import MOST_BYTES, STANDARD_GRAVITY, UNITS
+
+Floats = NDArray[np.float64]
+
+TABLE = "ground_acceleration"
+
+#: What the block may be measured by.
+RESPONSES = ("block_acceleration", "relative_velocity", "relative_displacement")
+
+CHANNELS = (TABLE, *RESPONSES)
+
+#: Fewer tell nothing of three parameters and their noise.
+FEWEST_SAMPLES = 16
+
+#: Words of a column's name that say which channel it is: one of the first set, and one of the second.
+_NAMES: dict[str, tuple[set[str], set[str]]] = {
+    TABLE: ({"table", "ground", "plane", "base", "input"}, {"acceleration", "accelerations", "acc"}),
+    "block_acceleration": ({"block", "mass"}, {"acceleration", "accelerations", "acc"}),
+    "relative_velocity": ({"relative", "rel", "sliding"}, {"velocity", "vel"}),
+    "relative_displacement": ({"relative", "rel", "sliding"}, {"displacement", "disp"}),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ShakingTest:
+    """What was measured in a test on a shaking table.
+
+    Attributes
+    ----------
+    times : ndarray
+        Times of the samples, s, increasing; the intervals need not be equal.
+    channels : dict of str to ndarray
+        `ground_acceleration` (m/s², of the table), without a gap, and any of `block_acceleration` (m/s²),
+        `relative_velocity` (m/s) and `relative_displacement` (m, downslope positive), NaN where there is no sample.
+    name : str
+        What the test is called in messages.
+    attrs : dict
+        How it was read and what was taken off it, for the attributes of results.
+
+    Raises
+    ------
+    InputError
+        Fewer than 16 samples, times that do not increase, a channel that is not known, or an acceleration of the
+        table that is not finite.
+    """
+
+    times: Floats
+    channels: Mapping[str, Floats]
+    name: str = "test"
+    attrs: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for channel in self.channels:
+            if channel not in CHANNELS:
+                raise InputError(f"{self.name}: {channel}: must be one of {', '.join(CHANNELS)}")
+        if TABLE not in self.channels:
+            raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
+        times = check_numbers(f"{self.name}: time", self.times)
+        kept = {
+            name: check_numbers(f"{self.name}: {name}", self.channels[name])
+            for name in CHANNELS
+            if name in self.channels
+        }
+        for name, values in kept.items():
+            if times.ndim != 1 or values.shape != times.shape:
+                raise InputError(f"{self.name}: {name}: {values.shape} samples, where time has {times.shape}")
+            if np.isinf(values).any() or not np.isfinite(values).any():
+                raise InputError(f"{self.name}: {name}: must be finite numbers, or blank where there is no sample")
+        if times.size < FEWEST_SAMPLES:
+            raise InputError(f"{self.name}: {times.size} samples: must be at least {FEWEST_SAMPLES}")
+        for what, values in (("time", times), (TABLE, kept[TABLE])):
+            for at in np.flatnonzero(~np.isfinite(values))[:1]:
+                raise InputError(f"{self.name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
+        for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
+            raise InputError(
+                f"{self.name}: time of sample {at + 2} = {times[at + 1]:.15g}: must be greater than "
+                f"{times[at]:.15g}, the time before it"
+            )
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "channels", kept)
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """What the block was measured by."""
+        return tuple(name for name in RESPONSES if name in self.channels)
+
+    def corrected(
+        self, offset: Any = (), drift: Any = (), rest: Sequence[float] | None = None
+    ) -> tuple["ShakingTest", dict[str, tuple[float, float]]]:
+        """The test less a constant or a straight line in some channels, and what these are.
+
+        Parameters
+        ----------
+        offset, drift : str or sequence of str
+            Channels to take a constant, or a straight line, off; "all" is all of them.
+        rest : (float, float), optional
+            From when to when the table and the block were at rest, s: constants and lines are fitted to these
+            samples only.  Without it they are fitted to all samples, which is right for accelerations of a motion
+            that begins and ends at rest.
+
+        Returns
+        -------
+        ShakingTest
+        dict of str to (float, float)
+            Of each channel corrected the constant at the first sample, and the slope in a second.
+        """
+        lines = check_channels("offset", offset, self.channels), check_channels("drift", drift, self.channels)
+        chosen = np.ones(self.times.size, dtype=bool)
+        if rest is not None:
+            bounds = check_list("rest", rest, "two times")
+            if len(bounds) != 2:
+                raise InputError(f"rest = {shown(rest)}: must be two times, s")
+            first, last = (check_finite("rest", one) for one in bounds)
+            chosen = (self.times >= first) & (self.times <= last)
+            if chosen.sum() < 3:
+                raise InputError(f"rest = {shown(rest)}: {chosen.sum()} samples lie between: must be at least 3")
+        channels, removed = dict(self.channels), {}
+        since = self.times - self.times[0]
+        for name in (one for one in CHANNELS if one in lines[0] or one in lines[1]):
+            use = chosen & np.isfinite(channels[name])
+            if use.sum() < 3:
+                raise InputError(f"{name}: {use.sum()} samples to fit its offset to: must be at least 3")
+            terms = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in lines[1] else 0)
+            constant, slope = (*terms.convert().coef, 0.0)[:2]
+            channels[name] = channels[name] - (constant + slope * since)
+            removed[name] = float(constant), float(slope)
+        return replace(self, channels=channels), removed
+
+
+def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, ...]:
+    """The channels that an option names: "all", one, or a list of them."""
+    if isinstance(given, str):
+        given = tuple(known) if given == "all" else (given,)
+    names = check_list(key, given, "channels")
+    for name in names:
+        if name not in known:
+            raise InputError(f"{key} = {shown(name)}: must be 'all', or of the channels measured: {', '.join(known)}")
+    return tuple(names)
+
+
+def removed_text(removed: Mapping[str, tuple[float, float]]) -> list[str]:
+    """What was taken off each channel, a line each."""
+    units = {name: HISTORY[name]["units"] for name in CHANNELS}
+    return [
+        f"{name}: {constant:.4g} {units[name]}" + (f" and {slope:.4g} {units[name]} a second" if slope else "")
+        for name, (constant, slope) in removed.items()
+    ]
+
+
+def read_test(path: str | Path) -> ShakingTest:
+    """Read a test from a CSV file.
+
+    The first line that is not blank and does not begin with ``#`` names the columns, each with its unit in
+    brackets: ``time (s), table acceleration (g), block acceleration (m/s2), relative displacement (mm)``.  Separators
+    are commas, semicolons or tabs.  Columns of other names are left out.  "g" is standard gravity, 9.80665 m/s².
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    ShakingTest
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a column has no unit, or a line holds no numbers: with the number of the line.
+    """
+    try:
+        path = Path(path)
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except TypeError:
+        raise InputError(f"test = {shown(path)}: must be the path of a file, a Dataset or a ShakingTest") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise InputError(f"{path}: cannot be read: {reason or error}") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a test must have that many at most")
+    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    if not rows:
+        raise InputError(f"{path}: has no line of names and no samples")
+    (number, header), *body = rows
+    separator = next((one for one in ("\t", ";", ",") if one in header), ",")
+    columns = [_column(path, cell.strip()) for cell in header.split(separator)]
+    found = [channel for channel, _ in columns if channel is not None]
+    for channel in ("time", *CHANNELS):
+        if found.count(channel) > 1:
+            raise InputError(f"{path}: line {number}: {found.count(channel)} columns are {channel}: must be one")
+    for channel in ("time", TABLE):
+        if channel not in found:
+            raise InputError(
+                f"{path}: line {number}: no column {'time' if channel == 'time' else 'table acceleration'}: must "
+                "name its columns, such as time (s), table acceleration (m/s2), block acceleration (m/s2)"
+            )
+    values = np.full((len(body), len(columns)), np.nan)
+    for row, (at, line) in zip(values, body, strict=True):
+        cells = [cell.strip() for cell in line.split(separator)]
+        if len(cells) != len(columns):
+            raise InputError(f"{path}: line {at}: {len(cells)} cells, where {len(columns)} columns are named")
+        for i, (cell, (named, _)) in enumerate(zip(cells, columns, strict=True)):
+            if named is None or (cell == "" and named not in ("time", TABLE)):
+                continue
+            try:
+                row[i] = float(cell)
+            except ValueError:
+                raise InputError(f"{path}: line {at}: {named} = {shown(cell)}: must be a number") from None
+    read = {channel: factor * values[:, i] for i, (channel, factor) in enumerate(columns) if channel is not None}
+    return ShakingTest(
+        read.pop("time"),
+        read,
+        str(path),
+        {
+            "test": path.name.encode(errors="backslashreplace").decode(),
+            "test_sha256": hashlib.sha256(content).hexdigest(),
+        },
+    )
+
+
+def _column(path: Path, cell: str) -> tuple[str | None, float]:
+    """The channel of a column, None of one that is left out, and the factor to its unit."""
+    matched = re.fullmatch(r"(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*", cell.strip('"'))
+    name, unit = (matched[1], matched[2]) if matched else (cell.strip('"'), "")
+    words = set(re.split(r"[\s_\-]+", name.lower()))
+    channel = next((one for one, (first, second) in _NAMES.items() if words & first and words & second), None)
+    if words & {"time", "t"}:
+        channel = "time"
+    if channel is None:
+        return None, 1.0
+    if not unit:
+        raise InputError(f"{path}: column {shown(cell)}: must give its unit in brackets, such as (m/s2)")
+    return channel, unit_factor(f"{path}: column {cell.strip()}: unit", channel, unit)
+
+
+def unit_factor(key: str, channel: str, unit: str) -> float:
+    """What to multiply a channel in `unit` by, to have it in SI units."""
+    own = "s" if channel == "time" else HISTORY[channel]["units"]
+    if own == "m s-2" and unit.lower() in UNITS:  # "gal", which other libraries take for gallons
+        return UNITS[unit.lower()]
+    return conversion(key, own, unit, STANDARD_GRAVITY)

@@ -1,0 +1,94 @@
+"""The public functions for tests on a shaking table: files, Datasets or DataArrays in, an xarray.Dataset out."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from slipsweep.errors import InputError
+from slipsweep.model.parameters import computed, shown
+from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
+from slipsweep.studies.datasets import _dataset
+from slipsweep.studies.friction import friction_table
+
+#: What a caller may give as a test.
+Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
+
+
+def measured_friction(
+    test: Test,
+    theta: float,
+    mu_s: float,
+    *,
+    g: float = 9.81,
+    offset: str | Sequence[str] = (),
+    drift: str | Sequence[str] = (),
+    rest: tuple[float, float] | None = None,
+    threshold: float | None = None,
+) -> xr.Dataset:
+    """Friction coefficient that a test on a shaking table measured, by the paper's Eq. 1, and the slides in it.
+
+    Parameters
+    ----------
+    test : path, Dataset, mapping of str to DataArray, or ShakingTest
+        A CSV file whose header names columns and units: ``time (s), table acceleration (g), block acceleration
+        (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the table's) and `block_acceleration`,
+        in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
+    theta, mu_s : float
+        Inclination of the plane, degrees, and static friction coefficient.
+    g : float
+        Gravity, m/s².
+    offset, drift : str or list of str
+        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off stands in the
+        attribute `removed`.  Nothing is taken off unasked.
+    rest : (float, float), optional
+        From when to when table and block were at rest, s: what is taken off is then fitted to these samples, else
+        to all.
+    threshold : float, optional
+        Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations of its noise, and
+        0.5 % of the table's largest acceleration at least.
+
+    Returns
+    -------
+    Dataset
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` μ(t) and
+        `friction_ratio` μ(t)/μs.  While the block sticks, μ(t) is what friction is mobilised, not what it could be.
+        Along `slide`: `slide_onset`, `slide_peak` (of the table's acceleration) and `slide_stop` (s; NaN where the
+        record ends before), `onset_acceleration`, `peak_acceleration` and `peak_block_acceleration` (m/s²) and
+        `least_friction`.  The attributes `threshold` (m/s²) and `threshold_from` say how slides were found.
+
+    Raises
+    ------
+    InputError
+        A test that cannot be read, without a block acceleration, or a value that no physics allows.
+    """
+    table = friction_table(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
+    return _dataset(table, {})
+
+
+def test_of(given: Any) -> ShakingTest:
+    """The test that a caller gives."""
+    if isinstance(given, ShakingTest):
+        return given
+    if not isinstance(given, (xr.Dataset, Mapping)):
+        return read_test(given)
+    known = [name for name in CHANNELS if name in given]
+    if TABLE not in known:
+        raise InputError(f"test: {TABLE}: missing: must be given, along time; there are {shown(list(given))}")
+    arrays = {name: xr.as_variable(given[name]) for name in known}
+    times: Any = given["time"] if "time" in given else getattr(given[TABLE], "coords", {}).get("time")
+    if times is None:
+        raise InputError("test: time: missing: must be a coordinate, s")
+    for name, array in arrays.items():
+        if array.dims != ("time",):
+            raise InputError(f"test: {name}: dimensions {array.dims}: must be ('time',)")
+    values = {name: np.asarray(computed(array), np.float64) for name, array in arrays.items()}
+    factors = {
+        name: unit_factor(f"test: {name}: units", name, str(array.attrs["units"]))
+        for name, array in {**arrays, "time": xr.as_variable(times)}.items()
+        if "units" in array.attrs
+    }
+    scaled = {name: factors.get(name, 1.0) * one for name, one in values.items()}
+    return ShakingTest(factors.get("time", 1.0) * np.asarray(computed(times), np.float64), scaled)

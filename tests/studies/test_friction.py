@@ -1,0 +1,170 @@
+"""Eq. 1 on tests made by `simulate`: the friction that went in, the slides, and sensors that are not as they should."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import slipsweep
+from slipsweep import InputError
+from tests.support.shaking import CONTINUOUS, STICK_SLIP, exact, measured
+
+GIVEN = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}
+
+
+@pytest.fixture(scope="module")
+def stick_slip() -> xr.Dataset:
+    return exact(STICK_SLIP)
+
+
+def friction(test: Any, **options: Any) -> xr.Dataset:
+    return slipsweep.measured_friction(test, **{**GIVEN, **options})
+
+
+def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:
+    """While the table's acceleration rises, and the block slides, μ(t) is Eq. 6."""
+    found = friction(stick_slip)
+    table = found.ground_acceleration.values
+    sliding = (table[2:] > table[1:-1]) & (table[1:-1] > table[:-2]) & (table[:-2] > 1.0)
+    law = (0.38 + 0.09) * np.exp(-2.7 * table[1:-1] / 9.81)
+    np.testing.assert_allclose(found.friction_coefficient.values[1:-1][sliding], law[sliding], rtol=1e-10)
+    np.testing.assert_allclose(found.least_friction, (0.38 + 0.09) * np.exp(-2.7 * 3.55 / 9.81), rtol=1e-3)
+    np.testing.assert_allclose(found.friction_ratio, found.friction_coefficient / 0.38, rtol=1e-15)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_slides_of_stick_slip(stick_slip: xr.Dataset, noise: float) -> None:
+    """A slide a cycle: onset where Eq. 4 first falls behind the table, peak with it, stop as simulated."""
+    found = friction(measured(stick_slip, noise=noise))
+    assert found.sizes["slide"] == 5
+    moving = stick_slip.relative_velocity.values > 1e-9
+    onsets = stick_slip.time.values[np.flatnonzero(~moving[:-1] & moving[1:])]
+    stops = stick_slip.time.values[np.flatnonzero(moving[:-1] & ~moving[1:]) + 1]
+    tolerance = 0.005 if noise == 0.0 else 0.015
+    np.testing.assert_allclose(found.slide_onset, onsets, atol=tolerance + 1e-9)
+    np.testing.assert_allclose(found.slide_stop, stops, atol=tolerance + 1e-9)
+    crests = 0.5 + (np.arange(5) + 0.25) / 1.8
+    np.testing.assert_allclose(found.slide_peak, crests, atol=0.0026 if noise == 0.0 else 0.04)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_continuous_sliding_is_one_slide(noise: float) -> None:
+    found = slipsweep.measured_friction(measured(exact(CONTINUOUS), noise=noise), 6.0, 0.38)
+    assert found.sizes["slide"] == 1
+    # Üy is reached at 0.9 m/s², and the shaking lasts for 8 cycles
+    assert abs(found.slide_onset.item() - 0.51) < 0.015
+    assert abs(found.slide_stop.item() - (0.5 + 8 / 2.5)) < 0.02
+
+
+def test_a_slide_that_the_record_ends_in_has_no_stop(stick_slip: xr.Dataset) -> None:
+    found = friction(stick_slip.isel(time=slice(0, 170)))  # 0.845 s, in the first slide
+    assert found.sizes["slide"] == 1
+    assert math.isnan(found.slide_stop.item())
+
+
+def test_the_threshold_is_told(stick_slip: xr.Dataset) -> None:
+    noisy = friction(measured(stick_slip))
+    # r has the noise of both: 2 % of 3.55 and of the block's peak acceleration
+    sigma = 0.02 * np.hypot(3.55, float(abs(stick_slip.block_acceleration).max()))
+    assert noisy.attrs["threshold"] == pytest.approx(4 * sigma, rel=0.15)
+    assert "standard deviations" in noisy.attrs["threshold_from"]
+    exactly = friction(stick_slip)
+    assert exactly.attrs["threshold"] == pytest.approx(0.005 * 3.55, rel=1e-3)
+    assert friction(stick_slip, threshold=5.0).sizes["slide"] == 0
+
+
+def test_unequal_sampling(stick_slip: xr.Dataset) -> None:
+    kept = np.sort(np.random.default_rng(1).permutation(stick_slip.time.size)[: stick_slip.time.size * 2 // 3])
+    found = friction(stick_slip.isel(time=kept))
+    np.testing.assert_allclose(found.slide_onset, friction(stick_slip).slide_onset, atol=0.025)
+    assert found.sizes["slide"] == 5
+
+
+def test_offset_and_drift_are_taken_off_when_asked_and_told(stick_slip: xr.Dataset) -> None:
+    drifting = stick_slip.copy(deep=True)
+    drifting.block_acceleration.values[:] += 0.4 + 0.1 * stick_slip.time.values
+    asked = friction(drifting, drift="block_acceleration", rest=(0.0, 0.495))
+    np.testing.assert_allclose(asked.block_acceleration, stick_slip.block_acceleration, atol=1e-12)
+    assert asked.attrs["removed"] == "block_acceleration: 0.4 m s-2 and 0.1 m s-2 a second"
+    unasked = friction(drifting)
+    np.testing.assert_array_equal(unasked.block_acceleration, drifting.block_acceleration)
+    assert unasked.attrs["removed"] == "nothing"
+
+
+def test_a_file_is_read_with_its_units(stick_slip: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "test.csv"
+    columns = (
+        stick_slip.time.values * 1e3,
+        stick_slip.ground_acceleration / 9.80665,
+        stick_slip.block_acceleration * 100,
+    )
+    rows = "\n".join(f"{t:.9g};{table:.15g};;{block:.15g}" for t, table, block in zip(*columns, strict=True))
+    path.write_text(f"# a test\nTime [ms];Table acceleration (g);remark;Block_acceleration (gal)\n{rows}\n")
+    found = friction(path)
+    np.testing.assert_allclose(found.friction_coefficient, friction(stick_slip).friction_coefficient, atol=1e-12)
+    assert found.attrs["test"] == "test.csv"
+    assert len(found.attrs["test_sha256"]) == 64
+
+
+def test_a_dataset_is_taken_in_its_units(stick_slip: xr.Dataset) -> None:
+    in_g = {name: stick_slip[name] / 9.80665 for name in ("ground_acceleration", "block_acceleration")}
+    for array in in_g.values():
+        array.attrs["units"] = "g"
+    np.testing.assert_allclose(
+        friction(in_g).friction_coefficient, friction(stick_slip).friction_coefficient, atol=1e-12
+    )
+
+
+HEAD = "time (s),table acceleration (m/s2),block acceleration (m/s2)\n"
+ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no line of names"),
+        (ROWS, "no column time"),
+        (HEAD.replace(" (m/s2),", ","), r"'table acceleration': must give its unit in brackets"),
+        (HEAD.replace("(m/s2),", "(mm),") + ROWS, r"must be a unit that converts to m s-2"),
+        (HEAD + ROWS.replace("0.05,", "0.05,,"), "line 7: 4 cells, where 3 columns are named"),
+        (HEAD + ROWS.replace("0.05,", "0.04,"), "time of sample 6 = 0.04: must be greater than 0.04"),
+        (HEAD + "0,1,one\n", "line 2: block_acceleration = 'one': must be a number"),
+        (HEAD + "0,,1\n", "line 2: ground_acceleration = '': must be a number"),
+        (HEAD + "0,1,1\n", "1 samples: must be at least 16"),
+        (HEAD.replace("block", "table") + ROWS, "2 columns are ground_acceleration: must be one"),
+        (HEAD.replace(",block acceleration", ",temperature") + ROWS, "block_acceleration: missing: Eq. 1 needs"),
+    ],
+)
+def test_files_that_are_no_tests(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "test.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        friction(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"theta": -1.0}, "theta = -1"),
+        ({"threshold": 0.0}, "threshold = 0.0: must be"),
+        ({"offset": "friction"}, "offset = 'friction': must be 'all'"),
+        ({"offset": "all", "rest": (5.0, 6.0)}, "rest = .*: 0 samples lie between"),
+        ({"drift": "all", "rest": 3.0}, "rest = 3.0: must be a list of two times"),
+        ({"g": 0.0}, "g = 0"),
+        ({"theta": 80.0}, "the block would lift off"),
+    ],
+)
+def test_options_that_cannot_be(stick_slip: xr.Dataset, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        friction(stick_slip, **options)
+
+
+def test_a_blank_cell_is_a_sample_that_is_not_there(stick_slip: xr.Dataset) -> None:
+    gappy = stick_slip.copy(deep=True)
+    gappy.block_acceleration.values[100:103] = np.nan
+    found = friction(gappy)
+    assert np.isnan(found.friction_coefficient.values[100:103]).all()
+    assert np.isfinite(found.least_friction).all()

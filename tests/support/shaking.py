@@ -1,0 +1,59 @@
+"""Synthetic tests on a shaking table: `simulate`, sampled, with noise, digitised, and what else may befall a sensor."""
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import slipsweep
+from slipsweep.motion.shaking import CHANNELS, RESPONSES
+
+#: One test in either sliding mode: parameters and a motion of the table.
+STICK_SLIP: dict[str, Any] = {
+    "theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8,
+    "yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09, "excitation": slipsweep.Sine(cycles=5),
+}  # fmt: skip
+CONTINUOUS: dict[str, Any] = {
+    "theta": 6.0, "mu_s": 0.38, "amplitude": 5.6, "frequency": 2.5,
+    "yield_acceleration": 0.9, "decay_rate": 2.3, "delta_mu": 0.11, "excitation": slipsweep.Sine(cycles=8),
+}  # fmt: skip
+
+
+def exact(case: dict[str, Any], rate: float = 200.0, lead: float = 0.5, tail: float = 0.5) -> xr.Dataset:
+    """What the channels of a test would be without sensors: `lead` and `tail` s of rest about the shaking."""
+    excitation = case["excitation"]
+    shaken = excitation.cycles / case["frequency"]
+    times = np.arange(round((lead + shaken + tail) * rate) + 1) / rate
+    moving = times >= lead
+    history = slipsweep.simulate(**case, times=times[moving] - lead)
+    channels = {}
+    for name in CHANNELS:
+        values = np.zeros(times.size)
+        values[moving] = history[name].values
+        channels[name] = ("time", values, history[name].attrs)
+    return xr.Dataset(channels, {"time": ("time", times, {"units": "s"})})
+
+
+def digitised(values: np.ndarray, bits: int, full_scale: float) -> np.ndarray:
+    """Values as a converter of so many bits gives them, from −full_scale to full_scale."""
+    step = 2.0 * full_scale / 2**bits
+    return np.asarray(np.clip(np.round(values / step) * step, -full_scale, full_scale - step))
+
+
+def measured(
+    clean: xr.Dataset,
+    seed: int = 0,
+    noise: float = 0.02,
+    bits: int | None = 12,
+    responses: Collection[str] = RESPONSES,
+) -> xr.Dataset:
+    """A test as sensors give it: white noise of so many parts of each channel's peak, then a converter of `bits`."""
+    generator = np.random.default_rng(seed)
+    test = clean.copy(deep=True)
+    for name in CHANNELS:
+        values = clean[name].values
+        peak = float(np.abs(values).max())
+        noisy = values + noise * peak * generator.standard_normal(values.size)
+        test[name].values[:] = noisy if bits is None else digitised(noisy, bits, 1.25 * peak)
+    return test.drop_vars([name for name in RESPONSES if name not in responses])
