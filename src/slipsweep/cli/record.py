@@ -72,9 +72,9 @@ def record(
 
     import numpy as np
 
-    from slipsweep.studies.record_sweeps import plan_record
+    from slipsweep.grid.plans import plan_sweep
 
-    plan = plan_record(
+    plan = plan_sweep(
         excitation=motion,
         model=model,
         polarity=polarity if polarity == "both" else int(polarity),

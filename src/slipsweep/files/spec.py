@@ -269,9 +269,9 @@ class SweepSpec:
         # these import numba, and scipy: not for sweeps that are only looked at
         with self._named():
             if self.sampling is None:
-                from slipsweep.studies.sweeps import plan_of
+                from slipsweep.grid.plans import plan_sweep
 
-                return plan_of(**self.arguments())
+                return plan_sweep(**self.arguments())
             from slipsweep.studies.uncertainty import plan_samples
 
             return plan_samples(self.sampling, **self._arguments_but("variables"))

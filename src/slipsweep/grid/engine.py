@@ -6,9 +6,9 @@ by the scaling law and costs no kernel call.
 """
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ from slipsweep.model.options import Mendez, Model, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, Validity
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.cutting import wave_of, wave_of_record
-from slipsweep.motion.pieces import Wave
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Sine, Waveform
 
@@ -52,6 +51,15 @@ MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", *MOTION_CO
 RECORD_CODES = (*RECORD_COUNTS, "validity")
 
 Array = NDArray[np.float64]
+
+#: Results by their names.
+Arrays: TypeAlias = dict[str, NDArray[Any]]
+
+#: The fields of `Cell`, each as one row.
+_Rows: TypeAlias = tuple[Array, ...]
+
+#: Solves cells of a grid, from one number up to another, into flat results.
+_Call: TypeAlias = Callable[[Grid, int, int, _Rows, Array, Results], None]
 
 
 @dataclass(frozen=True)
@@ -108,53 +116,89 @@ def cells_to_solve(shape: tuple[int, ...], inputs: list[Array], frequency: Array
     return math.prod(size for axis, size in enumerate(shape) if axis != scaled)
 
 
-def solve(
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Array],
-    wanted: tuple[str, ...],
-    progress: Callable[[int], None] | None = None,
-    empty: Empty = np.empty,
-) -> dict[str, NDArray[Any]]:
-    """Solve a grid.
+@dataclass(frozen=True)
+class Request:
+    """What is asked of a grid: its inputs, and the results wanted of it.
 
-    Parameters
+    Attributes
     ----------
     problem : Problem
-        Options common to all cells.
+        What all cells share.
     shape : tuple of int
         Shape of the results.
     arrays : mapping of str to array
-        `theta` (degrees), `mu_s`, `amplitude` or `displacement_amplitude`, `frequency` (Hz) and the
-        optional parameters, each with as many dimensions as `shape`, of length 1 where it does
-        not vary.
+        `theta` (degrees), `mu_s`, the optional parameters and the strength and the time of the shaking: under a
+        waveform `amplitude` or `displacement_amplitude`, and `frequency` (Hz); under a record `amplitude` or `scale`,
+        `time_scale` and `polarity`.  Each has as many dimensions as `shape`, of length 1 where it does not vary.
     wanted : tuple of str
-        Names from `MOTION_RESULTS`; nothing else is computed.
+        Names of results; nothing else is computed.
     progress : callable, optional
         Called with a number of result cells as they are finished, from any thread.
     empty : callable
         Makes the arrays of the results.
+    """
 
-    Returns
-    -------
-    dict of str to ndarray
-        Arrays of `shape`, float64, but for the codes (`variables.RESULT_DTYPES`).
+    problem: Problem
+    shape: tuple[int, ...]
+    arrays: Mapping[str, Array]
+    wanted: tuple[str, ...]
+    progress: Callable[[int], None] | None = None
+    empty: Empty = np.empty
+
+    def results(self) -> Arrays:
+        """Arrays for what is wanted, not filled in: of `shape`, float64 but for codes (`variables.RESULT_DTYPES`)."""
+        return {name: self.empty(self.shape, RESULT_DTYPES.get(name, "float64")) for name in self.wanted}
+
+    def tell(self, cells: int) -> None:
+        """Tell of progress, if anybody wants to know."""
+        if self.progress is not None:
+            self.progress(cells)
+
+    def part(self, where: tuple[slice, ...]) -> "Request":
+        """The same of a part of the grid."""
+        shape = tuple(len(range(*cut.indices(size))) for cut, size in zip(where, self.shape, strict=True))
+        return replace(self, shape=shape, arrays=cut(self.arrays, where))
+
+
+def solve(asked: Request) -> Arrays:
+    """Solve a grid for `MOTION_RESULTS` or, under a record, `variables.RECORD_RESULTS`.
 
     Raises
     ------
     InputError
         A result that has a value is beyond double precision.
+    RunError
+        An event of the motion was not found.
     """
-    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
-    if _amplitudes(arrays) <= _AMPLITUDES:
-        _solve_into(results, problem, shape, arrays, progress)
-        return results
-    # A = ω²d where d and ω span a grid: as large as a result, and there for a slab at a time only
-    for slab in slabs(shape, _AMPLITUDES):
-        sizes = tuple(part.stop - part.start for part in slab)
-        parts = {name: values[slab] for name, values in results.items()}
-        _solve_into(parts, problem, sizes, cut(arrays, slab), progress)
+    results = asked.results()
+    for where, part in _parts(asked):
+        # most parts lie in one piece in the results, and are solved where they lie
+        found = {name: np.require(values[where], requirements="C") for name, values in results.items()}
+        _solve_into(found, part)
+        for name, values in results.items():
+            if not np.may_share_memory(values, found[name]):
+                values[where] = found[name]
     return results
+
+
+def _parts(asked: Request) -> Iterator[tuple[tuple[slice, ...], Request]]:
+    """Parts that are solved one after the other: those of one motion, and those whose amplitudes memory holds."""
+    if isinstance(asked.problem.excitation, Record):
+        yield from motions(asked)
+    elif _amplitudes(asked.arrays) <= _AMPLITUDES:
+        yield (slice(None),) * len(asked.shape), asked
+    else:
+        # A = ω²d where d and ω span a grid: as large as a result, and there for a slab at a time only
+        for slab in slabs(asked.shape, _AMPLITUDES):
+            yield slab, asked.part(slab)
+
+
+def motions(asked: Request) -> Iterator[tuple[tuple[slice, ...], Request]]:
+    """The parts of a grid of records that one motion shakes, and where in the grid they lie; all of a waveform's."""
+    polarity = asked.arrays.get("polarity", np.ones((1,) * len(asked.shape)))
+    for side in np.ndindex(polarity.shape):
+        where = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
+        yield where, asked.part(where)
 
 
 def _amplitudes(arrays: Mapping[str, Array]) -> int:
@@ -169,31 +213,61 @@ def _is_plain_sine(motion: Waveform | Record) -> bool:
     return isinstance(motion, Sine) and motion == Sine(motion.cycles)
 
 
-def _solve_into(
-    results: Mapping[str, NDArray[Any]],
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Array],
-    progress: Callable[[int], None] | None,
-) -> None:
-    """Solve a grid, or a slab of one; `results` lie without gaps."""
-    inputs, frequency = cell_inputs(arrays, len(shape)), arrays["frequency"]
-    # what is out of the ordinary is looked at, for which flags are wanted in any case
-    ordinary = all(map(is_ordinary, (np.array(problem.model.g), *inputs[1:], frequency)))
-    filled = dict(results) if ordinary else {"validity": np.empty(shape, RESULT_DTYPES["validity"]), **results}
-    options = problem.options("peak_relative_velocity" in results)
+def _solve_into(results: Arrays, asked: Request) -> None:
+    """Solve a part of a grid that one motion shakes; `results` lie without gaps."""
+    problem, shape, arrays = asked.problem, asked.shape, asked.arrays
     motion = problem.excitation
-    assert isinstance(motion, Waveform)
-    wave = wave_of(motion)
-    work = 1
-    if isinstance(problem.solver, Step):
-        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle, options.rule)
-        work += options.steps_per_cycle // 16  # a step takes about 1/16 of a cell of the cycle solver
+    extremes: dict[str, Array] = {}
+    if isinstance(motion, Record):
+        own = {"acceleration of the record": motion.peak, "time of the record": np.abs(motion.times).max()}
+        extremes = {name: np.array(value) for name, value in own.items()}
+    inputs, periods, codes = kernel_inputs(asked)
+    # what is out of the ordinary is looked at, for which flags are wanted in any case
+    looked_at = (np.array(problem.model.g), *inputs[1:], periods, *extremes.values())
+    ordinary = all(map(is_ordinary, looked_at))
+    filled = results if ordinary else {"validity": np.empty(shape, RESULT_DTYPES["validity"]), **results}
+    call, work = _kernel_call(asked, "peak_relative_velocity" in results)
+    unsolved = _fill(filled, codes, shape, inputs, periods, call, work, asked.progress)
+    if not ordinary:
+        check_served(problem.model.g, {**arrays, **extremes}, results, filled["validity"])
+    _refuse_unsolved(unsolved, shape, arrays)
+    if "structure_frequency" in arrays and "validity" in results:
+        mark_flexible_blocks(results["validity"], arrays["frequency"], arrays["structure_frequency"])
 
-    def call(grid: Grid, first: int, last: int, rows: tuple[Array, ...], periods: Array, targets: Results) -> None:
-        if isinstance(problem.solver, Step):
+
+def kernel_inputs(asked: Request) -> tuple[list[Array], Array, tuple[str, ...]]:
+    """What kernels take: the fields of `Cell`, 1/ω or the factor on time, and the names of their rows of codes."""
+    motion, arrays, dimensions = asked.problem.excitation, asked.arrays, len(asked.shape)
+    if isinstance(motion, Waveform):
+        return cell_inputs(arrays, dimensions), 1.0 / (2.0 * math.pi * arrays["frequency"]), MOTION_CODES
+    with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
+        scale = arrays["scale"] if "scale" in arrays else arrays["amplitude"] / motion.peak
+    return cell_inputs({**arrays, "amplitude": scale}, dimensions), arrays["time_scale"], RECORD_CODES
+
+
+def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
+    """What solves a stretch of cells, and what a cell of them takes, in cells of the cycle solver."""
+    problem, options = asked.problem, asked.problem.options(wants_peak)
+    motion, solver = problem.excitation, problem.solver
+    if isinstance(motion, Record):
+        recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
+
+        def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets)
+
+        # some 2 µs against 0.1, and more for a long record
+        return call, max(32, recorded.pieces.shape[0] // 64)
+    wave = wave_of(motion)
+    if isinstance(solver, Step):
+        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle, options.rule)
+
+        def call_step(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
             kernel(grid, first, last, rows, periods, options, steps, targets)
-            return
+
+        # a step takes about 1/16 of a cell of the cycle solver
+        return call_step, 1 + options.steps_per_cycle // 16
+
+    def call_cycle(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
         stretches = np.array([[first, last]])
         if _is_plain_sine(motion):
             rest = np.empty(((last - first + 1) // 2, 2), np.int64)
@@ -201,109 +275,38 @@ def _solve_into(
         if stretches.size:
             WAVE_KERNEL(grid, stretches, rows, periods, options, wave, targets)
 
-    periods = 1.0 / (2.0 * math.pi * frequency)
-    unsolved = _fill(filled, MOTION_CODES, shape, shape, 0, inputs, periods, call, work, progress)
-    if not ordinary:
-        check_served(problem.model.g, arrays, results, filled["validity"])
-    _refuse_unsolved(unsolved, shape, arrays)
-    if "structure_frequency" in arrays and "validity" in results:
-        mark_flexible_blocks(results["validity"], frequency, arrays["structure_frequency"])
+    return call_cycle, 1
 
 
-def amplitudes(
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Array],
-    wanted: tuple[str, ...],
-    progress: Callable[[int], None] | None = None,
-    empty: Empty = np.empty,
-) -> dict[str, NDArray[Any]]:
-    """The amplitude A = ω²d of every cell; arguments as those of `solve`."""
-    results = {name: empty(shape, "float64") for name in wanted}
+def amplitudes(asked: Request) -> Arrays:
+    """The amplitude A = ω²d of every cell."""
+    results = asked.results()
     for values in results.values():
-        np.copyto(values, peak_acceleration(arrays["displacement_amplitude"], arrays["frequency"]))
-    if progress is not None:
-        progress(math.prod(shape))
-    return results
-
-
-def solve_record(
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Array],
-    wanted: tuple[str, ...],
-    progress: Callable[[int], None] | None = None,
-    empty: Empty = np.empty,
-) -> dict[str, NDArray[Any]]:
-    """Solve a grid of responses to a record.
-
-    Parameters and results as in `solve`, but for the names: results are of `variables.RECORD_RESULTS`, and
-    in place of `amplitude` and `frequency` there are `scale`, `time_scale`, by which the scaling laws go as by
-    1/ω, and `polarity`.
-    """
-    record, options = problem.excitation, problem.options("peak_relative_velocity" in wanted)
-    assert isinstance(record, Record)
-    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
-    extremes = {
-        "acceleration of the record": np.abs(record.acceleration).max(),
-        "time of the record": np.abs(record.times).max(),
-    }
-    inputs = cell_inputs({**arrays, "amplitude": arrays["scale"]}, len(shape))
-    ordinary = all(map(is_ordinary, (np.array(problem.model.g), *inputs[1:], arrays["time_scale"], *extremes.values())))
-    filled = results if ordinary else {"validity": np.empty(shape, RESULT_DTYPES["validity"]), **results}
-    polarity = arrays["polarity"]
-    for side in np.ndindex(polarity.shape):
-        # the part of the grid that has this polarity, and where its results begin
-        part = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
-        sizes = tuple(1 if n > 1 else size for n, size in zip(polarity.shape, shape, strict=True))
-        begin = sum(at * stride for at, stride in zip(side, _strides(shape), strict=True))
-        own, wave = cut(arrays, part), wave_of_record(record, float(polarity[side]))
-
-        def call(
-            grid: Grid,
-            first: int,
-            last: int,
-            rows: tuple[Array, ...],
-            periods: Array,
-            targets: Results,
-            wave: Wave = wave,
-        ) -> None:
-            RECORD_KERNEL(grid, first, last, rows, periods, options, wave, targets)
-
-        # some 2 µs against 0.1, and more for a long record
-        work = max(32, wave.pieces.shape[0] // 64)
-        rows = cell_inputs({**own, "amplitude": own["scale"]}, len(shape))
-        unsolved = _fill(filled, RECORD_CODES, sizes, shape, begin, rows, own["time_scale"], call, work, progress)
-        if not ordinary:
-            served = {name: values[part] for name, values in results.items()}
-            check_served(problem.model.g, own | extremes, served, filled["validity"][part])
-        _refuse_unsolved(unsolved, sizes, own)
+        np.copyto(values, peak_acceleration(asked.arrays["displacement_amplitude"], asked.arrays["frequency"]))
+    asked.tell(math.prod(asked.shape))
     return results
 
 
 def _fill(
     results: Mapping[str, NDArray[Any]],
     codes: tuple[str, ...],
-    sizes: tuple[int, ...],
     shape: tuple[int, ...],
-    begin: int,
     inputs: list[Array],
     periods: Array,
-    call: Callable[[Grid, int, int, tuple[Array, ...], Array, Results], None],
+    call: _Call,
     work_per_cell: int,
     progress: Callable[[int], None] | None,
 ) -> tuple[int, ...] | None:
-    """Fill in a part, of these `sizes`, of results of a `shape`, from place `begin` on, by `call` of a kernel.
+    """Fill in results of a `shape` by `call` of a kernel.
 
     u and v go as the squares of `periods` and as `periods`; `codes` are the names of the kernel's rows of codes.
-    Returns a cell of the part that was not solved, if there is one.
+    Returns a cell that was not solved, if there is one.
     """
-    scaled = scaled_dimension(sizes, inputs, periods)
-    grid = layout(sizes, scaled, [*inputs, periods], shape)
+    scaled = scaled_dimension(shape, inputs, periods)
+    grid = layout(shape, scaled, [*inputs, periods])
 
     def target(name: str) -> NDArray[Any]:
-        values = results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64")))
-        return values.reshape(-1)[begin:]
+        return results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1)
 
     targets = Results(
         target("permanent_displacement"),
@@ -318,13 +321,13 @@ def _fill(
         if progress is not None:
             progress((last - first) * grid.frequencies)
 
-    if math.prod(sizes):
+    if math.prod(shape):
         # a result takes about 1/32 of a cell of the cycle solver
         threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell + grid.frequencies // 32)
     if targets.unsolved[0] < 0:
         return None
     at = [int(i) for i in np.unravel_index(int(targets.unsolved[0]), tuple(grid.shape))]
-    return tuple(at.pop(0) if axis != scaled else 0 for axis in range(len(sizes)))
+    return tuple(at.pop(0) if axis != scaled else 0 for axis in range(len(shape)))
 
 
 def _refuse_unsolved(cell: tuple[int, ...] | None, shape: tuple[int, ...], arrays: Mapping[str, Array]) -> None:
@@ -337,55 +340,37 @@ def _refuse_unsolved(cell: tuple[int, ...] | None, shape: tuple[int, ...], array
     )
 
 
-def friction_parameters(
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Array],
-    wanted: tuple[str, ...],
-    progress: Callable[[int], None] | None = None,
-    empty: Empty = np.empty,
-) -> dict[str, NDArray[Any]]:
-    """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion.
+def friction_parameters(asked: Request) -> Arrays:
+    """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion; no frequency.
 
-    Parameters, results and errors as in `solve`; there is no frequency.
+    Errors as of `solve`.
     """
-    return estimates(problem, shape, arrays, wanted, progress, empty, checked=True)
+    return estimates(asked, checked=True)
 
 
-def estimates(
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Array],
-    wanted: tuple[str, ...],
-    progress: Callable[[int], None] | None = None,
-    empty: Empty = np.empty,
-    checked: bool = False,
-) -> dict[str, NDArray[Any]]:
+def estimates(asked: Request, checked: bool = False) -> Arrays:
     """As `friction_parameters`; unless `checked`, an estimate that is no finite number is given as it is."""
-    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
-    options = problem.options(False)
-    parts = list(slabs(shape, _FRICTION_CELLS))
+    results, options = asked.results(), asked.problem.options(False)
+    parts = list(slabs(asked.shape, _FRICTION_CELLS))
 
     def solve_slab(slab: tuple[slice, ...]) -> None:
-        own = cut(arrays, slab)
-        inputs = cell_inputs(own, len(shape))
-        sizes = tuple(part.stop - part.start for part in slab)
-        grid = layout(sizes, None, [*inputs, np.ones((1,) * len(shape))])
-        cells = math.prod(sizes)
+        own = asked.part(slab)
+        inputs = cell_inputs(own.arrays, len(own.shape))
+        grid = layout(own.shape, None, [*inputs, np.ones((1,) * len(own.shape))])
+        cells = math.prod(own.shape)
         parameters = np.empty((len(FRICTION_PARAMETERS), cells))
         codes = {name: np.empty(cells, RESULT_DTYPES[name]) for name in ("sliding_mode", "validity")}
         rows = tuple(flat(values) for values in inputs)
         parameter_grid(grid, 0, cells, rows, options, parameters, codes["sliding_mode"], codes["validity"])
-        found = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
-        shaped = {name: found[name].reshape(sizes) for name in wanted}
+        found: Arrays = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
+        shaped = {name: found[name].reshape(own.shape) for name in asked.wanted}
         if checked:
-            check_served(problem.model.g, own, shaped, found["validity"].reshape(sizes))
+            check_served(asked.problem.model.g, own.arrays, shaped, codes["validity"].reshape(own.shape))
         for name, values in shaped.items():
             if checked and values.dtype.kind == "f":
                 values[np.isinf(values)] = math.nan  # of a cell without a value
             results[name][slab] = values
-        if progress is not None:
-            progress(cells)
+        asked.tell(cells)
 
     def work(first: int, last: int) -> None:
         for slab in parts[first:last]:
@@ -400,10 +385,10 @@ def kernels_of(solver: Callable[..., Any], problem: Problem) -> "list[Kernel]":
     """The kernels that one of the functions above takes for any grid (a sine may need the waves' one besides)."""
     if solver is friction_parameters:
         return [parameter_grid]
-    if solver is solve_record:
-        return [RECORD_KERNEL]
     if solver is not solve:
         return []
+    if isinstance(problem.excitation, Record):
+        return [RECORD_KERNEL]
     if isinstance(problem.solver, Step):
         return [STEP_KERNELS[RULES[problem.solver.rule]]]
     return [CYCLE_KERNEL if _is_plain_sine(problem.excitation) else WAVE_KERNEL]
@@ -435,15 +420,10 @@ def flat(values: Array) -> Array:
     return np.require(values, np.float64, ["C", "ALIGNED", "WRITEABLE"]).reshape(-1)
 
 
-def layout(
-    shape: tuple[int, ...], scaled: int | None, arrays: list[Array], whole: tuple[int, ...] | None = None
-) -> Grid:
-    """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart.
-
-    The results are a part of ones of the shape `whole`, if that is given.
-    """
+def layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:
+    """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart."""
     dimensions = [axis for axis in range(len(shape)) if axis != scaled]
-    rows = [_strides(values.shape) for values in arrays] + [_strides(whole or shape)]
+    rows = [_strides(values.shape) for values in arrays] + [_strides(shape)]
     return Grid(
         # a grid without dimensions is one cell along one
         shape=np.array([shape[axis] for axis in dimensions] or [1], np.int64),

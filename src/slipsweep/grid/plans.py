@@ -16,12 +16,21 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.blocks import Block, places
-from slipsweep.grid.engine import MOTION_RESULTS, Problem
+from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
-from slipsweep.model.options import MODELS, SOLVERS, Cycle, Step
-from slipsweep.model.parameters import BOUNDS, check_choices, check_given, check_progress, check_values, number_text
+from slipsweep.model.options import MODELS, SOLVERS, Cycle, Newmark, Step
+from slipsweep.model.parameters import (
+    BOUNDS,
+    check_choices,
+    check_given,
+    check_numbers,
+    check_progress,
+    check_values,
+    number_text,
+    shown,
+)
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
@@ -37,13 +46,11 @@ from slipsweep.model.variables import (
 )
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.records import Record
-from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
 )  # fmt: skip
-
-Arrays = dict[str, np.ndarray]
 
 #: Cells of the cycle solver that a cell of a record takes, about.
 _RECORD_COST = 200
@@ -56,7 +63,7 @@ class Task:
     Attributes
     ----------
     solver : callable
-        `engine.solve`, `engine.solve_record`, or `engine.friction_parameters`.
+        `engine.solve`, `engine.friction_parameters`, or another function of an `engine.Request`.
     problem : Problem
     names : tuple of str
         Results to compute.
@@ -66,7 +73,7 @@ class Task:
         Parameters, with all dimensions, of length 1 where they do not vary.
     """
 
-    solver: Callable[..., dict[str, np.ndarray]]
+    solver: Callable[[Request], Arrays]
     problem: Problem
     names: tuple[str, ...]
     sizes: dict[str, int]
@@ -81,7 +88,8 @@ class Task:
 
     def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Arrays:
         """Compute the results; `progress` is told of cells as they are finished, `empty` makes the arrays."""
-        return self.solver(self.problem, tuple(self.sizes.values()), self.inputs, self.names, progress, empty)
+        shape = tuple(self.sizes.values())
+        return self.solver(Request(self.problem, shape, self.inputs, self.names, progress, empty))
 
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
@@ -191,7 +199,7 @@ class Plan:
 def plan_sweep(
     *, excitation: Any = "sine", model: Any = "mendez", solver: Any = "auto", variables: Any = None, **given: Any
 ) -> Plan:
-    """Plan of a sweep under a waveform.
+    """Plan of a sweep.
 
     Parameters
     ----------
@@ -204,16 +212,65 @@ def plan_sweep(
     InputError
         As `slipsweep.sweep`.
     """
-    problem = check_problem(WAVEFORMS.of(excitation), model, solver)
+    problem = check_problem(excitation, model, solver)
+    parameters = check_parameters(problem, given)
+    if isinstance(problem.excitation, Record):
+        return _plan_record(problem, parameters, variables)
+    return _plan_waveform(problem, parameters, variables)
+
+
+def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, Variable]:
+    """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
+    motion = problem.excitation
     parameters = {name: values for name, values in given.items() if values is not None}
-    check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
-    if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
-        raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
-    check_given(parameters, ("theta", "mu_s", "frequency"))
-    wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
-    coords = checked(parameters)
+    if isinstance(motion, Waveform):
+        check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
+        if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
+            raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
+        check_given(parameters, ("theta", "mu_s", "frequency"))
+        return checked(parameters)
+    check_inputs(parameters, RECORD_INPUTS, "a Record")
+    check_given(parameters, ("theta", "mu_s"))
+    if {"amplitude", "scale"} <= parameters.keys():
+        raise InputError("amplitude, scale: must not both be given; either is the strength of the record")
+    if "amplitude" in parameters and not motion.peak > 0.0:
+        raise InputError(f"amplitude: {motion.name} has no acceleration to scale; give scale")
+    if isinstance(problem.model, Newmark):
+        for name in ("decay_rate", "delta_mu", "minimum_friction"):
+            if name in parameters:
+                raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
+    polarity = _polarity(parameters.pop("polarity", 1))
+    defaults = {"time_scale": 1.0} if "amplitude" in parameters else {"scale": 1.0, "time_scale": 1.0}
+    parameters = defaults | parameters
+    return checked({name: parameters[name] for name in PARAMETERS if name in parameters}) | {"polarity": polarity}
+
+
+def _polarity(given: Any) -> Variable:
+    """The signs asked for: 1, -1, both."""
+    both = isinstance(given, str) and given == "both"
+    try:
+        values = check_numbers("polarity", (1, -1) if both else given)
+    except InputError:
+        values = np.empty(0)
+    if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
+        raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
+    dims = ("polarity",) if values.ndim else ()
+    return Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
+
+
+def _plan_record(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+    """Plan of a sweep under a record; `coords` as `check_parameters` gives them."""
+    wanted = tuple(RECORD_RESULTS) if variables is None else check_choices("variables", variables, RECORD_RESULTS)
     sizes = grid_sizes(coords)
-    inputs = dict(coords)
+    task = Task(engine.solve, problem, wanted, sizes, aligned(coords, sizes))
+    attrs = about("Response of a rigid block to a recorded motion", problem)
+    return Plan(sizes, coords, (task,), wanted, attrs, cost_of(problem))
+
+
+def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+    """Plan of a sweep under a waveform; `coords` as `check_parameters` gives them."""
+    wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
+    sizes, inputs = grid_sizes(coords), dict(coords)
     drive: dict[str, Variable] = {
         name: coords[name] for name in ("displacement_amplitude", "frequency") if name in coords
     }
@@ -223,7 +280,7 @@ def plan_sweep(
         # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
         if any(dims.keys() == set(variable.dims) for variable in drive.values()):
             both = aligned(drive, dims)
-            coords["amplitude"] = Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])
+            coords = coords | {"amplitude": Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])}
 
     tasks = []
     motion = tuple(name for name in MOTION_RESULTS if name in wanted)

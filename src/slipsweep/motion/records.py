@@ -98,6 +98,11 @@ class Record:
                 "the time before it"
             )
 
+    @property
+    def peak(self) -> float:
+        """Peak ground acceleration: the largest magnitude of the samples, m/s²."""
+        return float(np.abs(self.acceleration).max())
+
     @classmethod
     def sampled(cls, acceleration: ArrayLike, interval: float, name: str = "record") -> "Record":
         """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""

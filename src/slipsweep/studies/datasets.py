@@ -15,7 +15,7 @@ import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
-from slipsweep.grid.plans import Plan, Task, plan_friction_parameters
+from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS, Model, Solver
 from slipsweep.model.parameters import computed, shown
@@ -24,7 +24,6 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies.history import history_table
 from slipsweep.studies.limits import AMPLITUDE_STEPS, plan_limits
-from slipsweep.studies.sweeps import plan_of
 
 #: What a caller may give for a parameter.
 Values = float | Sequence[float] | np.ndarray | xr.DataArray
@@ -114,7 +113,7 @@ def sweep(
         A value that no physics allows, an unknown option, a grid that memory cannot hold.
     """
     given = _inputs(locals())
-    plan = plan_of(**_plain(given), excitation=excitation, model=model, solver=solver, variables=variables)
+    plan = plan_sweep(**_plain(given), excitation=excitation, model=model, solver=solver, variables=variables)
     brought = _brought(given, plan.coords, plan.names)
     return _dataset(plan.solve(progress) if chunks is None else _lazy(plan, chunks), brought)
 

@@ -20,19 +20,23 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.blocks import slabs
-from slipsweep.grid.engine import Problem
+from slipsweep.grid.engine import Arrays, Problem, Request
 from slipsweep.grid.plans import Plan, plan_sweep
-from slipsweep.grid.tables import Empty, Variable
+from slipsweep.grid.tables import Variable
+from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (
     LIMIT_RESULTS,
     MAXIMUM_AMPLITUDE_IN_G,
+    RECORD_COUNTS,
     RESULT_DTYPES,
     RESULTS,
     TOLERABLE_DISPLACEMENT,
     LimitStatus,
     SlidingMode,
 )
+from slipsweep.motion.cutting import wave_of_record
+from slipsweep.motion.records import Record
 
 Floats = NDArray[np.float64]
 
@@ -50,8 +54,14 @@ _SCANNED = 2_000_000
 #: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
 JUMP = 1e-6
 
+#: How far from its place, in parts of it, a change of mode that is known by a formula may be: rounding.
+_BESIDE = 1e-15
+
+#: Results that tell in which mode a block slides.
+_MODES = ("sliding_mode", "stick_slip_pulses", "continuous_pulses")
+
 #: Inputs that only scale the result, or only flag it.
-_SCALES = ("frequency", "structure_frequency")
+_SCALES = ("frequency", "time_scale", "structure_frequency")
 
 
 def plan_limits(
@@ -88,7 +98,7 @@ def plan_limits(
     _, scaling = _groups(inputs, len(plan.sizes))
     dims = tuple(plan.sizes)
     coords = {name: variable for name, variable in plan.coords.items() if name != "amplitude"}
-    names = (*LIMIT_RESULTS, "sliding_mode", "validity")
+    names = (*LIMIT_RESULTS, *_codes(task.problem), "validity")
     return Plan(
         plan.sizes,
         coords | {"displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
@@ -96,11 +106,11 @@ def plan_limits(
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
         # a scan serves a block for all that is asked of it
-        cost=max(1.0, steps / math.prod(plan.sizes[dims[axis]] for axis in scaling)) + _COST,
+        cost=plan.cost * (max(1.0, steps / math.prod(plan.sizes[dims[axis]] for axis in scaling)) + _COST),
         together=tuple(dims[axis] for axis in scaling),
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
-        described=RESULTS | LIMIT_RESULTS,
+        described=RESULTS | RECORD_COUNTS | LIMIT_RESULTS,
     )
 
 
@@ -111,16 +121,12 @@ def _groups(inputs: Mapping[str, Floats], dimensions: int) -> tuple[list[int], l
     return moving, [axis for axis in range(dimensions) if axis not in moving]
 
 
-def solve(
-    maximum_amplitude: float,
-    steps: int,
-    problem: Problem,
-    shape: tuple[int, ...],
-    arrays: Mapping[str, Floats],
-    wanted: tuple[str, ...],
-    progress: Callable[[int], None] | None = None,
-    empty: Empty = np.empty,
-) -> dict[str, NDArray[Any]]:
+def _codes(problem: Problem) -> tuple[str, ...]:
+    """Results that tell in which mode a block slides, or how many pulses of a record it slides in."""
+    return tuple(RECORD_COUNTS) if isinstance(problem.excitation, Record) else ("sliding_mode",)
+
+
+def solve(maximum_amplitude: float, steps: int, asked: Request) -> Arrays:
     """Find the limit amplitudes of a grid.
 
     Parameters
@@ -129,41 +135,36 @@ def solve(
         Where the scan ends, m/s².
     steps : int
         Steps of the scan.
-    problem : Problem
-        Options common to all cells.
-    shape : tuple of int
-        Shape of the results.
-    arrays : mapping of str to array
-        Inputs of `engine.solve` but for the amplitude, laid out as there, and the `displacement`
-        that is to be reached, m.
-    wanted : tuple of str
-        Variables of `slipsweep.limit_amplitude`.
-    progress, empty : callable
-        As in `engine.solve`.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Arrays of `shape`.
+    asked : Request
+        Variables of `slipsweep.limit_amplitude`; its inputs are those of `engine.solve` but for the amplitude,
+        and the `displacement` that is to be reached, m.
     """
+    results = asked.results()
+    for where, part in engine.motions(asked):
+        found = _solve_motion(maximum_amplitude, steps, part)
+        for name, values in results.items():
+            values[where] = found[name]
+    return results
+
+
+def _solve_motion(maximum_amplitude: float, steps: int, asked: Request) -> Arrays:
+    """Find the limit amplitudes of a grid that one motion shakes."""
+    shape, arrays = asked.shape, asked.arrays
     moving, scaling = _groups(arrays, len(shape))
     # two dimensions are enough: the blocks, and what is asked of each
     table = tuple(math.prod(shape[axis] for axis in group) for group in (moving, scaling))
     rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in arrays.items()}
-    found = {name: np.empty(table, RESULT_DTYPES.get(name, "float64")) for name in wanted}
+    whole = replace(asked, shape=table, arrays=rows, empty=np.empty)
+    found = whole.results()
     for slab in slabs(table, max(1, _SCANNED // steps)):
-        cells = tuple(cut.stop - cut.start for cut in slab)
-        solved = _solve_slab(problem, cells, engine.cut(rows, slab), maximum_amplitude, steps)
+        part = whole.part(slab)
+        solved = _solve_slab(part, maximum_amplitude, steps)
         for name, values in found.items():
             values[slab] = solved[name]
-        if progress is not None:
-            progress(math.prod(cells))
+        asked.tell(math.prod(part.shape))
     order = [[*moving, *scaling].index(axis) for axis in range(len(shape))]
     sizes = [shape[axis] for axis in (*moving, *scaling)]
-    results = {name: empty(shape, RESULT_DTYPES.get(name, "float64")) for name in wanted}
-    for name, values in results.items():
-        values[...] = found[name].reshape(sizes).transpose(order)
-    return results
+    return {name: values.reshape(sizes).transpose(order) for name, values in found.items()}
 
 
 def _two_dimensional(values: Floats, shape: tuple[int, ...], groups: tuple[list[int], list[int]]) -> Floats:
@@ -177,21 +178,17 @@ def _two_dimensional(values: Floats, shape: tuple[int, ...], groups: tuple[list[
     return np.broadcast_to(values, sizes).transpose([*groups[0], *groups[1]]).reshape(lengths)
 
 
-def _solve_slab(
-    problem: Problem, shape: tuple[int, int], arrays: dict[str, Floats], maximum_amplitude: float, steps: int
-) -> dict[str, NDArray[Any]]:
+def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     """Solve blocks (rows) for what is asked of each (columns)."""
+    problem, shape, arrays = asked.problem, asked.shape, dict(asked.arrays)
     displacement = np.broadcast_to(arrays.pop("displacement"), shape)
     blocks = {name: values for name, values in arrays.items() if name not in _SCALES}
     amplitudes = _scan(problem, shape[0], blocks, maximum_amplitude, steps)
 
     # every amplitude of the scan, at every frequency
-    scanned = engine.solve(
-        problem,
-        (shape[0], amplitudes.shape[1], shape[1]),
-        {name: values[:, np.newaxis, :] for name, values in arrays.items()} | {"amplitude": amplitudes[:, :, None]},
-        ("permanent_displacement",),
-    )["permanent_displacement"]
+    every = {name: values[:, np.newaxis, :] for name, values in arrays.items()}
+    size = (shape[0], amplitudes.shape[1], shape[1])
+    scanned = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement",), size)["permanent_displacement"]
     reaches = scanned >= displacement[:, np.newaxis, :]
     first = reaches.argmax(axis=1)
     row, column = np.nonzero(reaches.any(axis=1))
@@ -203,23 +200,21 @@ def _solve_slab(
 
     def displaced(amplitude: Floats, which: NDArray[np.intp]) -> NDArray[np.bool_]:
         part = {name: values if values.size == 1 else values[which] for name, values in cells.items()}
-        found = engine.solve(problem, amplitude.shape, {**part, "amplitude": amplitude}, ("permanent_displacement",))
+        found = _at(problem, part, amplitude, ("permanent_displacement",))
         return np.asarray(found["permanent_displacement"] >= target[which])
 
     low, high = _bisect(low, high, displaced)
-    wanted = ("permanent_displacement", "sliding_mode", "validity")
-    before = engine.solve(problem, low.shape, {**cells, "amplitude": low}, wanted[:2])
-    after = engine.solve(problem, high.shape, {**cells, "amplitude": high}, wanted)
+    wanted = ("permanent_displacement", *_codes(problem), "validity")
+    before, after = _at(problem, cells, low, wanted), _at(problem, cells, high, wanted)
 
     # what is missing says why in its validity: that of the greatest amplitude
-    end = {"amplitude": np.full((1, 1), maximum_amplitude)}
-    results = engine.solve(problem, shape, {**arrays, **end}, ("validity",))
+    results = _at(problem, arrays, np.full((1, 1), maximum_amplitude), ("validity",), shape)
     has_value = (~np.isnan(scanned)).any(axis=1)
     results |= {
         "limit_amplitude": np.full(shape, math.nan),
         "limit_status": np.where(has_value, LimitStatus.NOT_REACHED, LimitStatus.INVALID).astype(np.int8),
         "permanent_displacement": np.full(shape, math.nan),
-        "sliding_mode": np.full(shape, SlidingMode.MISSING, np.int8),
+        **{name: np.full(shape, SlidingMode.MISSING, RESULT_DTYPES[name]) for name in _codes(problem)},
     }
     for name in wanted:
         results[name][row, column] = after[name]
@@ -228,13 +223,22 @@ def _solve_slab(
     return results
 
 
-def _scan(
-    problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_amplitude: float, steps: int
-) -> NDArray[np.float64]:
+def _at(
+    problem: Problem,
+    arrays: Mapping[str, Floats],
+    amplitude: Floats,
+    wanted: tuple[str, ...],
+    shape: tuple[int, ...] | None = None,
+) -> Arrays:
+    """Solve blocks at amplitudes; `shape` if it is not that of the amplitudes."""
+    return engine.solve(Request(problem, shape or amplitude.shape, {**arrays, "amplitude": amplitude}, wanted))
+
+
+def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_amplitude: float, steps: int) -> Floats:
     """Amplitudes to try for `count` blocks, increasing along each row; both sides of every change of mode are there."""
-    yields = engine.friction_parameters(
-        problem, (count, 1), {**blocks, "amplitude": np.zeros((1, 1))}, ("yield_acceleration",)
-    )["yield_acceleration"]
+    wanted = ("yield_acceleration", "limiting_acceleration")
+    known = engine.friction_parameters(Request(problem, (count, 1), {**blocks, "amplitude": np.zeros((1, 1))}, wanted))
+    yields = known["yield_acceleration"]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
     with np.errstate(over="ignore"):
@@ -242,33 +246,56 @@ def _scan(
     amplitudes = start * ratio ** np.linspace(0.0, 1.0, steps + 1)
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
+    if isinstance(problem.excitation, Record):
+        thresholds = [yields] if isinstance(problem.model, Newmark) else [yields, known["limiting_acceleration"]]
+        changes = _pulse_changes(problem.excitation, float(blocks["polarity"].item()), np.hstack(thresholds))
+    else:
+        changes = _mode_changes(problem, blocks, amplitudes)
+    within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
+    return np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
+
+
+def _pulse_changes(record: Record, polarity: float, thresholds: Floats) -> Floats:
+    """Amplitudes just below and just above those at which a pulse of a record begins to count, or changes its mode.
+
+    A pulse does where its own peak passes one of the `thresholds` (columns) of a block (rows): Üy, or Üg,lim of
+    Eq. 7, neither of which depends on the amplitude.
+    """
+    heights = np.unique(wave_of_record(record, polarity).height)
+    with np.errstate(over="ignore", invalid="ignore"):
+        places = (thresholds[:, :, None] * (record.peak / heights)).reshape(len(thresholds), -1)
+        return np.hstack([places * (1.0 - _BESIDE), places * (1.0 + _BESIDE)])
+
+
+def _mode_changes(problem: Problem, blocks: Mapping[str, Floats], amplitudes: Floats) -> Floats:
+    """The neighbouring numbers between which the sliding mode of blocks (rows) changes, as far as a scan sees it."""
 
     def modes(amplitude: Floats, cells: Mapping[str, Floats]) -> NDArray[Any]:
-        given = {**cells, "amplitude": amplitude, "frequency": np.ones((1,) * amplitude.ndim)}
-        return engine.solve(problem, amplitude.shape, given, ("sliding_mode",))["sliding_mode"]
+        given = {**cells, "frequency": np.ones((1,) * amplitude.ndim)}
+        return _at(problem, given, amplitude, ("sliding_mode",))["sliding_mode"]
 
     scanned = modes(amplitudes, blocks)
     row, step = np.nonzero(scanned[:, 1:] != scanned[:, :-1])
-    if not row.size:
-        return amplitudes
-    own = scanned[row, step]
+    own, count = scanned[row, step], len(amplitudes)
 
     def has_changed(amplitude: Floats, which: NDArray[np.intp]) -> NDArray[np.bool_]:
         return np.asarray(modes(amplitude, _zipped(blocks, row[which], None)) != own[which])
 
     before, after = _bisect(amplitudes[row, step], amplitudes[row, step + 1], has_changed)
     changes = np.bincount(row, minlength=count)
-    extra = np.full((count, changes.max()), maximum_amplitude)
     place = np.arange(row.size) - np.repeat(np.cumsum(changes) - changes, changes)
-    beyond = extra.copy()
-    extra[row, place], beyond[row, place] = before, after
-    return np.sort(np.concatenate([amplitudes, extra, beyond], axis=1), axis=1)
+    sides = np.full((2, count, changes.max(initial=0)), math.nan)
+    sides[0, row, place], sides[1, row, place] = before, after
+    return np.hstack([*sides])
 
 
 def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp] | None) -> dict[str, Floats]:
     """Cells picked from two-dimensional inputs, one after the other; without columns the first."""
     picked = {}
     for name, values in arrays.items():
+        if values.size == 1:
+            picked[name] = values.reshape(1)
+            continue
         down = row if values.shape[0] > 1 else np.zeros_like(row)
         across = column if column is not None and values.shape[1] > 1 else np.zeros_like(row)
         picked[name] = values[down, across]
@@ -300,7 +327,7 @@ def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]
     """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
     below, above = before["permanent_displacement"], after["permanent_displacement"]
     jumps = above - below > JUMP * above
-    other_mode = before["sliding_mode"] != after["sliding_mode"]
+    other_mode = np.any([before[name] != after[name] for name in _MODES if name in after], axis=0)
     status = np.full(above.shape, LimitStatus.REACHED, np.int8)
     status[jumps] = LimitStatus.AT_JUMP
     status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP

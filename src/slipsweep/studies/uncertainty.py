@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, threads
 from slipsweep.grid.blocks import Block, slabs
-from slipsweep.grid.engine import Problem
+from slipsweep.grid.engine import Problem, Request
 from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes, plan_sweep
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
@@ -656,7 +656,7 @@ class SamplePlan:
                 arrays[name] = self._about_estimate(drawn[name], arrays, lengths)
         arrays["frequency"] = relative
         names = ("permanent_displacement", "sliding_mode", "validity")
-        return engine.solve(self.problem, lengths, arrays, names, progress)
+        return engine.solve(Request(self.problem, lengths, arrays, names, progress))
 
     def _row(self, name: str, dimensions: int) -> Floats:
         return self.draws[name].reshape((1,) * dimensions + (-1,))
@@ -667,7 +667,7 @@ class SamplePlan:
         assert name in FRICTION_PARAMETERS
         dims = np.broadcast_shapes(*(values.shape for values in arrays.values()))
         full = tuple(max(a, b) for a, b in zip(dims, (1,) * len(shape), strict=True))
-        estimate = engine.estimates(self.problem, full, arrays, (name,))[name]
+        estimate = engine.estimates(Request(self.problem, full, arrays, (name,)))[name]
         values = one.applied(estimate, self._row(name, len(shape) - 1))
         return np.where(BOUNDS[name].holds(values), values, np.nan)
 
