@@ -67,7 +67,7 @@ def main() -> None:
     plt.close(figure)
 
     slides = mode == SlidingMode.STICK_SLIP
-    governed = slides & (default.validity.values & Validity.EQ4_BELOW_YIELD > 0)
+    governed = slides & (default.validity.values & Validity.YIELD_GOVERNS > 0)
     carried = slides & (default.validity.values & Validity.NOT_RECOUPLED > 0)
 
     newmark, integrated = "Newmark's block", "recoupling by integration"

@@ -96,7 +96,7 @@ def _cells(regime: str, count: int) -> dict[str, Any]:
     cells = regime_cells(name, count)
     if law:
         flags = slipsweep.sweep(**cells, variables=["validity"]).validity.values
-        governs = (flags & Validity.EQ4_BELOW_YIELD > 0) == law.startswith("yield")
+        governs = (flags & Validity.YIELD_GOVERNS > 0) == law.startswith("yield")
         cells |= {name: cells[name][governs] for name in ("theta", "mu_s", "amplitude")}
     return cells
 

@@ -11,7 +11,7 @@ import xarray as xr
 import slipsweep
 from slipsweep.errors import InputError
 from slipsweep.files import export, spec
-from slipsweep.model.variables import VALIDITY_TEXT, Validity
+from slipsweep.model.variables import FLAG_KINDS, VALIDITY_TEXT, Validity
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
 from tests.support.processes import slipsweep as command
@@ -195,7 +195,9 @@ def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pyte
 def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None:
     with xr.open_dataset(folder / "grid.nc", chunks=chunks) as data:
         flags = slipsweep.flags(data)
-        assert list(flags.data_vars) == [(flag.name or "").lower() for flag in Validity]
+        kinds = [flags[name].attrs["kind"] for name in flags.data_vars]
+        assert sorted(map(str, flags.data_vars)) == sorted((flag.name or "").lower() for flag in Validity)
+        assert kinds == ["no value"] * 5 + ["caution"] * 4 + ["note"] * 2
         assert flags.uplift.dims == data.validity.dims
         assert bool(flags.chunks) == (chunks is not None)  # lazy data stay lazy
         assert flags.statically_unstable.any()
@@ -204,7 +206,7 @@ def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None
         xr.testing.assert_identical(flags, slipsweep.flags(data.validity))
         for flag, text in VALIDITY_TEXT.items():
             assert flags[(flag.name or "").lower()].dtype == bool
-            assert flags[(flag.name or "").lower()].attrs == {"long_name": text}
+            assert flags[(flag.name or "").lower()].attrs == {"long_name": text, "kind": str(FLAG_KINDS[flag])}
         assert not slipsweep.flags(data).sel(theta=20, mu_s=0.5).statically_unstable.any()
 
 
@@ -265,8 +267,8 @@ def test_words_of_one_cell(folder: Path, tmp_path: Path, suffix: str) -> None:
     ("name", "attribute", "value", "refusal"),
     [
         ("permanent_displacement", "units", np.arange(3), None),
-        ("validity", "flag_masks", 2.0 ** np.arange(8), None),
-        ("validity", "flag_masks", "all", "flag_meanings has 8 words and flag_masks 0 whole numbers"),
+        ("validity", "flag_masks", 2.0 ** np.arange(11), None),
+        ("validity", "flag_masks", "all", "flag_meanings has 11 words and flag_masks 0 whole numbers"),
         ("sliding_mode", "flag_values", np.array([0, 1], np.int8), "3 words and flag_values 2 whole numbers"),
         ("sliding_mode", "flag_meanings", 7, "1 words and flag_values 3 whole numbers"),
     ],

@@ -14,6 +14,7 @@ import slipsweep
 from slipsweep.model.variables import VALUELESS, Validity
 from tests.support import reference, strategies
 from tests.support.cases import Case, choices, read_cases, solve
+from tests.support.flag_definitions import acceleration_ratio, coulomb, remarks
 
 CASES = [case for case in read_cases() if not case.uplift]
 
@@ -109,8 +110,15 @@ def test_modes_and_flags_on_every_case(solver: str) -> None:
         *_, mode, validity = found[case.case]
         expected = Validity(0)
         if case.sliding_mode == 1:
-            expected |= Validity.EQ4_BELOW_YIELD * case.eq4_below_yield
+            expected |= Validity.YIELD_GOVERNS * (case.eq4_below_yield and case.model != "newmark")
             expected |= Validity.NOT_RECOUPLED * (not case.recoupled)
+        if case.sliding_mode > 0:
+            given = {"yield_acceleration": coulomb(case.theta, case.mu_s, case.g), **dict(case.given)}
+            expected |= remarks(
+                acceleration_ratio(case.theta, case.mu_s, case.amplitude, given["yield_acceleration"], case.g),
+                float(case.permanent_displacement), decay_rate=given.get("decay_rate"), delta_mu=given.get("delta_mu"),
+                newmark=case.model == "newmark", yield_governs=case.eq4_below_yield,
+            )  # fmt: skip
         assert mode == case.sliding_mode, f"sliding mode of case {case}"
         assert Validity(validity) == expected, f"validity of case {case}"
 

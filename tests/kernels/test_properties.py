@@ -280,10 +280,20 @@ SLIPPERY: strategies.Cell = {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0, "yiel
 STUCK: strategies.Cell = {"theta": 0.0, "mu_s": 3.0, "amplitude": 60.0, "yield_acceleration": 60.0}
 
 
+ESTIMATED = Validity.FRICTION_ESTIMATED
+
+
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({}, 0),
+        ({}, ESTIMATED),
+        ({"decay_rate": 2.0}, ESTIMATED),
+        ({"delta_mu": 0.1, "recoupling": "integrate"}, ESTIMATED),
+        ({"decay_rate": 2.0, "delta_mu": 0.1}, 0),
+        ({"minimum_friction": 0.05, "delta_mu": 0.1, "cycles": 1}, ESTIMATED),
+        ({"amplitude": 0.05}, 0),
+        ({"amplitude": 4.8, "recoupling": "integrate"}, Validity.NEAR_MODE_LIMIT | ESTIMATED),
+        ({"amplitude": 5.5, "recoupling": "integrate"}, Validity.NEAR_MODE_LIMIT | ESTIMATED),
         ({**COULOMB, "mu_s": 0.1}, Validity.STATICALLY_UNSTABLE),
         ({"yield_acceleration": 0.0}, Validity.STATICALLY_UNSTABLE),
         ({"theta": 45.0, "mu_s": 1.5, "amplitude": 9.9}, Validity.UPLIFT),
@@ -294,17 +304,17 @@ STUCK: strategies.Cell = {"theta": 0.0, "mu_s": 3.0, "amplitude": 60.0, "yield_a
         ({**SLIPPERY, "decay_rate": 0.5, "delta_mu": 0.5}, 0),
         (STUCK, Validity.FRICTION_NOT_DECAYING),
         ({**STUCK, "decay_rate": 1.0}, 0),
-        ({**COULOMB, "amplitude": 3.2}, Validity.EQ4_BELOW_YIELD),
-        ({**COULOMB, "rise": "literal", "amplitude": 3.2}, Validity.EQ4_BELOW_YIELD | Validity.KD_NOT_POSITIVE),
-        ({"amplitude": 4.0}, Validity.NOT_RECOUPLED),
-        ({"amplitude": 4.0, "cycles": 1}, 0),
-        ({"amplitude": 4.0, "recoupling": "integrate"}, 0),
-        ({"structure_frequency": 5.0}, Validity.FLEXIBLE_BLOCK),
-        ({"structure_frequency": 5.01}, 0),
-        ({"frequency": 1.3, "structure_frequency": 1.0}, Validity.FLEXIBLE_BLOCK),
-        ({"frequency": 1.31, "structure_frequency": 1.0}, 0),
+        ({**COULOMB, "amplitude": 3.2}, Validity.YIELD_GOVERNS),
+        ({**COULOMB, "rise": "literal", "amplitude": 3.2}, Validity.YIELD_GOVERNS | Validity.KD_NOT_POSITIVE),
+        ({"amplitude": 4.0}, Validity.NOT_RECOUPLED | ESTIMATED),
+        ({"amplitude": 4.0, "cycles": 1}, ESTIMATED),
+        ({"amplitude": 4.0, "recoupling": "integrate"}, ESTIMATED),
+        ({"structure_frequency": 5.0}, Validity.FLEXIBLE_BLOCK | ESTIMATED),
+        ({"structure_frequency": 5.01}, ESTIMATED),
+        ({"frequency": 1.3, "structure_frequency": 1.0}, Validity.FLEXIBLE_BLOCK | ESTIMATED),
+        ({"frequency": 1.31, "structure_frequency": 1.0}, ESTIMATED),
         ({**COULOMB, "mu_s": 0.1, "structure_frequency": 2.0}, Validity.STATICALLY_UNSTABLE | Validity.FLEXIBLE_BLOCK),
-        ({"model": "newmark", "theta": 45.0, "mu_s": 2.5, "amplitude": 10.0}, Validity.EQ4_BELOW_YIELD),
+        ({"model": "newmark", "theta": 45.0, "mu_s": 2.5, "amplitude": 10.0}, 0),
         ({**COULOMB, "model": "newmark", "mu_s": 0.1}, Validity.STATICALLY_UNSTABLE),
         ({**STUCK, "model": "newmark"}, 0),
     ],

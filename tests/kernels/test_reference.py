@@ -9,6 +9,7 @@ from mpmath import mp, mpf, nstr, workdps
 
 from tests.support import reference
 from tests.support.cases import Case, read_cases
+from tests.support.flag_definitions import UPLIFT
 
 CASES = read_cases()
 
@@ -57,7 +58,7 @@ def test_uplift_has_no_value() -> None:
     (case,) = (case for case in CASES if case.uplift)
     solution = solve(case)
     assert mp.isnan(solution.permanent_displacement)
-    assert (solution.sliding_mode, solution.validity) == (reference.MISSING, reference.UPLIFT)
+    assert (solution.sliding_mode, solution.validity) == (reference.MISSING, UPLIFT)
 
 
 def test_continuous_velocity_is_that_of_bessel_and_struve_functions() -> None:

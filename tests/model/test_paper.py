@@ -86,4 +86,4 @@ def test_figures_with_the_printed_decay_rate(
     )
     assert printed(result.permanent_displacement * 1000, 0) == displacement, "displacement, mm"
     assert printed(result.peak_relative_velocity, 3) == velocity, "peak relative velocity, m/s"
-    assert int(result.validity) == 0
+    assert int(result.validity) == slipsweep.Validity.FRICTION_ESTIMATED, "delta_mu by Eqs. 10, 11"

@@ -17,6 +17,7 @@ from slipsweep.charts.slices import Result
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
+from slipsweep.model.variables import Validity
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
 from slipsweep.studies.uncertainty import DRAWN, check_sampling
@@ -124,7 +125,7 @@ def test_statistics_of_a_sweep_over_the_draws(uncertain: dict[str, Any]) -> None
         share = (u > threshold).mean("sample").transpose(*dims)
         np.testing.assert_allclose(found.exceedance_probability.sel(threshold=threshold), share, atol=1e-15)
     modes = xr.concat([(swept.sliding_mode == mode).mean("sample") for mode in range(3)], "mode")
-    flags = xr.concat([(swept.validity & (1 << bit) != 0).mean("sample") for bit in range(8)], "flag")
+    flags = xr.concat([(swept.validity & (1 << bit) != 0).mean("sample") for bit in range(len(Validity))], "flag")
     for name, share in (("mode_share", modes), ("flag_share", flags)):
         ours, theirs = xr.broadcast(found[name].drop_vars(str(found[name].dims[-1])), share)
         np.testing.assert_allclose(ours, theirs.transpose(*ours.dims), atol=1e-15)

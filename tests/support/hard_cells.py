@@ -17,6 +17,7 @@ from mpmath import mp, mpf, nstr, workdps
 
 from tests.support import reference
 from tests.support.cases import DATA, PARAMETERS, Case, inputs_of, read_cases
+from tests.support.flag_definitions import NOT_RECOUPLED, YIELD_GOVERNS
 
 G = 9.81
 HARD_CASES = DATA / "hard_cases.csv"
@@ -362,8 +363,8 @@ def read_hard_cases() -> list[HardCase]:
                 peak_relative_velocity=row["peak_relative_velocity"],
                 sliding_mode=int(row["sliding_mode"]),
                 validity=int(row["validity"]),
-                recoupled=not int(row["validity"]) & reference.NOT_RECOUPLED,
-                eq4_below_yield=bool(int(row["validity"]) & reference.EQ4_BELOW_YIELD),
+                recoupled=not int(row["validity"]) & NOT_RECOUPLED,
+                eq4_below_yield=bool(int(row["validity"]) & YIELD_GOVERNS),
                 displacement_bound=row["displacement_bound"],
                 velocity_bound=row["velocity_bound"],
                 outcomes=frozenset(

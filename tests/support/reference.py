@@ -16,16 +16,19 @@ from typing import TypeAlias
 
 from mpmath import mp, mpf, workdps
 
-Number: TypeAlias = float | int | str | mpf
+from tests.support.flag_definitions import (
+    FLEXIBLE_BLOCK,
+    FRICTION_NOT_DECAYING,
+    KD_NOT_POSITIVE,
+    LIMIT_UNDEFINED,
+    NOT_RECOUPLED,
+    STATICALLY_UNSTABLE,
+    UPLIFT,
+    YIELD_GOVERNS,
+    remarks,
+)
 
-STATICALLY_UNSTABLE = 1
-UPLIFT = 2
-LIMIT_UNDEFINED = 4
-FRICTION_NOT_DECAYING = 8
-EQ4_BELOW_YIELD = 16
-KD_NOT_POSITIVE = 32
-NOT_RECOUPLED = 64
-FLEXIBLE_BLOCK = 128
+Number: TypeAlias = float | int | str | mpf
 
 MISSING, STUCK, STICK_SLIP, CONTINUOUS = -1, 0, 1, 2
 
@@ -52,7 +55,8 @@ class Solution:
     """Response of one cell.
 
     ``recoupled`` is true where every pulse of stick-slip (or stuck) comes to rest before the
-    next onset; it is false in continuous mode.  ``eq4_below_yield`` is bit 16 of ``validity``.
+    next onset; it is false in continuous mode.  ``eq4_below_yield`` is bit 16 of ``validity``,
+    but for Newmark's block, where it is true and the bit is not set.
     """
 
     permanent_displacement: mpf
@@ -150,16 +154,21 @@ minimum_friction, structure_frequency, model, rise, recoupling, g
         omega = 2 * mp.pi * mpf(frequency)
         if parameters.sliding_mode == CONTINUOUS:
             displacement, peak = _continuous(interface, cycles)
+            validity |= remarks(parameters.acceleration_ratio, displacement, decay_rate=decay_rate, delta_mu=delta_mu)
             return Solution(displacement / omega**2, peak / omega, CONTINUOUS, validity, False, False)
 
         motion = _StickSlip(interface, model, rise, recoupling)
-        below = model == "newmark" or motion.eq4_below_yield()
-        validity |= EQ4_BELOW_YIELD * below
+        newmark = model == "newmark"
+        below = newmark or motion.eq4_below_yield()
+        validity |= YIELD_GOVERNS * (below and not newmark)
         response = motion.run(cycles)
         if response is None:
             return Solution(mp.nan, mp.nan, MISSING, validity | KD_NOT_POSITIVE, False, below)
         displacement, peak, recoupled = response
-        validity |= NOT_RECOUPLED * (not recoupled)
+        validity |= NOT_RECOUPLED * (not recoupled) | remarks(
+            parameters.acceleration_ratio, displacement, decay_rate=decay_rate, delta_mu=delta_mu, newmark=newmark,
+            yield_governs=below,
+        )  # fmt: skip
         return Solution(displacement / omega**2, peak / omega, STICK_SLIP, validity, recoupled, below)
 
 

@@ -13,12 +13,10 @@ from typing import Any
 
 from mpmath import mp, mpf, workdps
 
+from tests.support.flag_definitions import KD_NOT_POSITIVE, NOT_RECOUPLED, YIELD_GOVERNS, remarks
 from tests.support.reference import (
     CONTINUOUS,
-    EQ4_BELOW_YIELD,
-    KD_NOT_POSITIVE,
     MISSING,
-    NOT_RECOUPLED,
     STUCK,
     Solution,
     _friction_parameters,
@@ -407,14 +405,24 @@ def solve(
         interface = _Interface(mpf(g), tan_theta, mpf(mu_s), parameters, mpf(amplitude), DIGITS)
         omega = 2 * mp.pi * mpf(frequency)
         shaking = sections(waveform, harmonics, ramp_in, ramp_out, cycles, mpf(amplitude))
+        # ramps may keep the shaking below its peak, and the block from sliding
+        slides = any(max(section.first, section.last) > parameters.yield_acceleration for section in shaking)
         if mode == CONTINUOUS:
             u, peak = _continuous(interface, shaking)
+            if slides:
+                validity |= remarks(parameters.acceleration_ratio, u, decay_rate=decay_rate, delta_mu=delta_mu)
             return Solution(u / omega**2, peak / omega, mode, validity, False, False)
         block = Block(interface, model, rise, recoupling)
         has_value = block.run(shaking)
         below = block.yield_governs(shaking)
-        validity |= EQ4_BELOW_YIELD * below
+        newmark = model == "newmark"
+        validity |= YIELD_GOVERNS * (below and not newmark)
         if not has_value:
             return Solution(mp.nan, mp.nan, MISSING, validity | KD_NOT_POSITIVE, False, below)
         validity |= block.flags
+        if slides:
+            validity |= remarks(
+                parameters.acceleration_ratio, block.u, decay_rate=decay_rate, delta_mu=delta_mu, newmark=newmark,
+                yield_governs=below,
+            )  # fmt: skip
         return Solution(block.u / omega**2, block.peak / omega, mode, validity, not block.flags, below)

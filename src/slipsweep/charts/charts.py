@@ -37,16 +37,17 @@ _MODE_COLOURS = {
     SlidingMode.CONTINUOUS: PURPLE,
 }
 
-#: Hatching of each flag.
+#: Hatching of each flag but notes, under which a value is sound.
 HATCHES = {
     Validity.STATICALLY_UNSTABLE: "////",
     Validity.UPLIFT: "||||",
     Validity.LIMIT_UNDEFINED: "oo",
     Validity.FRICTION_NOT_DECAYING: "----",
-    Validity.EQ4_BELOW_YIELD: ".",
     Validity.KD_NOT_POSITIVE: "xxx",
     Validity.NOT_RECOUPLED: "\\\\\\",
     Validity.FLEXIBLE_BLOCK: "++",
+    Validity.UPSLOPE: "**",
+    Validity.NEAR_MODE_LIMIT: "OO",
 }
 
 _LINES: dict[str, tuple[str, dict[str, Any]]] = {
@@ -592,7 +593,7 @@ def _finish_map(
 
 
 def _hatch(axes: Axes, table: Table, x: str, y: str) -> list[Patch]:
-    """Hatch the cells of each flag; return the entries of the legend."""
+    """Hatch the cells of each flag that is no note; return the entries of the legend."""
     if "validity" not in table:
         return []
     validity: NDArray[Any] = _grid(table["validity"], table, y, x)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slipsweep.errors import InputError
-from slipsweep.model.variables import VALIDITY_TEXT
+from slipsweep.model.variables import FLAG_KIND_TEXT, VALIDITY_TEXT, FlagKind, Validity, flags_of
 
 if TYPE_CHECKING:
     from slipsweep.grid.tally import Tally
@@ -49,13 +49,14 @@ def echo_tally(tally: "Tally") -> None:
         for mode, count in tally.modes.items():
             typer.echo(f"  {mode.name.lower():<24}{count / tally.cells:7.2%}")
     if tally.flags is not None:
-        typer.echo("flags (validity):")
-        for flag, count in tally.flags.items():
-            if count:
+        seen = Validity(sum(flag for flag, count in tally.flags.items() if count))
+        typer.echo("flags (validity):" if seen else "flags (validity): none")
+        for kind in FlagKind:
+            if seen & flags_of(kind):
+                typer.echo(f"  {kind}: {FLAG_KIND_TEXT[kind]}")
+            for flag in seen & flags_of(kind):
                 name = (flag.name or "").lower()
-                typer.echo(f"  {name:<24}{count / tally.cells:7.2%}  {VALIDITY_TEXT[flag]}")
-        if not any(tally.flags.values()):
-            typer.echo("  none")
+                typer.echo(f"    {name:<22}{tally.flags[flag] / tally.cells:7.2%}  {VALIDITY_TEXT[flag]}")
 
 
 @contextmanager

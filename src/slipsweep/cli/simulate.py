@@ -11,7 +11,7 @@ from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
 from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
-from slipsweep.model.variables import HISTORY, VALIDITY_TEXT, SlidingMode, Validity
+from slipsweep.model.variables import HISTORY, VALIDITY_TEXT, FlagKind, SlidingMode, Validity, flags_of
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
@@ -91,8 +91,9 @@ def simulate(
     typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
-    for flag in Validity(table["validity"].item()):
-        typer.echo(f"flag                    {(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
+    for kind in FlagKind:
+        for flag in Validity(table["validity"].item()) & flags_of(kind):
+            typer.echo(f"{kind:<24}{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
     for path in paths:
         typer.echo(path)
 

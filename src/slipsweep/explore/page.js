@@ -69,7 +69,7 @@
   const KINDS = {
     stuck: "stuck: no displacement",
     missing: "no value (see flags)",
-    flagged: "flagged: read with care",
+    flagged: "caution (see flags)",
     upslope: "upslope (negative)",
     boundary: "limit of a sliding mode",
   };
@@ -78,7 +78,7 @@
     if (Number.isNaN(u)) return "missing";
     if (u === 0) return "stuck";
     if (u < 0) return "upslope";
-    return value("validity", index) ? "flagged" : "plain";
+    return value("validity", index) & meta.cautions ? "flagged" : "plain";
   }
   function mark(what, i, j) { // the colour of pixel (i, j)
     if (what === "stuck") return STUCK;
@@ -162,7 +162,7 @@
     else if (amplitude !== null) rows.splice(1, 0, ["peak ground acceleration", `${withUnit("amplitude", amplitude)} (${(amplitude / meta.g).toPrecision(4)} g)`, "amplitude"]);
     rows.push(["permanent displacement", displacementText(value("permanent_displacement", index)), "displacement"]);
     rows.push(["sliding mode", mode === null ? "not in the file" : meta.modes[mode], "mode"]);
-    rows.push(["flags", flags === null ? "not in the file" : flags.map((f) => `${f.name}: ${f.text}`).join("; ") || "none", "flags"]);
+    rows.push(["flags", flags === null ? "not in the file" : flags.map((f) => `${f.kind} ${f.name}: ${f.text}`).join("; ") || "none", "flags"]);
     const host = document.getElementById("readout");
     host.replaceChildren();
     for (const [title, text, id] of rows) {
@@ -207,7 +207,7 @@
       ? { t: [], ground: [], block: [], v: [], u: [] }
       : { t: store.phase.map((phase) => phase / omega), ground: store.ground.map((w) => w * amplitude), block: row(0, 1), v: row(1, 1 / omega), u: row(2, 1000 / omega ** 2) };
     note.textContent = `${described([meta.map.y, meta.map.x], chosen)}. ` +
-      (empty ? `No history: the model gives no value (${(flagsOf(index) || []).map((f) => f.name).join(", ") || "see flags"}).`
+      (empty ? `No history: the model gives no value (${(flagsOf(index) || []).filter((f) => f.mask & meta.valueless).map((f) => f.name).join(", ") || "see flags"}).`
         : `First ${store.cycles} of ${store.of} cycles, ${which}.`);
     note.dataset.index = JSON.stringify(index);
   }

@@ -29,7 +29,7 @@ from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS
-from slipsweep.model.variables import PARAMETERS, VALIDITY_TEXT, VALUELESS, SlidingMode, Validity
+from slipsweep.model.variables import CAUTIONS, PARAMETERS, VALIDITY_TEXT, VALUELESS, FlagKind, SlidingMode, flags_of
 from slipsweep.motion.waveforms import WAVEFORMS
 from slipsweep.studies.history import history_table
 
@@ -378,9 +378,12 @@ def page(excerpt: Excerpt, histories: Histories | None, name: str, script: str) 
         "symbols": {key: value_text(key, 0.0).split(" = ")[0] for key in table.coords},
         "modes": {int(mode): mode.name.lower() for mode in SlidingMode},
         "flags": [
-            {"mask": int(flag), "name": (flag.name or "").lower(), "text": VALIDITY_TEXT[flag]} for flag in Validity
+            {"mask": int(flag), "name": (flag.name or "").lower(), "kind": str(kind), "text": VALIDITY_TEXT[flag]}
+            for kind in FlagKind
+            for flag in flags_of(kind)
         ],
         "valueless": int(VALUELESS),
+        "cautions": int(CAUTIONS),
         "g": float(table.attrs.get("g", 9.81)),
         "histories": None
         if histories is None

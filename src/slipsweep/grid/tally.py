@@ -28,7 +28,7 @@ class Tally:
         if "validity" in results:
             self.flags = self.flags or dict.fromkeys(Validity, 0)
             seen = int(np.bitwise_or.reduce(results["validity"], axis=None))
-            for flag in Validity(seen & 255):
+            for flag in Validity(seen & sum(Validity)):
                 self.flags[flag] += int(np.count_nonzero(results["validity"] & int(flag)))
 
     def merge(self, other: "Tally") -> None:

@@ -33,9 +33,12 @@ STATICALLY_UNSTABLE = int(Validity.STATICALLY_UNSTABLE)
 UPLIFT = int(Validity.UPLIFT)
 LIMIT_UNDEFINED = int(Validity.LIMIT_UNDEFINED)
 FRICTION_NOT_DECAYING = int(Validity.FRICTION_NOT_DECAYING)
-EQ4_BELOW_YIELD = int(Validity.EQ4_BELOW_YIELD)
+YIELD_GOVERNS = int(Validity.YIELD_GOVERNS)
 KD_NOT_POSITIVE = int(Validity.KD_NOT_POSITIVE)
 NOT_RECOUPLED = int(Validity.NOT_RECOUPLED)
+UPSLOPE = int(Validity.UPSLOPE)
+NEAR_MODE_LIMIT = int(Validity.NEAR_MODE_LIMIT)
+FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
 
 #: Not a flag of results: an event was not found (`events`), and the engine raises an error.
 UNSOLVED = 1 << 14
@@ -113,6 +116,27 @@ def _given(given: float, estimate: float) -> float:
 
 
 @in_lanes
+def remarks_on(cell: Cell, ratio: float) -> int:
+    """Cautions and notes on a block of the paper's model that slides, with what is known before it does."""
+    near = (ratio >= 0.9) & (ratio <= 1.1)
+    estimated = math.isnan(cell.decay_rate) | math.isnan(cell.delta_mu)
+    return (NEAR_MODE_LIMIT if near else 0) | (FRICTION_ESTIMATED if estimated else 0)
+
+
+@in_lanes
+def settled(validity: int, displacement: float) -> int:
+    """The flags of a block once its displacement is known: what is said of a value needs one."""
+    moved = validity | (UPSLOPE if displacement < 0.0 else 0)
+    return moved if validity & NO_VALUE == 0 else validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
+
+
+@in_lanes
+def settled_in_cycles(validity: int, displacement: float) -> int:
+    """`settled` for pulses of one friction, which plays no part where the yield acceleration governs them."""
+    return settled(validity & ~FRICTION_ESTIMATED if validity & YIELD_GOVERNS else validity, displacement)
+
+
+@in_lanes
 def interface_of(cell: Cell, rise: int, g: float) -> tuple[float, float, float, float, float, int, int]:
     """Üy, Ü1, ξ, μmin and Δμ (Eqs. 7-11), sliding mode and a-priori validity of a cell: all that needs no λ."""
     # estimates first, then what is given in their place: without branches, so that a loop
@@ -138,6 +162,7 @@ def interface_of(cell: Cell, rise: int, g: float) -> tuple[float, float, float, 
     )
     mode = eq.sliding_mode(amplitude, yield_acceleration, math.inf if newmark else limit)
     mode = mode if validity == 0 else -1
+    validity |= remarks_on(cell, ratio) if (mode > eq.STUCK) & (not newmark) else 0
     return yield_acceleration, limit, ratio, minimum_friction, delta_mu, mode, validity
 
 
@@ -168,10 +193,11 @@ def block_at(cells: np.ndarray, j: int, options: Options) -> Block:
 def store_motion(found: Motion, j: int, motion: np.ndarray, codes: np.ndarray) -> None:
     """Store the motion of cell j of a tile; an iteration that has not ended has made it NaN."""
     motion[0, j], motion[1, j] = found.displacement, found.peak_velocity
-    codes[1, j] |= found.validity
-    if math.isnan(found.displacement) and codes[1, j] & NO_VALUE == 0:
-        codes[1, j] |= UNSOLVED
-    if codes[1, j] & NO_VALUE:
+    validity = codes[1, j] | found.validity
+    if math.isnan(found.displacement) and validity & NO_VALUE == 0:
+        validity |= UNSOLVED
+    codes[1, j] = settled_in_cycles(validity, found.displacement)
+    if validity & NO_VALUE:
         codes[0, j] = -1
 
 
@@ -290,8 +316,6 @@ def relative_acceleration_root(block: Block, start: float, end: float) -> float:
 @scalar
 def stays_below_yield(block: Block, start: float, end: float) -> bool:
     """Whether Eq. 4 stays at or below the yield value on the plane's way from `start`, no less than it, to `end`."""
-    if block.rise == NEWMARK:
-        return True
     highest = max(response(block, start), response(block, end))
     bend = min(inflection(block), end)
     if bend > start and slope_and_curvature(block, start)[0] > 0.0 > slope_and_curvature(block, bend)[0]:

@@ -59,6 +59,7 @@ from slipsweep.kernels.pulse import (
     beginning,
     first_pulse,
     pulse_of,
+    validity_before,
 )
 from slipsweep.kernels.train import train_of
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
@@ -536,7 +537,7 @@ def solve_cells(
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
     for j in range(count):
         block = block_at(cells, j, options)
-        codes[0, j], codes[1, j] = block.sliding_mode, block.validity
+        codes[0, j], codes[1, j] = block.sliding_mode, validity_before(block, wave)
         motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
         if block.sliding_mode == CONTINUOUS:
             store_motion(continuous(block, options, wave, room.zeros), j, motion, codes)

@@ -13,7 +13,7 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle, record, sine, step
-from slipsweep.kernels.block import TILE, UNSOLVED, Options, block_of, cell_of
+from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
 from slipsweep.kernels.lanes import LANES_SIZE
 from slipsweep.motion.pieces import Wave
 
@@ -291,7 +291,7 @@ def _parameter_grid(
                 parameters[4, place] = block.delta_mu
                 parameters[5, place] = block.decay_rate
                 mode[place] = block.sliding_mode
-                validity[place] = block.validity
+                validity[place] = block.validity & ~FRICTION_ESTIMATED  # known only with the motion
 
 
 #: Friction parameters of every cell (rows as in `variables.FRICTION_PARAMETERS`).

@@ -17,9 +17,11 @@ import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
+    FRICTION_ESTIMATED,
     INTEGRATE,
     KD_NOT_POSITIVE,
     LITERAL,
+    NEAR_MODE_LIMIT,
     NEWMARK,
     Block,
     Options,
@@ -63,6 +65,13 @@ def first_pulse(block: Block, wave: Wave, k: int) -> int:
     while k < wave.height.size and block.amplitude * wave.height[k] <= block.yield_acceleration:
         k += 1
     return k
+
+
+@scalar
+def validity_before(block: Block, wave: Wave) -> int:
+    """The flags known before the motion; ramps may keep the shaking below its peak, and a block from sliding."""
+    slides = block.amplitude * wave.highest > block.yield_acceleration
+    return block.validity if slides else block.validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
 
 
 @scalar

@@ -13,7 +13,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
-    EQ4_BELOW_YIELD,
+    FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
     KD_NOT_POSITIVE,
     LIMIT_UNDEFINED,
@@ -24,12 +24,15 @@ from slipsweep.kernels.block import (
     STATICALLY_UNSTABLE,
     UNSOLVED,
     UPLIFT,
+    YIELD_GOVERNS,
     Block,
     Cell,
     Options,
     block_of,
     cell_of,
+    remarks_on,
     response,
+    settled,
     stays_below_yield,
 )
 from slipsweep.kernels.cycle import Room, follow_through, pulse
@@ -132,8 +135,10 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
         validity |= block.validity & FRICTION_NOT_DECAYING
         # not the block's own mode, which is missing where the harmonic motion of that peak would uplift
         slides_on = peak > block.limiting_acceleration
+        remarks = remarks_on(cell, block.acceleration_ratio)
         if not slides_on and stays_below_yield(block, block.yield_acceleration, peak):
-            validity |= EQ4_BELOW_YIELD
+            remarks = YIELD_GOVERNS | (remarks & ~FRICTION_ESTIMATED)
+        validity |= remarks
         if not slides_on and block.rise == LITERAL and response(block, peak) <= 0.0:
             validity |= KD_NOT_POSITIVE
         if validity & NO_VALUE:
@@ -155,7 +160,7 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
         if math.isnan(displacement + highest) and validity & NO_VALUE == 0:
             validity |= UNSOLVED
         k = following
-    codes[3, j] = validity
+    codes[3, j] = settled(validity, displacement)
     if validity & NO_VALUE:
         codes[0, j] = codes[1, j] = codes[2, j] = -1
         return math.nan, math.nan
@@ -214,7 +219,6 @@ def newmark(cell: Cell, options: Options, wave: Wave, codes: np.ndarray, j: int)
                     p += 1
     # the record may have ended before the slide: then the plane is at rest
     displacement += eq.attenuated_displacement(velocity, threshold, math.inf)
-    codes[3, j] |= EQ4_BELOW_YIELD if codes[0, j] > 0 else 0  # its yield value always governs
     return scale * displacement, scale * max(peak, velocity)
 
 

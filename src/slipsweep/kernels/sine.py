@@ -19,7 +19,6 @@ from slipsweep.kernels.block import (
     BEGAN,
     DECAY,
     DELTA_MU,
-    EQ4_BELOW_YIELD,
     INTEGRATE,
     LANE_ROWS,
     MONOTONE,
@@ -35,9 +34,11 @@ from slipsweep.kernels.block import (
     decay_rate_of,
     interface_of,
     lane_response,
+    settled_in_cycles,
     store_motion,
     whole_lanes,
 )
+from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
 from slipsweep.kernels.continuous import SHORT_SINE, continuous, lane_continuous
 from slipsweep.kernels.lanes import (
     CODE,
@@ -225,11 +226,11 @@ def enter(
 ) -> None:  # fmt: skip
     """Enter the result of a lane that has converged as cell j; else the cell is to go the long way."""
     solved = lanes[CONVERGED + lane] > 0.0
-    flags = int(lanes[CODE + lane]) | (EQ4_BELOW_YIELD if way == YIELD_GOVERNS else 0)
+    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if (way == YIELD_GOVERNS) & (options.rise != NEWMARK) else 0)
     motion[0, j] = lanes[W + lane]
     if options.wants_peak:
         motion[1, j] = lanes[PEAK + lane]
-    codes[1, j] |= flags if solved else 0
+    codes[1, j] = settled_in_cycles(codes[1, j] | flags, lanes[W + lane]) if solved else codes[1, j]
     blocks[_WAY + j] = way if solved else OTHER
 
 

@@ -28,7 +28,6 @@ from numba import literally
 from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
     AMPLITUDE,
-    EQ4_BELOW_YIELD,
     INTEGRATE,
     LANE_ROWS,
     LITERAL,
@@ -36,6 +35,7 @@ from slipsweep.kernels.block import (
     NEWMARK,
     TILE,
     YIELD,
+    YIELD_GOVERNS,
     Block,
     Motion,
     Options,
@@ -73,6 +73,7 @@ from slipsweep.kernels.pulse import (
     asks_anew,
     begin_slide,
     pulse_of,
+    validity_before,
 )
 from slipsweep.kernels.train import train_of, yield_governs
 from slipsweep.model import equations as eq
@@ -810,7 +811,7 @@ def stick_slip_lanes(
             if states[_SLIDES + j] > 0.0:
                 moved += eq.attenuated_displacement(states[_VELOCITY + j], states[_HELD + j], math.inf)
             slides = block.amplitude * highest > block.yield_acceleration
-            validity = EQ4_BELOW_YIELD if slides and yield_governs(block, wave) else 0
+            validity = YIELD_GOVERNS if slides and yield_governs(block, wave) else 0
             found = Motion(moved, states[_PEAK + j], validity)
         store_motion(found, where[j], motion, codes)
 
@@ -950,7 +951,7 @@ def solve_cells(
         for j in range(count):
             block = block_at(cells, j, options)
             if wanted == STICK_SLIP:
-                codes[0, j], codes[1, j] = block.sliding_mode, block.validity
+                codes[0, j], codes[1, j] = block.sliding_mode, validity_before(block, steps.wave)
                 motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
             if block.sliding_mode == wanted:
                 lane_of(block, lanes, lane)

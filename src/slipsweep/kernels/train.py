@@ -12,10 +12,11 @@ from typing import Any
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
-    EQ4_BELOW_YIELD,
+    NEWMARK,
     NO_VALUE,
     NOT_RECOUPLED,
     UNSOLVED,
+    YIELD_GOVERNS,
     Block,
     Motion,
     Options,
@@ -27,8 +28,11 @@ from slipsweep.motion.pieces import END, Wave
 
 @scalar
 def yield_governs(block: Block, wave: Wave) -> bool:
-    """Whether Eq. 4 stays at or below the yield value over all that the plane rises through or jumps to."""
-    governs = True
+    """Whether Eq. 4 stays at or below the yield value over all that the plane rises through or jumps to.
+
+    Not said of Newmark's block, which knows no Eq. 4.
+    """
+    governs = block.rise != NEWMARK
     for i in range(wave.rises.shape[0]):
         high = block.amplitude * wave.rises[i, 1]
         if governs and high > block.yield_acceleration:
@@ -78,7 +82,7 @@ def train_of(
         k = first_pulse(block, wave, 0)
         if k == wave.height.size:
             return Motion(0.0, 0.0, 0)
-        validity = EQ4_BELOW_YIELD if yield_governs(block, wave) else 0
+        validity = YIELD_GOVERNS if yield_governs(block, wave) else 0
         now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0)
         velocity, displacement, peak = now.velocity, now.displacement, now.peak
         validity |= now.validity

@@ -6,7 +6,7 @@ the codes.  The xarray datasets, the netCDF files, the sweep-file schema and the
 all take their words from here.
 """
 
-from enum import IntEnum, IntFlag
+from enum import IntEnum, IntFlag, StrEnum
 from typing import Any
 
 REFERENCE = (
@@ -26,16 +26,27 @@ class SlidingMode(IntEnum):
 
 
 class Validity(IntFlag):
-    """Why a cell's value is missing or to be read with care; 0 means all is well."""
+    """What is to be known of a cell's value, or why it has none (`FLAG_KINDS`); 0 means that no flag is raised."""
 
     STATICALLY_UNSTABLE = 1
     UPLIFT = 2
     LIMIT_UNDEFINED = 4
     FRICTION_NOT_DECAYING = 8
-    EQ4_BELOW_YIELD = 16
+    YIELD_GOVERNS = 16
     KD_NOT_POSITIVE = 32
     NOT_RECOUPLED = 64
     FLEXIBLE_BLOCK = 128
+    UPSLOPE = 256
+    NEAR_MODE_LIMIT = 512
+    FRICTION_ESTIMATED = 1024
+
+
+class FlagKind(StrEnum):
+    """What a flag says of the value of its cell."""
+
+    NO_VALUE = "no value"
+    CAUTION = "caution"
+    NOTE = "note"
 
 
 class LimitStatus(IntEnum):
@@ -63,25 +74,51 @@ LIMIT_STATUS_TEXT: dict[LimitStatus, str] = {
 MAXIMUM_AMPLITUDE_IN_G = 5.0
 
 
-#: Flags under which a cell has no value (NaN, and sliding mode missing).
-VALUELESS = (
-    Validity.STATICALLY_UNSTABLE
-    | Validity.UPLIFT
-    | Validity.LIMIT_UNDEFINED
-    | Validity.FRICTION_NOT_DECAYING
-    | Validity.KD_NOT_POSITIVE
-)
+#: What each flag says of the value: there is none (NaN, and sliding mode missing); there is one, but an assumption
+#: behind it is broken; there is one, and it is sound.
+FLAG_KINDS: dict[Validity, FlagKind] = {
+    Validity.STATICALLY_UNSTABLE: FlagKind.NO_VALUE,
+    Validity.UPLIFT: FlagKind.NO_VALUE,
+    Validity.LIMIT_UNDEFINED: FlagKind.NO_VALUE,
+    Validity.FRICTION_NOT_DECAYING: FlagKind.NO_VALUE,
+    Validity.YIELD_GOVERNS: FlagKind.NOTE,
+    Validity.KD_NOT_POSITIVE: FlagKind.NO_VALUE,
+    Validity.NOT_RECOUPLED: FlagKind.CAUTION,
+    Validity.FLEXIBLE_BLOCK: FlagKind.CAUTION,
+    Validity.UPSLOPE: FlagKind.CAUTION,
+    Validity.NEAR_MODE_LIMIT: FlagKind.CAUTION,
+    Validity.FRICTION_ESTIMATED: FlagKind.NOTE,
+}
+
+
+def flags_of(kind: FlagKind) -> Validity:
+    """All flags of a kind."""
+    return Validity(sum(flag for flag in Validity if FLAG_KINDS[flag] is kind))
+
+
+VALUELESS, CAUTIONS, NOTES = flags_of(FlagKind.NO_VALUE), flags_of(FlagKind.CAUTION), flags_of(FlagKind.NOTE)
+
+#: A heading for each kind, for people.
+FLAG_KIND_TEXT: dict[FlagKind, str] = {
+    FlagKind.NO_VALUE: "the model does not apply",
+    FlagKind.CAUTION: "an assumption behind the value is broken",
+    FlagKind.NOTE: "the value is sound; which rule produced it",
+}
 
 #: One line a flag, for people (`slipsweep info`).
 VALIDITY_TEXT: dict[Validity, str] = {
-    Validity.STATICALLY_UNSTABLE: "yield acceleration <= 0: the block slides under its own weight (no value)",
-    Validity.UPLIFT: "A tan(theta) >= g: the block loses contact within the cycle (no value)",
-    Validity.LIMIT_UNDEFINED: "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit (no value)",
-    Validity.FRICTION_NOT_DECAYING: "calibrated decay rate <= 0 (mu_s xi^2 >= 1) (no value)",
-    Validity.EQ4_BELOW_YIELD: "Eq. 4 stays below the yield value: the yield value governs",
-    Validity.KD_NOT_POSITIVE: "literal rise: Kd <= 0, Eq. 12 cannot stop the block (no value)",
-    Validity.NOT_RECOUPLED: "the block still slides when the next slide begins",
+    Validity.STATICALLY_UNSTABLE: "yield acceleration <= 0: the block slides under its own weight",
+    Validity.UPLIFT: "A tan(theta) >= g: the block loses contact within the cycle",
+    Validity.LIMIT_UNDEFINED: "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit",
+    Validity.FRICTION_NOT_DECAYING: "calibrated decay rate <= 0 (mu_s xi^2 >= 1)",
+    Validity.YIELD_GOVERNS: "Eq. 4 stays below the yield acceleration: with the monotone rise the block slides as "
+    "Newmark's, and lambda plays no part",
+    Validity.KD_NOT_POSITIVE: "literal rise: Kd <= 0, Eq. 12 cannot stop the block",
+    Validity.NOT_RECOUPLED: "does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable",
     Validity.FLEXIBLE_BLOCK: "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold",
+    Validity.UPSLOPE: "the permanent displacement is negative: the block ends upslope",
+    Validity.NEAR_MODE_LIMIT: "0.9 <= xi <= 1.1: at xi = 1 the displacement jumps several times over",
+    Validity.FRICTION_ESTIMATED: "lambda by Eq. 6 or delta_mu by Eqs. 10, 11 enters the displacement",
 }
 
 #: Dimensions of a result, in order; further ones follow.
@@ -147,7 +184,7 @@ RESULTS: dict[str, dict[str, Any]] = {
         "ancillary_variables": "validity",
     },
     "validity": {
-        "long_name": "where the model does not apply, 0: all well",
+        "long_name": "validity flags; 0 = no flag raised (says nothing about lambda or Uy)",
         "flag_masks": [int(flag) for flag in Validity],
         "flag_meanings": " ".join((flag.name or "").lower() for flag in Validity),
     },

@@ -5,9 +5,11 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import shown
-from slipsweep.model.variables import VALIDITY_TEXT
+from slipsweep.model.variables import FLAG_KINDS, VALIDITY_TEXT, FlagKind
 
 _TEXT = {(flag.name or "").lower(): text for flag, text in VALIDITY_TEXT.items()}
+_KINDS = {(flag.name or "").lower(): kind for flag, kind in FLAG_KINDS.items()}
+_ORDER = list(FlagKind)
 
 
 def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
@@ -26,7 +28,8 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     -------
     Dataset
         `statically_unstable`, `uplift`, …: True where the flag is set; dimensions and
-        coordinates of the bit mask, what the flag means as `long_name`.
+        coordinates of the bit mask.  First the flags under which there is no value, then cautions, then
+        notes: the attribute `kind` says which, `long_name` what the flag means.
 
     Raises
     ------
@@ -63,17 +66,17 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     for name in names:
         if name in data.coords or name in data.dims:
             raise InputError(f"{data.name}: has a coordinate {name!r}, as its flag is called: must have another name")
-    return xr.Dataset(
-        {
-            name: _flag(mask, bit, _TEXT.get(name, name.replace("_", " ")))
-            for name, bit in zip(names, bits, strict=True)
-        },
-        coords=data.coords,
+    # a flag of no kind, of another program's file, goes last
+    ordered = sorted(
+        zip(names, bits, strict=True), key=lambda one: _ORDER.index(_KINDS[one[0]]) if one[0] in _KINDS else len(_ORDER)
     )
+    return xr.Dataset({name: _flag(mask, bit, name) for name, bit in ordered}, coords=data.coords)
 
 
-def _flag(mask: xr.Variable, bit: int, text: str) -> xr.Variable:
+def _flag(mask: xr.Variable, bit: int, name: str) -> xr.Variable:
     # the bit in the type of the mask: a wider one would widen all cells with it
     values = (mask & mask.dtype.type(bit)) != 0
-    values.attrs = {"long_name": text}
+    values.attrs = {"long_name": _TEXT.get(name, name.replace("_", " "))}
+    if name in _KINDS:
+        values.attrs["kind"] = str(_KINDS[name])
     return values

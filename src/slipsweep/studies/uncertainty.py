@@ -687,7 +687,8 @@ class SamplePlan:
             "flag_share": np.empty((rows, len(Validity))),
             "valueless_share": np.empty(rows),
         }
-        bits = np.array([[code & int(flag) != 0 for flag in Validity] for code in range(256)], np.float64)
+        codes = 1 + sum(Validity)
+        bits = np.array([[code & int(flag) != 0 for flag in Validity] for code in range(codes)], np.float64)
 
         def work(first: int, last: int) -> None:
             with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused below
@@ -696,7 +697,7 @@ class SamplePlan:
                     values.sort()  # NaN goes last
                     count = int(np.searchsorted(values, np.nan))
                     found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
-                    found["flag_share"][row] = np.bincount(flags[row], minlength=256) @ bits / samples
+                    found["flag_share"][row] = np.bincount(flags[row], minlength=codes) @ bits / samples
                     found["valueless_share"][row] = (samples - count) / samples
                     if not count:
                         continue
