@@ -6,9 +6,12 @@ from pathlib import Path
 
 import netCDF4
 import pytest
+from hypothesis import given, settings
 
 from slipsweep.cli import main
+from tests.support import odd_names, results
 from tests.support.processes import slipsweep
+from tests.support.strategies import reproducible
 
 CELL = "".join(
     f"[axes.{name}]\nvalues = {values}\n"
@@ -101,3 +104,25 @@ def test_where_names_are_ascii(tmp_path: Path) -> None:
     (tmp_path / "r.toml").write_text(record, encoding="utf-8")
     assert "cannot be read" in failed(slipsweep(tmp_path, "run", "r.toml", environment=ascii_only))
     assert {*os.listdir(tmp_path)} == {"ü.toml", "ü.nc", "a.toml", "r.toml"}
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return results.made(tmp_path_factory.mktemp("made"))
+
+
+posix = pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="not every name is one there")
+
+
+@posix
+@settings(reproducible, max_examples=25)
+@given(name=odd_names.names())
+def test_any_name_is_written(sources: list[Path], name: bytes) -> None:
+    odd_names.written(sources[0].parents[1], sources, name)
+
+
+@posix
+@settings(reproducible, max_examples=15)
+@given(name=odd_names.names())
+def test_any_name_is_read(sources: list[Path], name: bytes) -> None:
+    odd_names.read(sources[0].parents[1], sources, name)

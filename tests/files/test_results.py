@@ -4,54 +4,33 @@ import signal
 import subprocess
 import sys
 import time
-from collections import Counter
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 from unittest import mock
 
 import netCDF4
 import numpy as np
-import pandas as pd
 import pytest
-import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slipsweep.charts.slices import Result
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.explore.page import read_excerpt
 from slipsweep.files import guard, spec
 from slipsweep.files.results import ResultFile
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
-from tests.support import edits, trials
+from tests.support import edits, results, trials
 from tests.support.strategies import reproducible
 
 #: Where another process finds the tests.
 ROOT = Path(__file__).parents[2]
 
-GRID = """
-[axes.theta]
-values = [0, 5, 12]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-start = 1
-stop = 8
-num = 6
-[axes.frequency]
-values = [0.5, 1, 2, 4]
-[excitation]
-cycles = 3
-"""
-
 
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("results") / "grid.nc"
-    store.run(sweep_job(spec.parse(GRID, "grid")), path, command="slipsweep run grid.toml")
+    store.run(sweep_job(spec.parse(results.GRID, "grid")), path, command="slipsweep run grid.toml")
     return path
 
 
@@ -167,145 +146,16 @@ def test_packing_that_makes_no_sense_is_named(tmp_path: Path, value: Any) -> Non
 
 # ------------------------------------------------------------------- results after other programs
 
-CASES = """
-[[cases]]
-label = "mild ± slope, wet"
-theta = 5
-mu_s = 0.38
-[[cases]]
-theta = 12
-mu_s = 0.5
-[axes.amplitude]
-values = [1, 3, 6]
-[axes.frequency]
-values = [1, 2, 4]
-[output]
-dtype = "float32"
-"""
-CELL = """
-[[cases]]
-theta = 5
-mu_s = 0.4
-amplitude = 4
-frequency = 1
-"""
-STATISTICS = """
-[axes.theta]
-values = [0, 5]
-[axes.amplitude]
-values = [2, 4, 6, 8]
-[axes.frequency]
-values = [1]
-[uncertainty]
-samples = 16
-[uncertainty.mu_s]
-distribution = "norm"
-loc = 0.4
-scale = 0.03
-"""
-
 
 @pytest.fixture(scope="module")
-def sources(grid: Path) -> list[Path]:
-    """Results of every command that writes them."""
-    paths = [grid]
-    for name, text in (("cases", CASES), ("cell", CELL), ("statistics", STATISTICS)):
-        (grid.parent / f"{name}.toml").write_text(text)
-        paths.append(grid.parent / f"{name}.nc")
-        assert main(["run", str(grid.parent / f"{name}.toml"), "-o", str(paths[-1]), "-q"]) == 0
-    block = ["--theta", "5", "--mu-s", "0.4"]
-    for name, command in {
-        "limit": ["limit", str(grid), "--displacement", "50mm", "-q"],
-        "history": ["simulate", *block, "--frequency", "1", "--amplitude", "4", "--points", "8", "--cycles", "2", "-q"],
-        "record": ["record", str(_motion(grid.parent)), *block, "--scale", "1,2", "--units", "m/s2", "-q"],
-    }.items():
-        paths.append(grid.parent / f"{name}.nc")
-        assert main([*command, "-o", str(paths[-1])]) == 0
-    return paths
-
-
-def _motion(folder: Path) -> Path:
-    path = folder / "motion.csv"
-    times = np.arange(0.0, 2.0, 0.1)
-    path.write_text("".join(f"{t:.1f},{4 * np.sin(5 * t):.4f}\n" for t in times))
-    return path
-
-
-def ends_in_one_line(command: list[str], capsys: pytest.CaptureFixture[str]) -> bool:
-    """Run a command, which may be refused for its input alone; tell whether it was not."""
-    status = main(command)
-    error = capsys.readouterr().err
-    assert status in (0, 2), error
-    assert error == "" if status == 0 else error.startswith("slipsweep: error: ") and error.count("\n") == 1
-    return status == 0
-
-
-def same_table(table: Path, source: Path) -> None:
-    """Compare an exported table with what xarray reads."""
-    frame = pd.read_csv(table, keep_default_na=False, na_values=[""], dtype={"label": str})
-    frame = frame.rename(columns=lambda header: header.partition(" (")[0])
-    with netCDF4.Dataset(source) as file:
-        order = list(file.dimensions)
-    with xr.open_dataset(source, decode_times=False, decode_timedelta=False) as data:
-        dims = {dim for name in frame for dim in data[name].dims}
-        shape = {dim: data.sizes[dim] for dim in order if dim in dims}
-        for name in frame:
-            ours, theirs = frame[name], data[name].variable.set_dims(shape).values.ravel()
-            assert len(ours) == len(theirs)
-            if theirs.dtype.kind in "OSU":
-                texts = [text.decode() if isinstance(text, bytes) else str(text) for text in theirs]
-                assert [*ours.fillna("").astype(str)] == [text.rstrip() for text in texts]
-            else:
-                np.testing.assert_allclose(ours.to_numpy(float), theirs.astype(float), rtol=1e-6)
-
-
-def same_slice(source: Path) -> bool:
-    """Compare what charts and the page read with what xarray reads; tell whether there was something to read."""
-    name = "permanent_displacement"
-    try:
-        with Result(source) as result, xr.open_dataset(source, decode_timedelta=False) as data:
-            if name not in result.variables:
-                return False
-            dims = data[name].dims
-            expected = data[name].sortby([d for d in dims if d in data.indexes and data[d].dtype.kind in "iuf"])
-            middle = {d: 0 if d == "case" else (data.sizes[d] - 1) // 2 for d in dims if d not in result.wide}
-            table = result.select([name], {dim: slice(None) for dim in result.wide}, {})
-            np.testing.assert_allclose(table[name].values, expected.isel(middle).values, rtol=1e-6)
-            excerpt = read_excerpt(source, 10**6)
-            # the page has single precision
-            np.testing.assert_allclose(excerpt.table[name].values, expected.values, rtol=1e-6, atol=1e-37)
-    except InputError:
-        return False
-    return True
-
-
-KINDS = ["contours", "modes", "families", "dimensionless", "newmark", "fragility", "quantiles"]
-
-#: How edited results ended, by what was done.
-ended: Counter[tuple[str, ...]] = Counter()
+def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return results.made(tmp_path_factory.mktemp("sources"))
 
 
 @settings(reproducible, max_examples=60)
 @given(seed=edits.seeds)
-def test_edited_results_are_read_right_or_refused_in_one_line(
-    sources: list[Path], capsys: pytest.CaptureFixture[str], seed: int
-) -> None:
-    folder = sources[0].parent
-    source, table, figure = (folder / f"edited.{suffix}" for suffix in ("nc", "csv", "png"))
-    done = edits.edited(seed, sources, source)
-    told = ends_in_one_line(["info", str(source)], capsys)
-    words = ["--words"] if seed % 2 else []
-    exported = ends_in_one_line(["export", str(source), "-o", str(table), "-q", "--overwrite", *words], capsys)
-    if exported and not words:
-        same_table(table, source)
-    read = same_slice(source)
-    if seed % 3 == 0:
-        kind = KINDS[seed % len(KINDS)]
-        ends_in_one_line(["chart", str(source), "--kind", kind, "-o", str(figure), "--overwrite"], capsys)
-    with suppress(InputError):
-        spec.load(source)
-    outcome = [what for what, so in (("told", told), ("exported", exported), ("read as a slice", read)) if so]
-    ended.update((name, *outcome) for name in done)
+def test_edited_results_are_read_right_or_refused_in_one_line(sources: list[Path], seed: int) -> None:
+    results.edited(sources, seed)
 
 
 def test_a_file_is_named_once_in_what_is_refused(
@@ -320,7 +170,7 @@ def test_a_record_that_was_changed_in_its_result_is_refused_by_the_name_of_that(
     sources: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sweep = "[axes]\nscale = {values = [1, 2]}\ntheta = {values = [5]}\nmu_s = {values = [0.4]}\n"
-    (tmp_path / "a.toml").write_text(f'{sweep}[excitation]\nrecord = "{_motion(tmp_path)}"\nunits = "m/s2"\n')
+    (tmp_path / "a.toml").write_text(f'{sweep}[excitation]\nrecord = "{results.motion(tmp_path)}"\nunits = "m/s2"\n')
     assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.nc"), "-q"]) == 0
     with netCDF4.Dataset(tmp_path / "a.nc", "a") as file:
         file["record_acceleration"][3] = np.nan
@@ -333,28 +183,13 @@ def test_a_record_that_was_changed_in_its_result_is_refused_by_the_name_of_that(
 
 @pytest.fixture(scope="module")
 def contents(sources: list[Path]) -> list[bytes]:
-    """Results as bytes, in all formats."""
-    found = [path.read_bytes() for path in sources[:4]]
-    with xr.open_dataset(sources[0]) as data:
-        for form, chunks in (("NETCDF3_CLASSIC", None), ("NETCDF3_64BIT", None), ("NETCDF4", (2, 2, 2, 2))):
-            path = sources[0].with_name("form.nc")
-            encoding = {"permanent_displacement": {"chunksizes": chunks}} if chunks else {}
-            data.load().drop_encoding().to_netcdf(path, format=cast(Any, form), encoding=encoding)
-            found.append(path.read_bytes())
-    return found
+    return results.contents(sources)
 
 
 @settings(reproducible, max_examples=100)
 @given(seed=edits.seeds)
-def test_damaged_results_are_read_or_refused_in_one_line(
-    sources: list[Path], contents: list[bytes], capsys: pytest.CaptureFixture[str], seed: int
-) -> None:
-    path, table = (sources[0].with_name(name) for name in ("damaged.nc", "damaged.csv"))
-    _, content = edits.damaged(seed, contents)
-    path.write_bytes(content)
-    with mock.patch.object(guard, "STEP_SECONDS", 0):
-        if ends_in_one_line(["info", str(path)], capsys):
-            ends_in_one_line(["export", str(path), "-o", str(table), "-q", "--overwrite"], capsys)
+def test_damaged_results_are_read_or_refused_in_one_line(sources: list[Path], contents: list[bytes], seed: int) -> None:
+    results.damaged(sources[0].parent, contents, seed)
 
 
 def test_a_library_in_an_endless_loop_is_given_up(

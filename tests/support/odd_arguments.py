@@ -6,6 +6,7 @@ function in which one or two arguments are odd, those of the others good.
 
 import datetime
 import inspect
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
@@ -21,6 +22,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import slipsweep
+from slipsweep import InputError
+from slipsweep.model.choices import Choice
+from tests.support.commands import one_line
 
 # ------------------------------------------------------------------------------- values
 
@@ -163,6 +167,25 @@ def calls(draw: st.DrawFn) -> Call:
     called, good = FUNCTIONS[function]
     known = list(inspect.signature(called).parameters)
     names = draw(st.lists(st.sampled_from(known), min_size=1, max_size=2, unique=True))
-    changed = {name: draw(odd) for name in names}
+    # what a function that is called raises is the caller's
+    uncalled = odd.filter(lambda value: not callable(value))
+    changed = {name: draw(uncalled if name == "progress" else odd) for name in names}
     beside = {other: value for name in names for other, value in _BESIDE.get(name, {}).items() if other in known}
     return Call(function, changed, {**good, **beside, **changed})
+
+
+def is_served(call: Call) -> bool:
+    """Call: a result comes, or one clear message that names what is wrong, and nothing else; tell which."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            found = call()
+            if isinstance(found, xr.Dataset):
+                found.load()
+        except InputError as error:
+            message = one_line(str(error), 500)
+        else:
+            assert isinstance(found, (xr.Dataset, slipsweep.Record, Choice)), found
+            return True
+    assert any(name in message for name in (*call.arguments, *WORDS)), message
+    return False

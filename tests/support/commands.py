@@ -1,0 +1,66 @@
+"""Commands run in this process: what they print, and that a refusal is one line."""
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from slipsweep.cli import main
+
+
+class Ended(NamedTuple):
+    """How a command ended, and what it printed."""
+
+    status: int
+    output: str
+    errors: str
+
+
+def run_command(*arguments: object) -> Ended:
+    """Run a command to its end."""
+    written = [io.BytesIO(), io.BytesIO()]
+    streams = [io.TextIOWrapper(one, "utf-8", errors="surrogateescape", write_through=True) for one in written]
+    with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
+        status = main([str(argument) for argument in arguments])
+    output, errors = (one.getvalue().decode(errors="surrogateescape") for one in written)
+    return Ended(status, output, errors)
+
+
+def one_line(message: str, most: int = 700) -> str:
+    """Check that what is said of bad input is one line, of letters that a terminal shows, and not a long one."""
+    assert message.splitlines() == [message], ascii(message)
+    assert message.isprintable(), ascii(message)
+    assert 0 < len(message) < most, message
+    return message
+
+
+def is_served(*arguments: object) -> bool:
+    """Run a command, which may be refused for its input alone; tell whether it was not."""
+    ended = run_command(*arguments)
+    assert ended.status in (0, 2), (arguments, ended)
+    if ended.status == 0:
+        assert ended.errors == "", (arguments, ended)
+        return True
+    assert ended.output == "", (arguments, ended)
+    start = "slipsweep: error: "
+    assert ended.errors.startswith(start), (arguments, ended)
+    assert ended.errors.endswith("\n"), (arguments, ended)
+    one_line(ended.errors.removeprefix(start)[:-1])
+    return False
+
+
+@contextlib.contextmanager
+def working_folder(folder: Path) -> Iterator[Path]:
+    """Run what follows in a folder, with nothing on standard input."""
+    before, stdin = Path.cwd(), sys.stdin
+    os.chdir(folder)
+    try:
+        with open(os.devnull, encoding="utf-8") as nothing:
+            sys.stdin = nothing
+            yield folder
+    finally:
+        sys.stdin = stdin
+        os.chdir(before)
