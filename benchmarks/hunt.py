@@ -17,7 +17,7 @@ from hypothesis import seed as seeded
 from hypothesis.errors import HypothesisException
 
 from benchmarks.machine import arguments, measured_on, table
-from tests.support.hunt import KINDS, Kind, Sources
+from tests.support.hunt import FOUND, KINDS, Kind, Sources
 
 #: Inputs of a kind that are drawn together.
 BATCH = 500
@@ -85,15 +85,15 @@ def draw(name: str, kind: Kind, sources: Sources, count: int, seed: int) -> Endi
 
 def main() -> None:
     """Draw, try out, write hunt.md."""
-    given_ = arguments(__doc__, counts={"percent": 100, "seed": -1})
-    seed = given_.seed if given_.seed >= 0 else random.randrange(2**31)
+    wanted = arguments(__doc__, counts={"percent": 100, "seed": -1})
+    seed = wanted.seed if wanted.seed >= 0 else random.randrange(2**31)
     print(f"seed {seed}", flush=True)
     rows: list[list[object]] = []
     faults = 0
     with tempfile.TemporaryDirectory() as folder:
         sources = Sources(Path(folder))
         for name, kind in KINDS.items():
-            count = 5 if given_.tiny else max(5, kind.count * given_.percent // 100)
+            count = 5 if wanted.tiny else max(5, kind.count * wanted.percent // 100)
             endings = draw(name, kind, sources, count, seed)
             rows += endings.rows()
             faults += len(endings.faults)
@@ -103,9 +103,12 @@ def main() -> None:
     print(counted)
     head = (
         f"{measured_on(('numpy', 'xarray', 'netCDF4', 'hypothesis'))} Written by `python -m benchmarks.hunt "
-        f"--percent {given_.percent} --seed {seed}`."
+        f"--percent {wanted.percent} --seed {seed}`."
     )
-    (given_.folder / "hunt.md").write_text(f"{head}\n\n{counted}", encoding="utf-8")
+    since = table(["input", "what was wrong"], [[found.kind.removesuffix(" of"), found.wrong] for found in FOUND])
+    since = since.replace("---:", "---")
+    text = f"{head}\n\n{counted}\nFound by such runs, mended, and tried again by the tests:\n\n{since}"
+    (wanted.folder / "hunt.md").write_text(text, encoding="utf-8")
     if faults:
         raise SystemExit(f"{faults} faults")
 

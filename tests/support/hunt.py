@@ -68,3 +68,27 @@ KINDS: dict[str, Kind] = {
     "results edited by other programs": Kind(400, edits.seeds, lambda made, seed: results.edited(made.paths, seed)),
     "results damaged": Kind(600, edits.seeds, lambda made, seed: results.damaged(made.folder, made.contents, seed)),
 }
+
+
+@dataclass(frozen=True)
+class Found:
+    """An input that failed once: of which kind, the input itself, and what was wrong."""
+
+    kind: str
+    value: Any
+    wrong: str
+
+
+#: Faults found by long runs, and mended; each is tried again by the tests.
+FOUND = [
+    Found(
+        "arguments of",
+        odd_arguments.called("simulate", points_per_cycle=10**400),
+        "`points_per_cycle` of 400 digits: OverflowError",
+    ),
+    Found(
+        "command line of",
+        ["export", "x" * 300, "-o", "new.csv"],
+        "a name longer than the system takes: exit status 1 and an error number",
+    ),
+]

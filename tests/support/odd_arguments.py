@@ -160,18 +160,23 @@ class Call:
         return FUNCTIONS[self.function][0](**self.arguments)
 
 
+def called(function: str, **changed: Any) -> Call:
+    """A call of a function in which these arguments are odd, those of the others good."""
+    called, good = FUNCTIONS[function]
+    known = inspect.signature(called).parameters
+    beside = {other: value for name in changed for other, value in _BESIDE.get(name, {}).items() if other in known}
+    return Call(function, changed, {**good, **beside, **changed})
+
+
 @st.composite
 def calls(draw: st.DrawFn) -> Call:
     """A call in which one argument, or two, are odd."""
     function = draw(st.sampled_from(list(FUNCTIONS)))
-    called, good = FUNCTIONS[function]
-    known = list(inspect.signature(called).parameters)
+    known = list(inspect.signature(FUNCTIONS[function][0]).parameters)
     names = draw(st.lists(st.sampled_from(known), min_size=1, max_size=2, unique=True))
     # what a function that is called raises is the caller's
     uncalled = odd.filter(lambda value: not callable(value))
-    changed = {name: draw(uncalled if name == "progress" else odd) for name in names}
-    beside = {other: value for name in names for other, value in _BESIDE.get(name, {}).items() if other in known}
-    return Call(function, changed, {**good, **beside, **changed})
+    return called(function, **{name: draw(uncalled if name == "progress" else odd) for name in names})
 
 
 def is_served(call: Call) -> bool:

@@ -75,8 +75,12 @@ def open_result(path: Path) -> Iterator["ResultFile"]:
     InputError
         It cannot be read, is not netCDF or damaged, or was not written by slipsweep.
     """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     guard.try_out(read_through, path)
     with ResultFile(path) as file:
         if not str(file.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in file.attrs:

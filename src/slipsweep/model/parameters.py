@@ -81,6 +81,7 @@ STEPS_PER_CYCLE = 1024
 #: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
 MOST_CYCLES = 1_000_000_000
 MOST_STEPS = 16_777_216
+MOST_POINTS = 1_000_000_000
 
 
 def number_text(value: float) -> str:

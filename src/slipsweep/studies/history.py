@@ -13,7 +13,7 @@ from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history
-from slipsweep.model.parameters import check_numbers, check_whole, number_text
+from slipsweep.model.parameters import MOST_POINTS, check_numbers, check_whole, number_text
 from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
 from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.waveforms import WAVEFORMS
@@ -47,7 +47,7 @@ def history_table(
         return table
 
     if times is None:
-        points = check_whole("points_per_cycle", points_per_cycle, 4)
+        points = check_whole("points_per_cycle", points_per_cycle, 4, MOST_POINTS)
         last = sampled(np.array([2.0 * math.pi * motion.cycles]))[0]
         # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
         braking = last[1] - last[0]
