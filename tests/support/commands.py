@@ -48,7 +48,7 @@ def is_served(*arguments: object) -> bool:
     start = "slipsweep: error: "
     assert ended.errors.startswith(start), (arguments, ended)
     assert ended.errors.endswith("\n"), (arguments, ended)
-    one_line(ended.errors.removeprefix(start)[:-1])
+    one_line(ended.errors.removeprefix(start)[:-1], 1010)
     return False
 
 

@@ -91,4 +91,9 @@ FOUND = [
         ["export", "x" * 300, "-o", "new.csv"],
         "a name longer than the system takes: exit status 1 and an error number",
     ),
+    Found(
+        "command line of",
+        ["run", "grid.toml", "1" * 5000],
+        "an argument of 5000 letters: repeated in full by the error",
+    ),
 ]

@@ -39,6 +39,10 @@ app.command(epilog=explore.EXAMPLE)(explore.explore)
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
+#: Letters of an error; longer ones are cut in the middle.
+_LONGEST = 1000
+
+
 class Interrupted(BaseException):
     """Ctrl-C or SIGTERM; no `except Exception` stops it."""
 
@@ -133,5 +137,7 @@ def _words(error: Any) -> str:
 def _fail(message: str, status: int) -> int:
     # one line, whatever a name or a library has in it
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+    if len(line) > _LONGEST:  # a page of what was given hides what is wrong with it
+        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
     print(f"slipsweep: error: {line}", file=sys.stderr)
     return status
