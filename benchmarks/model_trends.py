@@ -1,0 +1,170 @@
+"""What the model's numbers are worth: ``python -m benchmarks.model_trends``.
+
+Writes experiments.md, the paper's two experiments under every choice of inputs that an engineer has;
+sensitivity.md, how far each input moves them; and model_trends.md, how often the displacement of a lined slope
+goes against what a block is expected to do.  ``.ci/include-report`` puts them into README.md and docs/trust.md.
+Nothing is timed.
+"""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+import slipsweep
+from benchmarks.machine import arguments, table
+from slipsweep import SlidingMode, Validity
+
+#: The paper's Tables 1 and 2: the table moved with the frequency and the amplitude, and what was identified.
+STICK_SLIP = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8}
+CONTINUOUS = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "frequency": 3.5}
+MEASURED_YIELD = (0.59, 0.08)
+PRINTED_DECAY = (2.70, 2.30)
+PRINTED_DELTA_MU = (0.09, 0.11)
+CYCLES = 5
+
+#: Inputs, and what is given of each experiment under them.
+INPUTS: dict[str, tuple[dict[str, tuple[float, float]], Any]] = {
+    "all estimated": ({}, "mendez"),
+    "Üy measured": ({"yield_acceleration": MEASURED_YIELD}, "mendez"),
+    "Üy measured, recoupling by integration": (
+        {"yield_acceleration": MEASURED_YIELD},
+        slipsweep.Mendez(recoupling="integrate"),
+    ),
+    "Üy measured, λ as printed": ({"yield_acceleration": MEASURED_YIELD, "decay_rate": PRINTED_DECAY}, "mendez"),
+    "Üy measured, λ and Δμ as printed": (
+        {"yield_acceleration": MEASURED_YIELD, "decay_rate": PRINTED_DECAY, "delta_mu": PRINTED_DELTA_MU},
+        "mendez",
+    ),
+    "Newmark's block, Üy measured": ({"yield_acceleration": MEASURED_YIELD}, "newmark"),
+    "Newmark's block, Üy estimated": ({}, "newmark"),
+}
+
+#: A lined slope: inclinations in degrees, friction coefficients, amplitudes in m/s².
+SLOPE: dict[str, NDArray[np.float64]] = {
+    "theta": np.linspace(8, 14, 13),
+    "mu_s": np.linspace(0.25, 0.45, 21),
+    "amplitude": np.linspace(0.05, 1.2, 116) * slipsweep.Mendez().g,
+}
+
+#: Which way the displacement of a block is expected to go along each axis.
+EXPECTED = {"amplitude": 1, "mu_s": -1, "theta": 1}
+
+#: Models of the lined slope.
+MODELS: dict[str, dict[str, Any]] = {
+    "all estimated": {},
+    "λ = 2.7": {"decay_rate": 2.7},
+    "recoupling by integration": {"model": slipsweep.Mendez(recoupling="integrate")},
+    "Newmark's block": {"model": "newmark"},
+}
+
+#: Differences of two results that are rounding.
+_ROUNDING = 1e-9
+
+
+def experiments() -> str:
+    """Permanent displacement of both experiments under every choice of inputs, in millimetres."""
+    rows: list[list[object]] = [["the published figures end at", "150", "200"]]
+    for text, (given, model) in INPUTS.items():
+        row: list[object] = [text]
+        for which, cell in enumerate((STICK_SLIP, CONTINUOUS)):
+            inputs = cell | {name: values[which] for name, values in given.items()}
+            found = slipsweep.sweep(**inputs, excitation=slipsweep.Sine(cycles=CYCLES), model=model)  # type: ignore[arg-type]
+            about = []
+            if model != "newmark" and found.sliding_mode != (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS)[which]:
+                about.append(f"as {SlidingMode(found.sliding_mode.item()).name.lower().replace('_', '–')}")
+            if found.validity & Validity.NOT_RECOUPLED:
+                about.append("does not recouple")
+            value = f"{found.permanent_displacement.item() * 1000:.0f}"
+            row.append(f"{value} ({', '.join(about)})" if about else value)
+        rows.append(row)
+    return table(["inputs", "stick–slip, mm", "continuous, mm"], rows)
+
+
+def sensitivity() -> str:
+    """Change of the permanent displacement of both experiments when one input is a tenth larger or smaller."""
+    shaking = slipsweep.Sine(cycles=CYCLES)
+    rows: list[list[object]] = []
+    names = {
+        "yield_acceleration": "Üy",
+        "decay_rate": "λ",
+        "delta_mu": "Δμ",
+        "mu_s": "μs",
+        "theta": "θ",
+        "amplitude": "A",
+        "frequency": "f",
+    }
+    measured = zip(MEASURED_YIELD, PRINTED_DECAY, PRINTED_DELTA_MU, strict=True)
+    cells = [
+        cell | dict(zip(("yield_acceleration", "decay_rate", "delta_mu"), values, strict=True))
+        for cell, values in zip((STICK_SLIP, CONTINUOUS), measured, strict=True)
+    ]
+
+    def displacement(cell: dict[str, float]) -> float:
+        return float(slipsweep.sweep(**cell, excitation=shaking).permanent_displacement)  # type: ignore[arg-type]
+
+    for name, symbol in names.items():
+        row: list[object] = [symbol]
+        for cell in cells:
+            base = displacement(cell)
+            row += [f"{displacement(cell | {name: cell[name] * by}) / base - 1:+.0%}" for by in (0.9, 1.1)]
+        rows.append(row)
+    return table(["input", "stick–slip, −10 %", "+10 %", "continuous, −10 %", "+10 %"], rows)
+
+
+def against(found: xr.Dataset, axis: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Steps of the grid along an axis: with a displacement at both ends, against what is expected, with a caution."""
+    low, high = found.isel({axis: slice(None, -1)}), found.isel({axis: slice(1, None)})
+    before, after = low.permanent_displacement.values, high.permanent_displacement.values
+    there = np.isfinite(before) & np.isfinite(after) & ((before != 0) | (after != 0))
+    with np.errstate(invalid="ignore"):
+        change = EXPECTED[axis] * (after - before)
+        wrong = there & (change < -_ROUNDING * np.maximum(np.abs(before), np.abs(after)))
+    cautions = Validity.NOT_RECOUPLED  # XX
+    return there, wrong, ((low.validity.values | high.validity.values) & cautions) != 0
+
+
+def trends(tiny: bool) -> str:
+    """How often the displacement goes against what is expected, by model, axis and sliding mode."""
+    grid: dict[str, Any] = {name: values[:: 8 if tiny else 1] for name, values in SLOPE.items()}
+    rows: list[list[object]] = []
+    for text, options in MODELS.items():
+        found = slipsweep.sweep(**grid, frequency=1.0, excitation=slipsweep.Sine(cycles=15), **options)
+        for mode in (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS):
+            row: list[object] = [text, mode.name.lower().replace("_", "–")]
+            warned = total = 0
+            for axis in EXPECTED:
+                there, wrong, caution = against(found, axis)
+                codes = found.sliding_mode
+                both = [codes.isel({axis: part}).values == mode for part in (slice(None, -1), slice(1, None))]
+                inside = there & both[0] & both[1]
+                row.append(f"{(wrong & inside).sum() / inside.sum():.0%}" if inside.any() else "")
+                warned += int((wrong & inside & caution).sum())
+                total += int((wrong & inside).sum())
+            if any(row[2:]):
+                rows.append([*row, f"{warned / total:.0%}" if total else ""])
+    header = ["inputs", "mode", "falls with PGA", "rises with μs", "falls with θ", "of these, under a caution"]
+    return table(header, rows)
+
+
+def main() -> None:
+    """Solve, and write the tables."""
+    given = arguments(__doc__)
+    by = "Written by `python -m benchmarks.model_trends`.\n"
+    (given.folder / "experiments.md").write_text(
+        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. {by}", encoding="utf-8"
+    )
+    (given.folder / "sensitivity.md").write_text(
+        f"{sensitivity()}\nWith Üy measured, λ and Δμ as printed, {CYCLES} cycles. {by}", encoding="utf-8"
+    )
+    cells = " × ".join(str(values.size) for values in SLOPE.values())
+    (given.folder / "model_trends.md").write_text(
+        f"{trends(given.tiny)}\nθ 8 to 14°, μs 0.25 to 0.45, PGA 0.05 to 1.2 g, 1 Hz, 15 cycles, {cells} cells; "
+        f"shares of the steps from one point of the grid to the next. {by}",
+        encoding="utf-8",
+    )
+
+
+if __name__ == "__main__":
+    main()
