@@ -25,7 +25,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         place.chmod(0o755)  # for the faults done as another user
-        run(place / "undisturbed.nc", block_cells=10**9)
+        run(place / "undisturbed.nc", chunk_cells=10**9)
         expected = values(place / "undisturbed.nc")
         for name in names:
             reason = can_be_done(name)

@@ -1,4 +1,4 @@
-"""Sweeps to disk: throughput, blocks, workers, memory, compression, and what follows for 10¹² cells.
+"""Sweeps to disk: throughput, chunks, workers, memory, compression, and what follows for 10¹² cells.
 
 ``python -m benchmarks.large_sweeps`` writes large_sweeps.md, scaling.md and large_sweeps.json; then
 ``.ci/include-report`` puts the tables into docs.  Commands are run as processes, as a user runs them.
@@ -25,14 +25,14 @@ import slipsweep
 from benchmarks.grids import design_grid, regime_cells
 from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
 from slipsweep.files import spec
-from slipsweep.grid import blocks
+from slipsweep.grid import chunks
 from slipsweep.runs import store
 from slipsweep.runs.jobs import Job, sweep_job
 
 #: Results that are written by default, with their types.
 RESULTS = {"permanent_displacement": "f8", "peak_relative_velocity": "f8", "sliding_mode": "i1", "validity": "i2"}
 
-#: Writes the same bytes with the netCDF4 library alone, as many cells at a time as a block has, from arrays that are
+#: Writes the same bytes with the netCDF4 library alone, as many cells at a time as a chunk has, from arrays that are
 #: there: what is measured begins with opening the file.
 ALONE = """
 import os, sys, time
@@ -118,7 +118,7 @@ def run(sweep: Path, *options: str) -> Process:
 def throughput(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
     """`slipsweep run` to netCDF, against the netCDF4 library writing as many bytes."""
     length = 10 if tiny else 100
-    rows = max(1, blocks.BLOCK_CELLS // length**3)
+    rows = max(1, chunks.CHUNK_CELLS // length**3)
     sweep = sweep_file(folder / "big.toml", [length] * 4)
     taken: dict[str, list[tuple[float, float]]] = {"run": [], "alone": [], "again": [], "synced": [], "disk": []}
     memory = 0.0
@@ -172,30 +172,30 @@ def throughput(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
 
 
 def overhead(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
-    """What a block costs beside its cells: the same sweep in blocks of the default size and in smaller ones."""
-    length, size = (10, 1000) if tiny else (80, blocks.BLOCK_CELLS)
+    """What a chunk costs beside its cells: the same sweep in chunks of the default size and in smaller ones."""
+    length, size = (10, 1000) if tiny else (80, chunks.CHUNK_CELLS)
     rows, worst = [], 0.0
     for name, lengths in {
         f"four axes of {length}": [length] * 4,
         "no frequency axis": [length // 2, length, 10 * length, 1],
     }.items():
-        job = sweep_job(spec.parse(sweep_file(folder / "blocks.toml", lengths).read_text(), "blocks.toml"))
+        job = sweep_job(spec.parse(sweep_file(folder / "chunks.toml", lengths).read_text(), "chunks.toml"))
 
-        def blocked(cells: int, job: Job = job) -> Callable[[], object]:
-            return lambda: store.run(job, folder / "blocks.nc", command="-", overwrite=True, block_cells=cells)
+        def chunked(cells: int, job: Job = job) -> Callable[[], object]:
+            return lambda: store.run(job, folder / "chunks.nc", command="-", overwrite=True, chunk_cells=cells)
 
-        counts = [sum(1 for _ in blocks.grid_blocks(job.plan.sizes, cells)) for cells in (size, size // 8)]
-        whole, eighth = alternate({"1": blocked(size), "8": blocked(size // 8)}, 1 if tiny else 5, min).values()
+        counts = [sum(1 for _ in chunks.grid_chunks(job.plan.sizes, cells)) for cells in (size, size // 8)]
+        whole, eighth = alternate({"1": chunked(size), "8": chunked(size // 8)}, 1 if tiny else 5, min).values()
         each = max(0.0, eighth - whole) / (counts[1] - counts[0])
         share = each * counts[0] / whole
         worst = max(worst, share)
         rows.append([name, f"{job.plan.cells:,}", *counts, number(whole), number(eighth), number(each * 1e3)])
         rows[-1].append(f"{share:.1%}")
-    (folder / "blocks.nc").unlink(missing_ok=True)
+    (folder / "chunks.nc").unlink(missing_ok=True)
     text = (
-        f"### A block's overhead (default: {blocks.BLOCK_CELLS:,} cells)\n\n"
-        + table(["", "cells", "blocks", "in eighths", "s", "s in eighths", "ms a block", "share at default"], rows)
-        + "\nThe time that more blocks add, over their number.\n"
+        f"### A chunk's overhead (default: {chunks.CHUNK_CELLS:,} cells)\n\n"
+        + table(["", "cells", "chunks", "in eighths", "s", "s in eighths", "ms a chunk", "share at default"], rows)
+        + "\nThe time that more chunks add, over their number.\n"
     )
     return text, {"share": worst}
 
@@ -244,7 +244,7 @@ def memory(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:
         cells = int(np.prod(lengths))
         rows.append([f"{cells:,}", number(4e-9 * cells), number(found.seconds), f"{found.memory / 1e6:.0f} MB"])
     text = "### Memory\n\n" + table(["cells", "GB", "s", "peak resident memory"], rows)
-    return text + "\nDisplacement as float32, default size of blocks.\n", {"peak_bytes": peak}
+    return text + "\nDisplacement as float32, default size of chunks.\n", {"peak_bytes": peak}
 
 
 def compression(folder: Path, tiny: bool) -> tuple[str, dict[str, float]]:

@@ -16,11 +16,8 @@ WRITES = {
     "paper_waveforms": ["paper_waveforms.md", "paper_waveforms.png"],
     "faults": ["faults.md"],
     "agreement": ["agreement.md"],
-<<<<<<< ours
     "hunt": ["hunt.md"],
-=======
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
->>>>>>> theirs
     "waveforms": ["waveforms.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],

@@ -188,7 +188,7 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_keeps_its_finished_blocks(tmp_path: Path, number: signal.Signals) -> None:
+def test_an_interrupted_run_keeps_its_finished_chunks(tmp_path: Path, number: signal.Signals) -> None:
     (tmp_path / "long.toml").write_text(LONG)
     with subprocess.Popen(
         [*SLIPSWEEP, "run", "long.toml"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -203,9 +203,9 @@ def test_an_interrupted_run_keeps_its_finished_blocks(tmp_path: Path, number: si
             process.kill()
     assert process.returncode == 128 + number
     assert output == ""
-    assert re.fullmatch(r"slipsweep: interrupted; \d+ of 600 blocks are kept; go on with --resume\n", errors)
+    assert re.fullmatch(r"slipsweep: interrupted; \d+ of 600 chunks are kept; go on with --resume\n", errors)
     assert names(tmp_path) == {"long.toml", "long.nc.parts"}
-    assert_fails(slipsweep(tmp_path, "run", "long.toml"), 2, "finished blocks of an interrupted run", "--resume")
+    assert_fails(slipsweep(tmp_path, "run", "long.toml"), 2, "finished chunks of an interrupted run", "--resume")
 
 
 def wait_until(condition: Callable[[], bool]) -> None:

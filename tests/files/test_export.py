@@ -67,13 +67,13 @@ def bare(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-@pytest.mark.parametrize("block_cells", [7, export.BLOCK_CELLS])
-def test_a_table_has_every_cell_once(folder: Path, tmp_path: Path, suffix: str, block_cells: int) -> None:
+@pytest.mark.parametrize("chunk_cells", [7, export.CHUNK_CELLS])
+def test_a_table_has_every_cell_once(folder: Path, tmp_path: Path, suffix: str, chunk_cells: int) -> None:
     if suffix == ".parquet":
         pytest.importorskip("pyarrow")
     done: list[int] = []
     path = tmp_path / f"t{suffix}"
-    rows = export.export(folder / "grid.nc", path, block_cells=block_cells, progress=done.append)
+    rows = export.export(folder / "grid.nc", path, chunk_cells=chunk_cells, progress=done.append)
     table = bare(read(path))
     assert rows == sum(done) == len(table) == 3 * 2 * 3 * 2 * 2
     axes = ["theta", "mu_s", "displacement_amplitude", "frequency", "decay_rate"]
@@ -82,7 +82,7 @@ def test_a_table_has_every_cell_once(folder: Path, tmp_path: Path, suffix: str, 
         expected["sliding_mode"] = expected["sliding_mode"].where(expected["sliding_mode"] >= 0)
     table, expected = (frame.sort_values(axes, ignore_index=True) for frame in (table, expected))
     assert {*table.columns} == {*expected.columns}
-    if block_cells == export.BLOCK_CELLS:
+    if chunk_cells == export.CHUNK_CELLS:
         assert list(bare(read(path))["decay_rate"][:4]) == [1.0, 2.5, 1.0, 2.5]  # the last one runs fastest
     for name in table:
         # exact: as many digits as bring the value back
@@ -138,7 +138,7 @@ def test_a_parquet_file_tells_how_it_was_made(folder: Path, tmp_path: Path) -> N
     assert schema.field("validity").metadata[b"flag_meanings"].startswith(b"statically_unstable uplift")
 
 
-def test_memory_stays_that_of_a_block(tmp_path: Path) -> None:
+def test_memory_stays_that_of_a_chunk(tmp_path: Path) -> None:
     """A table of 600 000 rows is written in the memory of a few thousand."""
     import tracemalloc
 
@@ -151,7 +151,7 @@ def test_memory_stays_that_of_a_block(tmp_path: Path) -> None:
     store.run(sweep_job(spec.parse(text + '[output]\nvariables = ["validity"]', "x")), tmp_path / "a.nc", command="x")
     tracemalloc.start()
     try:
-        assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", block_cells=5000) == 600_000
+        assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", chunk_cells=5000) == 600_000
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

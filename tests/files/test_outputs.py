@@ -148,16 +148,16 @@ def test_an_input_by_another_name_is_not_written_either(folder: Path, capfd: pyt
 
 
 def test_a_work_folder_is_not_made_of_what_is_read(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Folders are emptied: that of the blocks, and with --split the output itself."""
+    """Folders are emptied: that of the chunks, and with --split the output itself."""
     Path("b.nc.parts").mkdir()
     Path("a.toml").rename("b.nc.parts/data.nc")
     refused(capfd, "run", "b.nc.parts/data.nc", "-o", "b.nc")
     Path("b.nc.parts/data.nc").rename("b.nc.parts/a.toml")
     refused(capfd, "run", "b.nc.parts/a.toml", "-o", "b.nc")
     Path("b.nc.parts/a.toml").rename("a.toml")
-    Path("blocks").mkdir()
-    os.link("a.toml", "blocks/block-000007.nc")
-    assert "block-000007.nc" not in refused(capfd, "run", "a.toml", "--split", "-o", "blocks", "--overwrite")
+    Path("chunks").mkdir()
+    os.link("a.toml", "chunks/chunk-000007.nc")
+    assert "chunk-000007.nc" not in refused(capfd, "run", "a.toml", "--split", "-o", "chunks", "--overwrite")
 
 
 def test_a_work_folder_keeps_what_no_run_made(folder: Path) -> None:

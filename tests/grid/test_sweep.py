@@ -14,7 +14,7 @@ import slipsweep
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans
-from slipsweep.grid.blocks import slabs
+from slipsweep.grid.chunks import slabs
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,

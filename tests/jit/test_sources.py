@@ -138,7 +138,7 @@ def test_names_that_people_read_are_no_machine_code(package: Path) -> None:
     path.write_text(path.read_text().replace('"plane inclination"', '"inclination of the plane"'))
     after = keys_of(known_sources(package))
     assert after.machine_code == before.machine_code
-    assert after.results != before.results  # they are written into the blocks of a split result
+    assert after.results != before.results  # they are written into the chunks of a split result
 
 
 # --------------------------------------------------------------------------------------- imports

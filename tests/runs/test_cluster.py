@@ -43,9 +43,9 @@ num = 10
 values = [1, 2]
 """
 
-#: 24 blocks, each of some milliseconds: enough to be killed among them.
+#: 24 chunks, each of some milliseconds: enough to be killed among them.
 SLOW = SWEEP + '[solver]\nmethod = "step"\nsteps_per_cycle = 1024\n'
-BLOCK_CELLS = 400
+CHUNK_CELLS = 400
 
 
 def dask(*arguments: str) -> "subprocess.Popen[bytes]":
@@ -99,9 +99,9 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def run(text: str, path: Path, **options: Any) -> store.Report:
-    """`store.run` in several blocks."""
+    """`store.run` in several chunks."""
     return store.run(
-        sweep_job(spec.parse(text, "a.toml")), path, command="slipsweep run", block_cells=BLOCK_CELLS, **options
+        sweep_job(spec.parse(text, "a.toml")), path, command="slipsweep run", chunk_cells=CHUNK_CELLS, **options
     )
 
 
@@ -118,7 +118,7 @@ def assert_same_bits(one: Path, other: Path) -> None:
 # ------------------------------------------------------------------------- what they compute
 
 
-def test_blocks_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Path) -> None:
+def test_chunks_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Path) -> None:
     progress: list[int] = []
     here = run(SWEEP, tmp_path / "here.nc")
     with cluster.cluster(scheduler=address) as solved:
@@ -193,7 +193,7 @@ def test_a_killed_worker_loses_nothing(address: str, tmp_path: Path) -> None:
             assert len(pids) == 4
 
             def kill(cells: int) -> None:
-                """Kill a worker that has blocks to solve, when the first block and again when another is back."""
+                """Kill a worker that has chunks to solve, when the first chunk and again when another is back."""
                 working = [worker for worker, tasks in client.processing().items() if tasks]
                 busy = [worker for worker in working if worker not in (*staying, *killed)]
                 if len(killed) < 2 and busy:
@@ -232,7 +232,7 @@ def test_a_killed_scheduler_leaves_a_run_that_can_be_gone_on_with(
                 process.kill()
 
         def killing_run(*arguments: Any, **options: Any) -> store.Report:
-            return whole_run(*arguments, **options | {"block_cells": BLOCK_CELLS, "progress": kill})
+            return whole_run(*arguments, **options | {"chunk_cells": CHUNK_CELLS, "progress": kill})
 
         monkeypatch.setattr(store, "run", killing_run)
         with workers(address, 1):
@@ -240,7 +240,7 @@ def test_a_killed_scheduler_leaves_a_run_that_can_be_gone_on_with(
             status = main([*command, "--scheduler", address])
     output, errors = capfd.readouterr()
     expected = (
-        rf"slipsweep: error: the scheduler at {address} was lost; (\d+) of 24 blocks are kept; go on with --resume\n"
+        rf"slipsweep: error: the scheduler at {address} was lost; (\d+) of 24 chunks are kept; go on with --resume\n"
     )
     found = re.fullmatch(expected, errors)
     assert found, errors

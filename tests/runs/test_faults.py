@@ -27,12 +27,12 @@ from tests.support.fault_rounds import SWEEP, run, stopped, values
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     path = tmp_path_factory.mktemp("undisturbed") / "a.nc"
-    run(path, block_cells=10**9)
+    run(path, chunk_cells=10**9)
     return values(path)
 
 
 def solved_on_resume(path: Path, **options: Any) -> list[int]:
-    """Go on with a run; return the numbers of the blocks that had to be solved."""
+    """Go on with a run; return the numbers of the chunks that had to be solved."""
     numbers = []
 
     def solved(*arguments: object) -> object:
@@ -55,14 +55,14 @@ def folder() -> Iterator[Path]:
 
 def test_nothing_is_computed_twice(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
     stopped(tmp_path / "a.nc")
-    with pytest.raises(InputError, match="holds 30 finished blocks of an interrupted run; go on with --resume"):
+    with pytest.raises(InputError, match="holds 30 finished chunks of an interrupted run; go on with --resume"):
         run(tmp_path / "a.nc")
     assert solved_on_resume(tmp_path / "a.nc") == list(range(30, 60))
     assert values(tmp_path / "a.nc") == undisturbed
 
 
 @pytest.mark.parametrize("fault", ["flipped bit", "truncated", "deleted", "header", "journal torn", "journal lost"])
-def test_damaged_blocks_are_solved_anew(tmp_path: Path, undisturbed: dict[str, bytes], fault: str) -> None:
+def test_damaged_chunks_are_solved_anew(tmp_path: Path, undisturbed: dict[str, bytes], fault: str) -> None:
     folder = stopped(tmp_path / "a.nc")
     data, journal = folder / "data.nc", folder / "journal"
     size = data.stat().st_size
@@ -70,13 +70,13 @@ def test_damaged_blocks_are_solved_anew(tmp_path: Path, undisturbed: dict[str, b
     expected = list(range(60))
     if fault == "flipped bit":
         with netCDF4.Dataset(data) as file:
-            # the displacement of the first row of block 7
+            # the displacement of the first row of chunk 7
             row = np.asarray(file["permanent_displacement"][3, 10, 39, :]).tobytes()
         at = content.index(row)
         data.write_bytes(content[:at] + bytes([content[at] ^ 16]) + content[at + 1 :])
         expected = [7, *range(30, 60)]
     elif fault == "truncated":
-        # the last variable is cut off, and with it a part of every block
+        # the last variable is cut off, and with it a part of every chunk
         os.truncate(data, size // 2)
     elif fault == "deleted":
         data.unlink()
@@ -99,7 +99,7 @@ def test_what_is_no_result_is_compared_bit_by_bit(tmp_path: Path, monkeypatch: p
     run(tmp_path / "whole", split=split)
     folder = stopped(tmp_path / "a", split=split)
     saved = shutil.copytree(folder, tmp_path / "saved")
-    victim = folder / "data" / "block-000007.nc" if split else folder / "data.nc"
+    victim = folder / "data" / "chunk-000007.nc" if split else folder / "data.nc"
     content = victim.read_bytes()
     work = parts.Folder(tmp_path / "a")
     work.read()
@@ -159,7 +159,7 @@ def test_every_changed_bit_changes_the_checksum() -> None:
     assert parts.checksum({"a": arrays["a"].view(np.int64), "b": arrays["b"]}) != expected
 
 
-def test_blocks_of_a_version_with_other_checksums_are_refused(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
+def test_chunks_of_a_version_with_other_checksums_are_refused(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
     path = tmp_path / "a.nc"
     folder = stopped(path)
     content = json.loads((folder / "manifest.json").read_text().partition("\n")[2])
@@ -168,15 +168,15 @@ def test_blocks_of_a_version_with_other_checksums_are_refused(tmp_path: Path, un
     (folder / "manifest.json").write_text(f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}")
     (folder / "journal").write_text("".join(f"{number} {'0f' * 32}\n" for number in range(30)))
     before = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
-    with pytest.raises(InputError, match="holds 30 finished blocks of an interrupted run"):
+    with pytest.raises(InputError, match="holds 30 finished chunks of an interrupted run"):
         run(path)
-    with pytest.raises(InputError, match=r"cannot go on with the blocks in .*: checksums was none, is XXH3-128"):
+    with pytest.raises(InputError, match=r"cannot go on with the chunks in .*: checksums was none, is XXH3-128"):
         run(path, resume=True)
     assert before == {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != "lock"}
 
 
 @pytest.mark.parametrize("split", [False, True])
-def test_blocks_are_brought_to_the_disk_before_the_next(
+def test_chunks_are_brought_to_the_disk_before_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: dict[str, bytes], split: bool
 ) -> None:
     whole = tmp_path / "a.nc"
@@ -192,10 +192,10 @@ def test_blocks_are_brought_to_the_disk_before_the_next(
     for module in (store, parts):
         monkeypatch.setattr(module, "sync", noted)
     run(tmp_path / "b.nc", split=split)
-    # each block, and after it the journal that tells of it
+    # each chunk, and after it the journal that tells of it
     names = [name for name in synced if name == "journal" or name.endswith(".nc")]
     if split:
-        assert [name for name in names if name != "journal"] == [f"block-{number:06}.nc" for number in range(60)]
+        assert [name for name in names if name != "journal"] == [f"chunk-{number:06}.nc" for number in range(60)]
         assert names.count("journal") >= 60
     else:
         assert names[:121] == ["data.nc", *60 * ["data.nc", "journal"]]
@@ -206,7 +206,7 @@ def test_blocks_are_brought_to_the_disk_before_the_next(
             assert values(tmp_path / "b.nc" / name) == values(whole / name)
 
 
-def test_blocks_of_another_sweep_are_refused_with_the_difference(
+def test_chunks_of_another_sweep_are_refused_with_the_difference(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: dict[str, bytes]
 ) -> None:
     path = tmp_path / "a.nc"
@@ -218,8 +218,8 @@ def test_blocks_of_another_sweep_are_refused_with_the_difference(
         store.run(sweep_job(spec.parse(SWEEP, "a").with_solver(Step())), path, command="x", resume=True)
     with pytest.raises(InputError, match="--split was False, is True"):
         run(path, resume=True, split=True)
-    with pytest.raises(InputError, match="--memory: too little for the blocks of 4000 cells"):
-        run(path, resume=True, block_cells=3000)
+    with pytest.raises(InputError, match="--memory: too little for the chunks of 4000 cells"):
+        run(path, resume=True, chunk_cells=3000)
     with monkeypatch.context() as other:
         other.setattr(parts.sources, "keys", lambda: parts.sources.Keys("other", "other"))
         with pytest.raises(InputError, match=r"slipsweep sources was .*, is other"):
@@ -234,7 +234,7 @@ def test_an_edited_manifest_is_refused(tmp_path: Path) -> None:
     folder = stopped(tmp_path / "a.nc", 5)
     manifest = folder / "manifest.json"
     head, _, content = manifest.read_text().partition("\n")
-    edited = json.loads(content) | {"block_cells": 4001}
+    edited = json.loads(content) | {"chunk_cells": 4001}
     manifest.write_text(f"{head}\n{json.dumps(edited)}")
     with pytest.raises(InputError, match=r"manifest.json: damaged or missing: .* start anew with --overwrite"):
         run(tmp_path / "a.nc", resume=True)
@@ -268,9 +268,9 @@ def test_killed_after_the_output_has_its_name(tmp_path: Path, split: bool, monke
 
 def test_split_opens_as_one_dataset_and_resumes(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
     folder = stopped(tmp_path / "a", split=True)
-    (folder / "data" / "block-000003.nc").unlink()
-    content = (folder / "data" / "block-000007.nc").read_bytes()
-    (folder / "data" / "block-000007.nc").write_bytes(content[: len(content) // 2])
+    (folder / "data" / "chunk-000003.nc").unlink()
+    content = (folder / "data" / "chunk-000007.nc").read_bytes()
+    (folder / "data" / "chunk-000007.nc").write_bytes(content[: len(content) // 2])
     assert solved_on_resume(tmp_path / "a", split=True) == [3, 7, *range(30, 60)]
     assert len(list((tmp_path / "a").iterdir())) == 60
     with xr.open_mfdataset(str(tmp_path / "a" / "*.nc"), combine="by_coords", mask_and_scale=False) as dataset:
@@ -316,7 +316,7 @@ def test_many_faults_are_survived(folder: Path, undisturbed: dict[str, bytes], n
     print(f"{one_round(name, folder, undisturbed, count)} times {name}: all survived")
 
 
-def test_a_disk_that_fills_up_keeps_the_finished_blocks(
+def test_a_disk_that_fills_up_keeps_the_finished_chunks(
     tmp_path: Path, undisturbed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import errno
@@ -332,7 +332,7 @@ def test_a_disk_that_fills_up_keeps_the_finished_blocks(
         patched.setattr(store._OneFile, "write", full)
         with pytest.raises(RunError, match=r"No space left on device; is the disk full\?") as caught:
             run(tmp_path / "a.nc")
-    assert caught.value.__notes__ == ["20 of 60 blocks are kept; go on with --resume"]
+    assert caught.value.__notes__ == ["20 of 60 chunks are kept; go on with --resume"]
     assert solved_on_resume(tmp_path / "a.nc") == list(range(20, 60))
     assert values(tmp_path / "a.nc") == undisturbed
 
@@ -341,7 +341,7 @@ def test_a_disk_that_fills_up_keeps_the_finished_blocks(
 
 
 def interrupted(path: Path, monkeypatch: pytest.MonkeyPatch, number: int, fault: Callable[[], object]) -> RunError:
-    """The error of a run in which something happens when a block is on record."""
+    """The error of a run in which something happens when a chunk is on record."""
     add = parts.Folder.add
     happened: list[int] = []
 
@@ -368,7 +368,7 @@ def test_a_work_folder_that_is_removed_is_named(
     path = tmp_path / name
     folder = tmp_path / f"{name}.parts"
     error = interrupted(path, monkeypatch, at, lambda: shutil.rmtree(folder))
-    assert str(error) == f"{folder}: was removed during the run, and the finished blocks with it; start again"
+    assert str(error) == f"{folder}: was removed during the run, and the finished chunks with it; start again"
     assert not hasattr(error, "__notes__")
     assert os.listdir(tmp_path) == []
     run(path, split="." not in name)
@@ -397,7 +397,7 @@ def test_another_run_in_the_place_of_one_is_left_alone(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="elsewhere what is open cannot be removed")
-@pytest.mark.parametrize(("name", "victim"), [("a.nc", "data.nc"), ("a", "data/block-000003.nc"), ("a", "data")])
+@pytest.mark.parametrize(("name", "victim"), [("a.nc", "data.nc"), ("a", "data/chunk-000003.nc"), ("a", "data")])
 def test_data_that_are_removed_do_not_become_a_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, victim: str
 ) -> None:
@@ -406,7 +406,7 @@ def test_data_that_are_removed_do_not_become_a_result(
     error = interrupted(path, monkeypatch, 40, lambda: shutil.rmtree(target) if target.is_dir() else target.unlink())
     assert not path.exists()
     assert "is the disk full" not in str(error) or victim == "data"  # all that the netCDF library tells
-    if victim != "data/block-000003.nc":
+    if victim != "data/chunk-000003.nc":
         assert not hasattr(error, "__notes__")
     run(path, resume=True, split="." not in name)
 
@@ -427,16 +427,16 @@ dtype = "float32"
 
 
 @pytest.mark.parametrize("split", [False, True])
-def test_a_number_too_large_for_its_type_keeps_no_blocks(tmp_path: Path, split: bool) -> None:
+def test_a_number_too_large_for_its_type_keeps_no_chunks(tmp_path: Path, split: bool) -> None:
     """No --resume could finish them."""
     path = tmp_path / "a"
     kept = FAR.replace("1e-20", "0.5")
-    stopped(path, after=1, text=kept, block_cells=2, split=split)
-    run(path, kept, block_cells=2, resume=True, split=split)
+    stopped(path, after=1, text=kept, chunk_cells=2, split=split)
+    run(path, kept, chunk_cells=2, resume=True, split=split)
     with pytest.raises(InputError, match=r"""a\.toml: output\.dtype = "float32": .* must be "float64\"""") as caught:
-        run(tmp_path / "b", FAR, block_cells=2, split=split)
+        run(tmp_path / "b", FAR, chunk_cells=2, split=split)
     assert not hasattr(caught.value, "__notes__")
-    stopped(tmp_path / "b", after=1, text=FAR, block_cells=2, split=split)
+    stopped(tmp_path / "b", after=1, text=FAR, chunk_cells=2, split=split)
     with pytest.raises(InputError, match=r"output\.dtype"):
-        run(tmp_path / "b", FAR, block_cells=2, resume=True, split=split)
+        run(tmp_path / "b", FAR, chunk_cells=2, resume=True, split=split)
     assert os.listdir(tmp_path) == ["a"]

@@ -1,4 +1,4 @@
-"""Every plan, every way: in parts, in blocks, in folders, by workers, killed and gone on with, to the same bits."""
+"""Every plan, every way: in parts, in chunks, in folders, by workers, killed and gone on with, to the same bits."""
 
 import os
 import pickle
@@ -19,7 +19,7 @@ from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.blocks import block_lengths, grid_blocks, places
+from slipsweep.grid.chunks import chunk_lengths, grid_chunks, places
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import Job, limit_job, sweep_job
 from tests.support.processes import TIMEOUT
@@ -32,7 +32,7 @@ values = [1, 2, 4, 7, 11]
 values = [0.5, 1, 3]
 """
 
-#: Rows after the frequency: what a block of some of them gives lies in many places of the file.
+#: Rows after the frequency: what a chunk of some of them gives lies in many places of the file.
 CASES = "".join(
     f'[[cases]]\nlabel = "no. {i}"\ntheta = {2 * i}\nmu_s = {0.3 + 0.05 * i}\nstructure_frequency = 2\n'
     for i in range(7)
@@ -73,14 +73,14 @@ PLANS: dict[str, Callable[[], Job]] = {
 }
 
 
-def assert_part(plan: AnyPlan, block: dict[str, slice], found: Any, whole: Any) -> None:
-    """A table of a block is the block of the table, bit for bit."""
+def assert_part(plan: AnyPlan, chunk: dict[str, slice], found: Any, whole: Any) -> None:
+    """A table of a chunk is the chunk of the table, bit for bit."""
     assert list(found.data_vars) == list(whole.data_vars) == list(plan.names)
     for name, one in (whole.data_vars | whole.coords).items():
         part = found[name]
-        expected = one.values[tuple(places(block, one.sizes).values())]
+        expected = one.values[tuple(places(chunk, one.sizes).values())]
         assert (part.dims, part.values.dtype, part.values.shape) == (one.dims, one.values.dtype, expected.shape)
-        assert part.values.tobytes() == np.ascontiguousarray(expected).tobytes(), (name, block)
+        assert part.values.tobytes() == np.ascontiguousarray(expected).tobytes(), (name, chunk)
 
 
 @pytest.mark.parametrize("name", PLANS)
@@ -93,24 +93,24 @@ def test_parts_give_the_bits_of_the_whole(name: str) -> None:
     ]
     assert empty.attrs == whole.attrs
     for most in (1, 4, 6, 20):
-        for block in grid_blocks(plan.sizes, most, plan.together):
-            part = plan.part(block)
-            assert part.sizes == {dim: cut.stop - cut.start for dim, cut in block.items()}
+        for chunk in grid_chunks(plan.sizes, most, plan.together):
+            part = plan.part(chunk)
+            assert part.sizes == {dim: cut.stop - cut.start for dim, cut in chunk.items()}
             # as it is, and as a worker gets it
-            assert_part(plan, block, part.solve(), whole)
-        assert_part(plan, block, pickle.loads(pickle.dumps(part)).solve(), whole)
+            assert_part(plan, chunk, part.solve(), whole)
+        assert_part(plan, chunk, pickle.loads(pickle.dumps(part)).solve(), whole)
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_blocks_keep_together_what_is_solved_once(name: str) -> None:
+def test_chunks_keep_together_what_is_solved_once(name: str) -> None:
     plan = PLANS[name]().plan
     assert {*plan.together} <= {*plan.sizes}
-    lengths = block_lengths(plan.sizes, 12, plan.together)
+    lengths = chunk_lengths(plan.sizes, 12, plan.together)
     assert [lengths[dim] for dim in plan.together] == [plan.sizes[dim] for dim in plan.together]
-    # progress counts all that there is to solve, once, whatever the blocks
+    # progress counts all that there is to solve, once, whatever the chunks
     counted: list[int] = []
-    for block in grid_blocks(plan.sizes, 12, plan.together):
-        plan.part(block).solve(counted.append)
+    for chunk in grid_chunks(plan.sizes, 12, plan.together):
+        plan.part(chunk).solve(counted.append)
     assert sum(counted) == plan.cells
 
 
@@ -123,23 +123,23 @@ def stored(path: Path) -> dict[str, tuple[tuple[str, ...], bytes]]:
 
 @pytest.mark.parametrize("cells", [1, 6, 20])
 @pytest.mark.parametrize("name", PLANS)
-def test_blocks_and_folders_give_what_one_piece_gives(tmp_path: Path, name: str, cells: int) -> None:
+def test_chunks_and_folders_give_what_one_piece_gives(tmp_path: Path, name: str, cells: int) -> None:
     job = PLANS[name]()
     one = store.run(job, tmp_path / "one.nc", command="x")
-    blocks = store.run(job, tmp_path / "blocks.nc", command="x", block_cells=cells)
-    assert stored(tmp_path / "blocks.nc") == stored(tmp_path / "one.nc")
-    # what several blocks have, as they lack a dimension, is counted once
-    assert blocks.tally == one.tally
-    split = store.run(job, tmp_path / "split", command="x", block_cells=cells, split=True)
+    chunks = store.run(job, tmp_path / "chunks.nc", command="x", chunk_cells=cells)
+    assert stored(tmp_path / "chunks.nc") == stored(tmp_path / "one.nc")
+    # what several chunks have, as they lack a dimension, is counted once
+    assert chunks.tally == one.tally
+    split = store.run(job, tmp_path / "split", command="x", chunk_cells=cells, split=True)
     assert split.tally == one.tally
     whole = job.plan.solve()
-    for path in (tmp_path / "blocks.nc", tmp_path / "split"):
+    for path in (tmp_path / "chunks.nc", tmp_path / "split"):
         table = store.stored_table(job.plan, path, cells, job.plan.names)
         assert_part(job.plan, {}, table, whole)
 
 
 def stopped(job: Job, path: Path, after: int, **options: Any) -> None:
-    """Interrupt a run after some blocks."""
+    """Interrupt a run after some chunks."""
 
     def solved(*arguments: Any) -> Any:
         for number, found in enumerate(solving.solve_here(*arguments)):
@@ -156,8 +156,8 @@ def stopped(job: Job, path: Path, after: int, **options: Any) -> None:
 @pytest.mark.parametrize("name", PLANS)
 def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path: Path, name: str, split: bool) -> None:
     job = PLANS[name]()
-    store.run(job, tmp_path / "whole", command="x", block_cells=6, split=split)
-    stopped(job, tmp_path / "a", 2, block_cells=6, split=split)
+    store.run(job, tmp_path / "whole", command="x", chunk_cells=6, split=split)
+    stopped(job, tmp_path / "a", 2, chunk_cells=6, split=split)
     solved: list[int] = []
 
     def counted(*arguments: Any) -> Any:
@@ -173,7 +173,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path: Path, name: str, 
 
 def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
     sweep = spec.parse(AXES + CASES, "a.toml")
-    stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 2, block_cells=6)
+    stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 2, chunk_cells=6)
     for other, message in (
         (limit_job(sweep, 0.06), r"--displacement was 0\.05, is 0\.06"),
         (limit_job(sweep, 0.05, 20.0), r"--maximum-amplitude was none, is 20"),
@@ -187,14 +187,14 @@ def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
     store.run(limit_job(sweep.with_solver(Step()), 0.05), tmp_path / "a.nc", command="x", resume=True)
 
 
-def test_blocks_of_what_takes_long_are_small() -> None:
-    """No more than seconds of work are lost with a block, however much memory there is."""
+def test_chunks_of_what_takes_long_are_small() -> None:
+    """No more than seconds of work are lost with a chunk, however much memory there is."""
     text = "[axes.theta]\nstart = 0\nstop = 9\nnum = 1000\n[axes.mu_s]\nvalues = [0.4]\n" + AXES + DRAWN
     plan = sweep_job(spec.parse(text.replace("samples = 32", "samples = 65536"), "a.toml")).plan
     # 65536 samples serve three frequencies
     assert solving.default_cells(plan) == 4_000_000 * 3 // 65536
     assert solving.cells_within(10**11, plan) == 4_000_000 * 3 // 65536
-    # draws and a million samples are there whatever the blocks
+    # draws and a million samples are there whatever the chunks
     with pytest.raises(InputError, match=r"--memory = 400 MB: must be 4\d\d MB at least"):
         solving.cells_within(400 * 10**6, plan)
     limits = limit_job(spec.parse("[axes.theta]\nvalues = [1]\n[axes.mu_s]\nvalues = [0.4]\n" + AXES, "a"), 0.05).plan
@@ -226,11 +226,11 @@ COMMANDS = {
     "limits": (LARGE, ("limit", "a.toml", "-d", "1cm", "-d", "10cm"), 20_000),
 }
 
-#: A command with blocks of so many cells of the cycle solver.
+#: A command with chunks of so many cells of the cycle solver.
 SMALL = """
 import sys
-from slipsweep.grid import blocks
-blocks.BLOCK_CELLS = int(sys.argv[1])
+from slipsweep.grid import chunks
+chunks.CHUNK_CELLS = int(sys.argv[1])
 from slipsweep.cli import main
 sys.exit(main(sys.argv[2:]))
 """
@@ -273,7 +273,7 @@ def test_memory_and_split_serve_every_command(tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     text, arguments, cells = COMMANDS[name]
     Path("a.toml").write_text(text)
-    monkeypatch.setattr("slipsweep.grid.blocks.BLOCK_CELLS", cells * 5)
+    monkeypatch.setattr("slipsweep.grid.chunks.CHUNK_CELLS", cells * 5)
     assert main([*arguments, "-q", "-o", "a.nc", "--memory", "1GB"]) == 0
     assert main([*arguments, "-q", "-o", "b", "--split"]) == 0
     assert len(list(Path("b").iterdir())) > 5
@@ -284,7 +284,7 @@ def test_memory_and_split_serve_every_command(tmp_path: Path, monkeypatch: pytes
                 xr.testing.assert_identical(part.drop_attrs(), whole.sel(places).drop_attrs())
 
 
-def test_blocks_of_limits_need_an_output(
+def test_chunks_of_limits_need_an_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

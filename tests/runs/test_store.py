@@ -1,4 +1,4 @@
-"""Blocks, and netCDF files: what they hold, and that they are complete or not there."""
+"""Chunks, and netCDF files: what they hold, and that they are complete or not there."""
 
 import errno
 import itertools
@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 import slipsweep
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import netcdf, results, spec
-from slipsweep.grid import blocks, plans
+from slipsweep.grid import chunks, plans
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model import variables
 from slipsweep.runs import placed, solving, store
@@ -75,7 +75,7 @@ def assert_same_data(one: Path, other: Path) -> None:
         np.testing.assert_array_equal(values, second[name], err_msg=name)
 
 
-# ---------------------------------------------------------------------------------- blocks
+# ---------------------------------------------------------------------------------- chunks
 
 SHAPES = st.dictionaries(
     st.sampled_from([*variables.DIMENSION_ORDER, "case"]), st.integers(1, 12), min_size=1, max_size=5
@@ -84,23 +84,23 @@ SHAPES = st.dictionaries(
 
 @given(shape=SHAPES, most=st.integers(1, 400))
 @settings(max_examples=200, deadline=None)
-def test_blocks_cover_the_grid_once_and_keep_within_the_limit(shape: dict[str, int], most: int) -> None:
-    parts = list(blocks.grid_blocks(shape, most))
+def test_chunks_cover_the_grid_once_and_keep_within_the_limit(shape: dict[str, int], most: int) -> None:
+    parts = list(chunks.grid_chunks(shape, most))
     seen = np.zeros(tuple(shape.values()), int)
     for part in parts:
-        block = seen[tuple(part.values())]
-        block += 1
-        assert block.size <= most
+        chunk = seen[tuple(part.values())]
+        chunk += 1
+        assert chunk.size <= most
     assert np.all(seen == 1)
 
 
 @given(shape=SHAPES, most=st.integers(1, 400), data=st.data())
 @settings(max_examples=200, deadline=None)
-def test_a_block_is_one_run_of_any_result(shape: dict[str, int], most: int, data: st.DataObject) -> None:
+def test_a_chunk_is_one_run_of_any_result(shape: dict[str, int], most: int, data: st.DataObject) -> None:
     """Also of those that have not all the dimensions."""
     sizes = {dim: length for dim, length in shape.items() if data.draw(st.booleans())}
     numbers = np.arange(math.prod(sizes.values())).reshape(tuple(sizes.values()))
-    for part in blocks.grid_blocks(shape, most):
+    for part in chunks.grid_chunks(shape, most):
         (first,), count = placed.runs_of(part, sizes)
         wanted = numbers[tuple(part[dim] for dim in sizes)]
         assert wanted.ravel().tolist() == list(range(first, first + count))
@@ -108,46 +108,46 @@ def test_a_block_is_one_run_of_any_result(shape: dict[str, int], most: int, data
 
 @given(shape=SHAPES, most=st.integers(1, 400), data=st.data())
 @settings(max_examples=200, deadline=None)
-def test_runs_of_blocks_with_dimensions_kept_together(shape: dict[str, int], most: int, data: st.DataObject) -> None:
+def test_runs_of_chunks_with_dimensions_kept_together(shape: dict[str, int], most: int, data: st.DataObject) -> None:
     """Wherever these are among the others, and with dimensions of results that are none of the grid's."""
     together = [dim for dim in shape if data.draw(st.booleans())]
     sizes = {dim: length for dim, length in shape.items() if data.draw(st.booleans())} | {"quantile": 3}
     numbers = np.arange(math.prod(sizes.values())).reshape(tuple(sizes.values()))
     seen = np.zeros(tuple(shape.values()), int)
-    for part in blocks.grid_blocks(shape, most, together):
+    for part in chunks.grid_chunks(shape, most, together):
         firsts, count = placed.runs_of(part, sizes)
-        wanted = numbers[tuple(blocks.places(part, sizes).values())]
+        wanted = numbers[tuple(chunks.places(part, sizes).values())]
         assert wanted.ravel().tolist() == [first + at for first in firsts for at in range(count)]
         seen[tuple(part.values())] += 1
         assert seen[tuple(part.values())].size <= most
     assert (seen == 1).all()
-    lengths = blocks.block_lengths(shape, most, together)
+    lengths = chunks.chunk_lengths(shape, most, together)
     if any(lengths[dim] < shape[dim] for dim in together):
         assert all(lengths[dim] == 1 for dim in shape if dim not in together)
 
 
-def test_blocks_are_whole_along_the_last_dimensions() -> None:
+def test_chunks_are_whole_along_the_last_dimensions() -> None:
     shape = {"theta": 50, "mu_s": 20, "amplitude": 300, "frequency": 1000, "case": 7}
-    assert blocks.block_lengths(shape, 4_000_000) == {
+    assert chunks.chunk_lengths(shape, 4_000_000) == {
         "theta": 1,
         "mu_s": 1,
         "amplitude": 300,
         "frequency": 1000,
         "case": 7,
     }
-    assert blocks.block_lengths(shape, 400_000)["frequency"] == 1000
+    assert chunks.chunk_lengths(shape, 400_000)["frequency"] == 1000
 
 
 @pytest.mark.parametrize("most", [7, 96, 1000])
-def test_blocks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> None:
+def test_chunks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> None:
     names = ", ".join(f'"{name}"' for name in variables.RESULTS if name != "amplitude")
     plan = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml").plan()
-    cut = dict(enumerate(blocks.grid_blocks(plan.sizes, most)))
+    cut = dict(enumerate(chunks.grid_chunks(plan.sizes, most)))
     whole = plan.solve()
     places: list[set[int]] = []
     previous: tuple[int, Table] | None = None
     for found in solving.solve_here(plan, cut):
-        # a block is as it was solved until the next but one is asked for, whatever their sizes
+        # a chunk is as it was solved until the next but one is asked for, whatever their sizes
         for number, table in filter(None, (previous, found)):
             for name, result in table.data_vars.items():
                 expected = whole[name].values[tuple(cut[number][dim] for dim in result.dims)]
@@ -221,14 +221,14 @@ def test_results_are_written_to_their_places(tmp_path: Path, monkeypatch: pytest
         monkeypatch.delattr(os, "O_DIRECT")
     elif way == "not this file system":
         monkeypatch.setattr(os, "open", not_directly)
-    run(LARGE, tmp_path / "a.nc", block_cells=400_000)
+    run(LARGE, tmp_path / "a.nc", chunk_cells=400_000)
     expected = slipsweep.sweep(**spec.parse(LARGE, "a.toml").arguments())
     with netCDF4.Dataset(tmp_path / "a.nc") as file:
         file.set_auto_mask(False)
         for name, result in expected.data_vars.items():
             np.testing.assert_array_equal(file[str(name)][...], result.values, err_msg=str(name))
     if way == "as it is" and written:  # not on every file system
-        # both floating-point results, but for the sectors that two blocks share; codes are too short
+        # both floating-point results, but for the sectors that two chunks share; codes are too short
         assert sum(written) > 0.98 * 16 * expected.permanent_displacement.size
 
 
@@ -251,8 +251,8 @@ def test_a_disk_that_fills_while_it_is_written_directly(tmp_path: Path, monkeypa
 # ----------------------------------------------------------------------------- what is in it
 
 
-def test_blocks_give_what_one_call_gives(tmp_path: Path) -> None:
-    run(GRID, tmp_path / "a.nc", block_cells=300)
+def test_chunks_give_what_one_call_gives(tmp_path: Path) -> None:
+    run(GRID, tmp_path / "a.nc", chunk_cells=300)
     run(GRID, tmp_path / "b.nc")
     assert_same_data(tmp_path / "a.nc", tmp_path / "b.nc")
     expected = slipsweep.sweep(**spec.parse(GRID, "a.toml").arguments())
@@ -306,12 +306,12 @@ def test_float32_and_chosen_variables(tmp_path: Path) -> None:
 SINGLE = '[output]\ndtype = "float32"\n'
 
 
-@pytest.mark.parametrize("cells", [7, 10**9], ids=["in blocks", "at once"])
+@pytest.mark.parametrize("cells", [7, 10**9], ids=["in chunks", "at once"])
 def test_float32_is_float64_rounded(tmp_path: Path, cells: int) -> None:
     """Displacements from below the least subnormal to near the greatest float32; modes and flags the same."""
     text = GRID.replace("[0.5, 1, 2, 4]", "[1e-18, 1e-10, 1.0, 1e10, 1e19, 1e22, 1e25]")
     run(text, tmp_path / "double.nc")
-    run(text + SINGLE, tmp_path / "single.nc", block_cells=cells)
+    run(text + SINGLE, tmp_path / "single.nc", chunk_cells=cells)
     double, single = stored(tmp_path / "double.nc"), stored(tmp_path / "single.nc")
     for name in ("permanent_displacement", "peak_relative_velocity"):
         assert single[name].dtype == np.float32
@@ -329,12 +329,12 @@ def test_float32_does_not_overflow_in_silence(tmp_path: Path, split: bool) -> No
     with pytest.raises(
         InputError, match=r'output.dtype = "float32": permanent_displacement reaches .*must be "float64"'
     ):
-        run(text, path, block_cells=100, split=split)
+        run(text, path, chunk_cells=100, split=split)
     assert not path.exists()
 
 
 def test_cases_have_labels_and_no_string_type(tmp_path: Path) -> None:
-    run(CASES, tmp_path / "a.nc", block_cells=5)
+    run(CASES, tmp_path / "a.nc", chunk_cells=5)
     with netCDF4.Dataset(tmp_path / "a.nc") as file:
         assert all(variable.dtype is not str for variable in file.variables.values())
         assert file["permanent_displacement"].dimensions == ("amplitude", "frequency", "case")
@@ -348,14 +348,14 @@ def test_cases_have_labels_and_no_string_type(tmp_path: Path) -> None:
 
 def test_the_amplitudes_of_displacement_amplitudes_are_written_if_asked_for(tmp_path: Path) -> None:
     text = GRID.replace("axes.amplitude", "axes.displacement_amplitude").replace("stop = 9", "stop = 0.6")
-    run(text, tmp_path / "a.nc", block_cells=100)
+    run(text, tmp_path / "a.nc", chunk_cells=100)
     with xr.open_dataset(tmp_path / "a.nc") as dataset:
         assert "amplitude" not in dataset
         values = sum(variable.nbytes for variable in dataset.variables.values())
         assert (tmp_path / "a.nc").stat().st_size < values + 50_000
     for split in (False, True):
         path = tmp_path / f"with_{split}.nc"
-        run(text + '[output]\nvariables = ["validity", "amplitude"]\n', path, block_cells=100, split=split)
+        run(text + '[output]\nvariables = ["validity", "amplitude"]\n', path, chunk_cells=100, split=split)
         for part in path.glob("*.nc") if split else [path]:
             with xr.open_dataset(part) as dataset:
                 expected = (2 * np.pi * dataset["frequency"]) ** 2 * dataset["displacement_amplitude"]
@@ -384,7 +384,7 @@ def test_a_result_repeats_its_run(tmp_path: Path) -> None:
 
 
 def test_the_tally_counts_modes_and_flags(tmp_path: Path) -> None:
-    report = run(GRID, tmp_path / "a.nc", block_cells=100)
+    report = run(GRID, tmp_path / "a.nc", chunk_cells=100)
     values = stored(tmp_path / "a.nc")
     assert report.tally.cells == values["validity"].size == 5 * 3 * 40 * 4
     assert report.tally.modes == {mode: np.sum(values["sliding_mode"] == mode) for mode in variables.SlidingMode}
@@ -439,7 +439,7 @@ def test_netcdf_of_others_has_no_contents(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("existing", [False, True])
-def test_a_failed_run_leaves_nothing_but_finished_blocks(
+def test_a_failed_run_leaves_nothing_but_finished_chunks(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     raised: BaseException,
@@ -460,10 +460,10 @@ def test_a_failed_run_leaves_nothing_but_finished_blocks(
     monkeypatch.setattr(store._OneFile, "write", failing)
     for last, left in ((0, set()), (2, {"a.nc.parts"})):
         with pytest.raises(seen, match=message) as caught:
-            run(GRID, path, block_cells=300, overwrite=True)
+            run(GRID, path, chunk_cells=300, overwrite=True)
         assert {entry.name for entry in tmp_path.iterdir()} == ({"a.nc"} if existing else set()) | left
         notes = getattr(caught.value, "__notes__", [])
-        assert notes == (["2 of 15 blocks are kept; go on with --resume"] if last else [])
+        assert notes == (["2 of 15 chunks are kept; go on with --resume"] if last else [])
         if existing:
             assert path.read_text() == "an earlier result"
     monkeypatch.undo()
@@ -487,14 +487,14 @@ def test_memory_that_runs_out_is_told(tmp_path: Path, monkeypatch: pytest.Monkey
         raise MemoryError
 
     monkeypatch.setattr(plans.Plan, "solve", failing)
-    with pytest.raises(RunError, match="out of memory at a block of 2400 cells"):
+    with pytest.raises(RunError, match="out of memory at a chunk of 2400 cells"):
         run(GRID, tmp_path / "a.nc")
     assert not list(tmp_path.iterdir())
 
 
 def test_an_output_is_not_there_before_it_is_complete(tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
-    run(GRID, path, block_cells=300, progress=lambda cells: pytest.fail("too early") if path.exists() else None)
+    run(GRID, path, chunk_cells=300, progress=lambda cells: pytest.fail("too early") if path.exists() else None)
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
 
 
@@ -541,8 +541,8 @@ def test_a_grid_too_large_for_the_disk_is_refused(tmp_path: Path) -> None:
         run(text, tmp_path / "a.nc")
 
 
-def test_a_block_too_large_for_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chunk_too_large_for_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "available_memory", lambda: 50_000)
-    with pytest.raises(InputError, match=r"blocks of 2400 cells \(5 theta x .*\) need 110 kB of memory, but 50 kB"):
+    with pytest.raises(InputError, match=r"chunks of 2400 cells \(5 theta x .*\) need 110 kB of memory, but 50 kB"):
         run(GRID, tmp_path / "a.nc")
-    run(GRID, tmp_path / "a.nc", block_cells=1000)
+    run(GRID, tmp_path / "a.nc", chunk_cells=1000)

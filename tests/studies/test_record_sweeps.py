@@ -1,4 +1,4 @@
-"""Recorded motions in sweep files: what a run writes, that it repeats itself, blocks, and what is refused."""
+"""Recorded motions in sweep files: what a run writes, that it repeats itself, chunks, and what is refused."""
 
 import hashlib
 import importlib.util
@@ -16,7 +16,7 @@ import xarray as xr
 
 from slipsweep import InputError, Record, RunError, read_record, sweep
 from slipsweep.files import export, spec
-from slipsweep.grid import blocks
+from slipsweep.grid import chunks
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import RECORD_RESULTS
 from slipsweep.runs import solving, store
@@ -161,19 +161,19 @@ def test_rows_of_cases_may_hold_the_scales(folder: Path) -> None:
         assert (found[:, at] > 0).all()
 
 
-# -------------------------------------------------------------------------------------- blocks
+# -------------------------------------------------------------------------------------- chunks
 
 
-def test_blocks_and_folders_give_what_one_piece_gives(folder: Path) -> None:
+def test_chunks_and_folders_give_what_one_piece_gives(folder: Path) -> None:
     run(folder / "a.toml", folder / "a.nc")
-    run(folder / "a.toml", folder / "b.nc", block_cells=7)
+    run(folder / "a.toml", folder / "b.nc", chunk_cells=7)
     assert_same_data(folder / "a.nc", folder / "b.nc")
-    run(folder / "a.toml", folder / "split", block_cells=30, split=True)
+    run(folder / "a.toml", folder / "split", chunk_cells=30, split=True)
     whole = stored(folder / "a.nc")
     for path in sorted((folder / "split").iterdir()):
-        with xr.open_dataset(path) as block, xr.open_dataset(folder / "a.nc") as one:
-            places = {dim: block[dim] for dim in block.permanent_displacement.dims}
-            np.testing.assert_array_equal(block.permanent_displacement, one.permanent_displacement.sel(places))
+        with xr.open_dataset(path) as chunk, xr.open_dataset(folder / "a.nc") as one:
+            places = {dim: chunk[dim] for dim in chunk.permanent_displacement.dims}
+            np.testing.assert_array_equal(chunk.permanent_displacement, one.permanent_displacement.sel(places))
         np.testing.assert_array_equal(stored(path)["record_acceleration"], whole["record_acceleration"])
 
 
@@ -185,10 +185,10 @@ def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) ->
             yield number, table
 
     with pytest.raises(RunError, match="the power went"):
-        run(folder / "a.toml", folder / "a.nc", block_cells=7, solved=failing)
+        run(folder / "a.toml", folder / "a.nc", chunk_cells=7, solved=failing)
     motion = (folder / "motion.csv").read_text()
     (folder / "motion.csv").write_text(motion.replace("5.00,", "5.001,"))
-    with pytest.raises(InputError, match=r"cannot go on with the blocks in a\.nc\.parts: record was"):
+    with pytest.raises(InputError, match=r"cannot go on with the chunks in a\.nc\.parts: record was"):
         run(folder / "a.toml", folder / "a.nc", resume=True)
     (folder / "motion.csv").write_text(motion)
     run(folder / "a.toml", folder / "a.nc", resume=True)
@@ -196,10 +196,10 @@ def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) ->
     assert_same_data(folder / "a.nc", folder / "b.nc")
 
 
-def test_blocks_of_a_record_are_seconds_of_work(folder: Path) -> None:
+def test_chunks_of_a_record_are_seconds_of_work(folder: Path) -> None:
     checked = spec.load(folder / "a.toml")
     job = sweep_job(checked)
-    assert solving.default_cells(job.plan) < blocks.BLOCK_CELLS // 10
+    assert solving.default_cells(job.plan) < chunks.CHUNK_CELLS // 10
     assert "record" in job.asked
 
 

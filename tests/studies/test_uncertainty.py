@@ -257,7 +257,7 @@ def test_correlation_of_normal_scores() -> None:
         )
 
 
-# ----------------------------------------------------------- what has no value, and blocks
+# ----------------------------------------------------------- what has no value, and chunks
 
 
 def test_samples_without_a_value_are_counted_and_left_out() -> None:
@@ -282,7 +282,7 @@ def test_samples_without_a_value_are_counted_and_left_out() -> None:
     assert nobody.displacement_quantile.isnull().all()
 
 
-def test_blocks_of_grid_points_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_of_grid_points_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     uncertain = {"amplitude": FACTOR, "decay_rate": {**FACTOR, "s": 0.1}}
     whole = slipsweep.sample(**GRID, uncertain=uncertain, samples=128)
     monkeypatch.setattr("slipsweep.studies.uncertainty._CELLS", 300)

@@ -63,7 +63,7 @@ s = 0.1
 
 @dataclass(frozen=True)
 class Asked:
-    """A command, the sweep file that it reads, and the work of its blocks, in cells of the cycle solver."""
+    """A command, the sweep file that it reads, and the work of its chunks, in cells of the cycle solver."""
 
     text: str = SWEEP
     command: tuple[str, ...] = ("run", "a.toml", "-q")
@@ -74,7 +74,7 @@ SWEEPING = Asked()
 SAMPLES = Asked(DRAWN, work=2000)
 LIMITS = Asked(command=("limit", "a.toml", "-q", "-d", "1cm", "-d", "10cm", "-o", "a.nc"), work=40_000)
 
-#: Cells of a block: 600 blocks for runs that are killed, 60 for those whose blocks are damaged.
+#: Cells of a chunk: 600 chunks for runs that are killed, 60 for those whose chunks are damaged.
 SMALL, CELLS = 400, 4000
 
 #: Longest that a run may take to begin, to answer or to end.
@@ -88,9 +88,9 @@ Fault: TypeAlias = Callable[[Path, random.Random, Values], int]
 
 _COMMAND = """
 import sys
-from slipsweep.grid import blocks
+from slipsweep.grid import chunks
 from slipsweep.runs import solving
-blocks.BLOCK_CELLS = int(sys.argv[1])
+chunks.CHUNK_CELLS = int(sys.argv[1])
 solving.cells_shared = lambda plan, workers: solving.default_cells(plan)
 from slipsweep.cli import main
 sys.exit(main(sys.argv[2:]))
@@ -103,7 +103,7 @@ class Stop(BaseException):
 
 def run(path: Path, text: str = SWEEP, **options: Any) -> store.Report:
     """`store.run` in this process."""
-    return store.run(sweep_job(spec.parse(text, "a.toml")), path, command="x", **{"block_cells": CELLS, **options})
+    return store.run(sweep_job(spec.parse(text, "a.toml")), path, command="x", **{"chunk_cells": CELLS, **options})
 
 
 def values(path: Path) -> Values:
@@ -119,7 +119,7 @@ def values(path: Path) -> Values:
 
 
 def stopped(path: Path, after: int = 30, **options: Any) -> Path:
-    """Stop a run in this process after some blocks; return its work folder."""
+    """Stop a run in this process after some chunks; return its work folder."""
 
     def solved(*arguments: Any) -> Iterator[Any]:
         for count, item in enumerate(solving.solve_here(*arguments)):
@@ -134,12 +134,12 @@ def stopped(path: Path, after: int = 30, **options: Any) -> Path:
     else:
         raise AssertionError("not stopped")
     number = 3 if "text" in options else 60
-    assert notes == [f"{after} of {number} blocks are kept; go on with --resume"]
+    assert notes == [f"{after} of {number} chunks are kept; go on with --resume"]
     return path.with_name(f"{path.name}.parts")
 
 
 def start(folder: Path, *options: str, asked: Asked = SWEEPING, **more: Any) -> "subprocess.Popen[str]":
-    """Start a command in small blocks as a process."""
+    """Start a command in small chunks as a process."""
     (folder / "a.toml").write_text(asked.text)
     command = [sys.executable, "-c", _COMMAND, str(asked.work or SMALL), *asked.command, *options]
     return subprocess.Popen(
@@ -163,10 +163,10 @@ def wait_for(process: "subprocess.Popen[str]", happened: Callable[[], bool]) -> 
         time.sleep(0.002)
 
 
-def wait_for_block(process: "subprocess.Popen[str]", folder: Path, blocks: int = 1) -> None:
-    """Wait until a run that is not resumed has some blocks on record."""
+def wait_for_chunk(process: "subprocess.Popen[str]", folder: Path, chunks: int = 1) -> None:
+    """Wait until a run that is not resumed has some chunks on record."""
     journal = folder / "a.nc.parts" / "journal"
-    wait_for(process, lambda: journal.exists() and journal.read_text().count("\n") >= blocks)
+    wait_for(process, lambda: journal.exists() and journal.read_text().count("\n") >= chunks)
 
 
 @contextmanager
@@ -267,7 +267,7 @@ def children(pid: int) -> list[int]:
 def worker_killed(folder: Path, rng: random.Random, expected: Values) -> int:
     """Kill −9 of a worker of --workers 2: the run goes on."""
     process = start(folder, "--workers", "2")
-    wait_for_block(process, folder, rng.randrange(1, 100))
+    wait_for_chunk(process, folder, rng.randrange(1, 100))
     workers = children(process.pid)
     if process.poll() is None and workers:
         os.kill(rng.choice(workers), signal.SIGKILL)
@@ -280,7 +280,7 @@ def worker_killed(folder: Path, rng: random.Random, expected: Values) -> int:
 def killed_with_workers(folder: Path, rng: random.Random, expected: Values) -> int:
     """Kill −9 of a run with --workers 2: no worker is left, and the run can be gone on with."""
     process = start(folder, "--workers", "2")
-    wait_for_block(process, folder, rng.randrange(1, 300))
+    wait_for_chunk(process, folder, rng.randrange(1, 300))
     workers = children(process.pid)
     process.kill()
     process.communicate(timeout=PATIENCE)
@@ -319,7 +319,7 @@ def full_file_system(folder: Path, rng: random.Random, expected: Values) -> int:
     """A file system that is full in the middle of a run, still full on --resume, and then no longer."""
     with small_file_system(folder) as place:
         process = start(place)
-        wait_for_block(process, place, rng.randrange(1, 200))
+        wait_for_chunk(process, place, rng.randrange(1, 200))
         with held(process):
             with (place / "ballast").open("wb", buffering=0) as ballast:
                 try:
@@ -329,7 +329,7 @@ def full_file_system(folder: Path, rng: random.Random, expected: Values) -> int:
                     pass
             kept = (place / "a.nc.parts" / "journal").read_text().count("\n")
         status, errors = ended(process)
-        assert (status, "blocks are kept; go on with --resume" in errors) == (1, True), errors
+        assert (status, "chunks are kept; go on with --resume" in errors) == (1, True), errors
         assert "is the disk full?" in errors
         status, errors = ended(start(place, "--resume"))
         assert status in (1, 2), errors
@@ -350,12 +350,12 @@ def limited_file_size(folder: Path, rng: random.Random, expected: Values) -> int
     status, errors = ended(start(folder, preexec_fn=limit))
     assert (status, "writing failed" in errors) == (1, True), errors
     process = start(folder)
-    wait_for_block(process, folder, rng.randrange(1, 200))
+    wait_for_chunk(process, folder, rng.randrange(1, 200))
     process.kill()
     ended(process)
     kept = (folder / "a.nc.parts" / "journal").read_text().count("\n")
     status, errors = ended(start(folder, "--resume", preexec_fn=limit))
-    assert (status, "blocks are kept; go on with --resume" in errors) == (1, True), errors
+    assert (status, "chunks are kept; go on with --resume" in errors) == (1, True), errors
     assert (folder / "a.nc.parts" / "journal").read_text().count("\n") >= kept
     go_on(folder, expected)
     return 2
@@ -366,7 +366,7 @@ def limited_file_size(folder: Path, rng: random.Random, expected: Values) -> int
 _REVOKING = """
 import contextlib, io, json, os, sys, tempfile
 from pathlib import Path
-from slipsweep.grid import blocks
+from slipsweep.grid import chunks
 from slipsweep.cli import main
 text = Path("a.toml").read_text()
 with tempfile.TemporaryDirectory() as folder:
@@ -375,7 +375,7 @@ with tempfile.TemporaryDirectory() as folder:
 if os.getuid() == 0:
     os.setgid(65534)
     os.setuid(65534)
-blocks.BLOCK_CELLS = int(sys.argv[1])
+chunks.CHUNK_CELLS = int(sys.argv[1])
 for name, mode in json.loads(sys.argv[2]):
     path = Path(name)
     before = path.stat().st_mode
@@ -460,7 +460,7 @@ def damaged(folder: Path, rng: random.Random, expected: Values) -> int:
 
 
 def joined(path: Path) -> Values:
-    """The results in a folder of blocks, put together."""
+    """The results in a folder of chunks, put together."""
     import xarray as xr
 
     with xr.open_mfdataset(str(path / "*.nc"), combine="by_coords", mask_and_scale=False) as dataset:
@@ -471,9 +471,9 @@ def joined(path: Path) -> Values:
 
 
 def competitor(folder: Path, rng: random.Random, expected: Values) -> int:
-    """A second run at one output, while the first is at some block."""
+    """A second run at one output, while the first is at some chunk."""
     process = start(folder)
-    wait_for_block(process, folder, rng.randrange(1, 300))
+    wait_for_chunk(process, folder, rng.randrange(1, 300))
     with held(process):
         status, errors = ended(start(folder, *rng.choice([(), ("--resume",), ("--overwrite",)])))
         assert (status, "another run is writing it" in errors) == (1, True), errors
@@ -485,7 +485,7 @@ def competitor(folder: Path, rng: random.Random, expected: Values) -> int:
 def rival(folder: Path, rng: random.Random, expected: Values) -> int:
     """Another program that makes the output in the meantime."""
     process = start(folder)
-    wait_for_block(process, folder, rng.randrange(1, 300))
+    wait_for_chunk(process, folder, rng.randrange(1, 300))
     with held(process):
         (folder / "a.nc").write_text("rival")
     status, errors = ended(process)

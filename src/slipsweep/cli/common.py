@@ -23,9 +23,9 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
 
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on with an interrupted run, from the blocks that it finished.")
+    bool, typer.Option("--resume", help="Go on with an interrupted run, from the chunks that it finished.")
 ]
-Split = Annotated[bool, typer.Option("--split", help="Write a folder with a netCDF file for each block, not one file.")]
+Split = Annotated[bool, typer.Option("--split", help="Write a folder with a netCDF file for each chunk, not one file.")]
 Memory = Annotated[
     str | None, typer.Option(metavar="SIZE", help="Most memory to take, like 512MiB or 2GB (default: 500 to 600 MB).")
 ]
@@ -119,8 +119,8 @@ def typed_command() -> str:
 
 
 @dataclass(frozen=True)
-class Blocks:
-    """How a run is carried out in blocks: the options of that name."""
+class Chunks:
+    """How a run is carried out in chunks: the options of that name."""
 
     overwrite: bool
     resume: bool
@@ -134,7 +134,7 @@ class Blocks:
             raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
 
     def given(self) -> list[str]:
-        """Options that only make sense with an output in blocks."""
+        """Options that only make sense with an output in chunks."""
         others = {**asdict(self), "overwrite": None}
         return [f"--{name}" for name, value in others.items() if value not in (None, False)]
 
@@ -160,7 +160,7 @@ class Blocks:
                 overwrite=self.overwrite,
                 resume=self.resume,
                 split=self.split,
-                block_cells=None if memory is None else solving.cells_within(memory, job.plan, self.workers or 0),
+                chunk_cells=None if memory is None else solving.cells_within(memory, job.plan, self.workers or 0),
                 shared_cells=shared,
                 progress=stack.enter_context(progress_bar(job.plan.cells, quiet, unit)),
                 solved=solved,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slipsweep.cli.common import (
-    Blocks,
+    Chunks,
     Memory,
     Overwrite,
     Quiet,
@@ -57,7 +57,7 @@ def limit(
 
     Solved anew, to the last digit, not interpolated from the result.
     """
-    blocks = Blocks(overwrite, resume, split, memory, workers, scheduler)
+    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler)
     results: list[Path] = []
     figures: list[Path] = []
     for path in output or []:
@@ -67,8 +67,8 @@ def limit(
             results.append(path)
         else:
             raise InputError(f"{path}: the name must end in one of {', '.join(('.nc', *_FIGURES))}")
-    for option in blocks.given() if not results else []:
-        raise InputError(f"{option}: needs -o OUT.nc, whose blocks are solved and written one after the other")
+    for option in chunks.given() if not results else []:
+        raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
 
     from slipsweep.files import outputs, spec
     from slipsweep.runs.jobs import limit_job
@@ -82,10 +82,10 @@ def limit(
     if results:
         from slipsweep.runs.store import stored_table
 
-        report = blocks.run(job, results[0], quiet)
+        report = chunks.run(job, results[0], quiet)
         # all of it for a figure only
         names = job.plan.names if figures else () if quiet else ("limit_amplitude", "limit_status")
-        table = stored_table(job.plan, report.path, report.block_cells, names)
+        table = stored_table(job.plan, report.path, report.chunk_cells, names)
     else:
         with job.named(), progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from slipsweep.cli.common import (
-    Blocks,
+    Chunks,
     Memory,
     Overwrite,
     Quiet,
@@ -60,7 +60,7 @@ def run(
     from slipsweep.files import spec
     from slipsweep.grid.resources import grid_text, size_text
 
-    blocks = Blocks(overwrite, resume, split, memory, workers, scheduler)
+    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler)
     checked = spec.load(sweep)
     if solver is not None and checked.record is not None:
         raise InputError(f"--solver {solver}: not allowed with excitation.record, to which the response is exact")
@@ -77,7 +77,7 @@ def run(
     job = sweep_job(checked)
     watch = Watch()
     unit = "cells" if checked.sampling is None else "samples"
-    report = blocks.run(job, path, quiet, unit)
+    report = chunks.run(job, path, quiet, unit)
     if quiet:
         return
     grid = grid_text(job.plan.sizes) or "no axes"

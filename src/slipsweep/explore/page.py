@@ -25,7 +25,7 @@ from slipsweep.charts.style import BLUE, VERMILION, axis_label, caption, unit, v
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
 from slipsweep.files.results import FileVariable, open_result
-from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
+from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS
@@ -162,37 +162,37 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             if np.isnan(coord.values).any():
                 raise InputError(f"{path}: {name}: values are missing")
         results = {name: np.empty([*left.values()], kind) for name, kind in _SHOWN.items() if name in file.results}
-        for block in grid_blocks(lengths, BLOCK_CELLS):
+        for chunk in grid_chunks(lengths, CHUNK_CELLS):
             inside = {
-                dim: np.flatnonzero((keep[dim] >= part.start) & (keep[dim] < part.stop)) for dim, part in block.items()
+                dim: np.flatnonzero((keep[dim] >= part.start) & (keep[dim] < part.stop)) for dim, part in chunk.items()
             }
             if not all(map(len, inside.values())):
                 continue
-            source = np.ix_(*(keep[dim][at] - block[dim].start for dim, at in inside.items()))
+            source = np.ix_(*(keep[dim][at] - chunk[dim].start for dim, at in inside.items()))
             for name, values in results.items():
-                values[np.ix_(*inside.values())] = _read_block(file[name], block)[source]
+                values[np.ix_(*inside.values())] = _read_chunk(file[name], chunk)[source]
         labels = [file.labels[at] for at in keep["case"]] if file.labels and "case" in keep else []
         attrs = file.attrs
     table = Table(coords, {name: Variable(tuple(left), values) for name, values in results.items()}, attrs)
     return Excerpt(table, map_dims, lengths, labels)
 
 
-def _read_block(variable: FileVariable, block: Mapping[str, slice]) -> NDArray[Any]:
-    """Read the part of a block along the block's dimensions, in their order."""
-    beyond = [dim for dim in variable.dims if dim not in block]
+def _read_chunk(variable: FileVariable, chunk: Mapping[str, slice]) -> NDArray[Any]:
+    """Read the part of a chunk along the chunk's dimensions, in their order."""
+    beyond = [dim for dim in variable.dims if dim not in chunk]
     if beyond:
         raise InputError(
             f"{variable.path}: {variable.name}: lies along {beyond[0]}, along which permanent_displacement does not"
         )
     if variable.name in CODES:
-        values = variable.read_codes(block, CODES[variable.name])
+        values = variable.read_codes(chunk, CODES[variable.name])
     else:
-        values = variable.read_floats(block)
+        values = variable.read_floats(chunk)
         check_drawable(variable.path, variable.name, values, float(np.finfo(np.float32).max))
-    values = values.transpose([variable.dims.index(dim) for dim in block if dim in variable.dims])
+    values = values.transpose([variable.dims.index(dim) for dim in chunk if dim in variable.dims])
     sizes = variable.sizes
-    values = values.reshape([part.stop - part.start if dim in sizes else 1 for dim, part in block.items()])
-    return np.broadcast_to(values, [part.stop - part.start for part in block.values()])
+    values = values.reshape([part.stop - part.start if dim in sizes else 1 for dim, part in chunk.items()])
+    return np.broadcast_to(values, [part.stop - part.start for part in chunk.values()])
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 """Results as long tables, CSV or Parquet: a row a cell, its coordinates in columns, units in the header.
 
-A file is read and written in blocks of `BLOCK_CELLS`, so that memory stays small whatever its size.
+A file is read and written in chunks of `CHUNK_CELLS`, so that memory stays small whatever its size.
 """
 
 import csv
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs
 from slipsweep.files.results import FileVariable, ResultFile, open_result
-from slipsweep.grid.blocks import grid_blocks
+from slipsweep.grid.chunks import grid_chunks
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import LIMIT_RESULTS, RESULTS
 
 #: Rows made at a time; text of ten columns takes a hundred times as many bytes.
-BLOCK_CELLS = 2**18
+CHUNK_CELLS = 2**18
 
 SUFFIXES = (".csv", ".parquet")
 
@@ -45,12 +45,12 @@ class Column:
         self.words = words and "flag_meanings" in self.attributes
         self.is_text = variable.is_text or self.words
 
-    def read(self, block: dict[str, slice]) -> np.ma.MaskedArray:
-        """Read the part of a block: an array along `dims`, masked where there is no value; texts are objects."""
-        values = self.variable.read(block)
+    def read(self, chunk: dict[str, slice]) -> np.ma.MaskedArray:
+        """Read the part of a chunk: an array along `dims`, masked where there is no value; texts are objects."""
+        values = self.variable.read(chunk)
         if not self.words:
             return values
-        return np.ma.MaskedArray(self.in_words(self.variable.read_codes(block)), np.ma.getmaskarray(values))
+        return np.ma.MaskedArray(self.in_words(self.variable.read_codes(chunk)), np.ma.getmaskarray(values))
 
     def in_words(self, codes: NDArray[Any]) -> NDArray[Any]:
         """Replace codes by words; the few that occur are spelled out once each."""
@@ -81,13 +81,13 @@ def export(
     variables: Sequence[str] | None = None,
     words: bool = False,
     overwrite: bool = False,
-    block_cells: int = BLOCK_CELLS,
+    chunk_cells: int = CHUNK_CELLS,
     progress: Callable[[int], None] | None = None,
 ) -> int:
     """Write a result of slipsweep as a long table, complete or not at all.
 
     Rows are in the order of the file's dimensions, the last one running fastest; where a file has
-    further dimensions than theta, mu_s, amplitude and frequency, in that order within blocks.
+    further dimensions than theta, mu_s, amplitude and frequency, in that order within chunks.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def export(
         Sliding modes and flags as words instead of codes.
     overwrite : bool
         Replace `path` if it exists.
-    block_cells : int
+    chunk_cells : int
         Rows made at a time, hence in memory.
     progress : callable, optional
         Called with the number of rows just written.
@@ -132,10 +132,10 @@ def export(
         with outputs.complete_or_absent(path, overwrite) as temporary:
             try:
                 with make(temporary, columns, attributes) as write:
-                    for block in grid_blocks(shape, block_cells):
-                        write(_table(columns, shape, block))
+                    for chunk in grid_chunks(shape, chunk_cells):
+                        write(_table(columns, shape, chunk))
                         if progress is not None:
-                            progress(math.prod(part.stop - part.start for part in block.values()))
+                            progress(math.prod(part.stop - part.start for part in chunk.values()))
             except OSError as error:
                 raise RunError(f"{path}: writing failed: {error.strerror or error}") from error
     return math.prod(shape.values())
@@ -166,19 +166,19 @@ def _columns(file: ResultFile, wanted: Sequence[str] | None, words: bool) -> tup
 Cells = list[tuple[Column, np.ma.MaskedArray]]
 
 
-def _table(columns: list[Column], shape: dict[str, int], block: dict[str, slice]) -> Cells:
-    """Read a block of every column, each of them as broadcastable to the block."""
+def _table(columns: list[Column], shape: dict[str, int], chunk: dict[str, slice]) -> Cells:
+    """Read a chunk of every column, each of them as broadcastable to the chunk."""
     table = []
     for column in columns:
-        values = column.read(block)
+        values = column.read(chunk)
         # another program may have put the dimensions of a variable into another order
         values = values.transpose([column.dims.index(dim) for dim in shape if dim in column.dims])
-        lengths = [block[dim].stop - block[dim].start if dim in column.dims else 1 for dim in shape]
+        lengths = [chunk[dim].stop - chunk[dim].start if dim in column.dims else 1 for dim in shape]
         table.append((column, values.reshape(lengths)))
     return table
 
 
-def _block_shape(table: Cells) -> tuple[int, ...]:
+def _chunk_shape(table: Cells) -> tuple[int, ...]:
     return np.broadcast_shapes(*(values.shape for _, values in table))
 
 
@@ -189,13 +189,13 @@ Writer = Callable[[Cells], None]
 
 @contextmanager
 def _csv(path: Path, columns: list[Column], attributes: dict[str, str]) -> Iterator[Writer]:
-    """Open a CSV file; what is yielded writes a block to it."""
+    """Open a CSV file; what is yielded writes a chunk to it."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(column.header for column in columns)
 
         def write(table: Cells) -> None:
-            shape = _block_shape(table)
+            shape = _chunk_shape(table)
             # a coordinate is put into text once a value, and then repeated
             texts = (np.broadcast_to(_text(values), shape).ravel().tolist() for _, values in table)
             writer.writerows(zip(*texts, strict=True))
@@ -224,7 +224,7 @@ def _check_pyarrow(path: Path) -> None:
 
 @contextmanager
 def _parquet(path: Path, columns: list[Column], attributes: dict[str, str]) -> Iterator[Writer]:
-    """Open a Parquet file; what is yielded writes a block to it, as a row group."""
+    """Open a Parquet file; what is yielded writes a chunk to it, as a row group."""
     import pyarrow
     from pyarrow import parquet
 
@@ -246,7 +246,7 @@ def _parquet(path: Path, columns: list[Column], attributes: dict[str, str]) -> I
     with parquet.ParquetWriter(path, schema) as writer:
 
         def write(table: Cells) -> None:
-            shape = _block_shape(table)
+            shape = _chunk_shape(table)
             arrays = []
             for (column, values), field in zip(table, schema, strict=True):
                 flat, missing = (

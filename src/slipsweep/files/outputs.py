@@ -22,8 +22,8 @@ from slipsweep.grid.resources import size_text
 #: Names of files that are being written begin so.
 _PREFIX = ".slipsweep-"
 
-#: Name of a block's file in a folder that `slipsweep.runs.store.run` made.
-_BLOCK_FILE = re.compile(r"block-\d{6,}\.nc")
+#: Name of a chunk's file in a folder that `slipsweep.runs.store.run` made.
+_CHUNK_FILE = re.compile(r"chunk-\d{6,}\.nc")
 
 
 #: What a command reads: a file, or the number of an open one (0: standard input).
@@ -52,7 +52,7 @@ def check_outputs(
         All that the command reads.  Files are compared, not their names: links, relative paths and
         names in other letters are the same file.
     folder : bool
-        The outputs are folders of blocks, not files.
+        The outputs are folders of chunks, not files.
     work : Path, optional
         A folder that is emptied for the outputs.
 
@@ -64,8 +64,8 @@ def check_outputs(
     for path in paths:
         try:
             check_name(path)
-            blocks = [path] if folder and _is_folder_of_blocks(path) else []
-            for file in (path, *_below(*blocks, *([work, work / "data"] if work else []))):
+            chunks = [path] if folder and _is_folder_of_chunks(path) else []
+            for file in (path, *_below(*chunks, *([work, work / "data"] if work else []))):
                 if (found := _identity(file)) in inputs:
                     name = inputs[found] or "standard input"
                     raise InputError(
@@ -82,7 +82,7 @@ def check_outputs(
 
 
 def _check_output(path: Path, overwrite: bool, folder: bool) -> None:
-    """Refuse an output (a file, or a `folder` of blocks) that cannot be written, or exists and may not be replaced."""
+    """Refuse an output (a file, or a `folder` of chunks) that cannot be written, or exists and may not be replaced."""
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist")
     if not os.access(path.parent, os.W_OK):
@@ -94,18 +94,18 @@ def _check_output(path: Path, overwrite: bool, folder: bool) -> None:
     link = stat.S_ISLNK(found.st_mode)
     if link and not path.exists():
         kind = f"is a symbolic link to {os.readlink(path)}, which does not exist"
-    elif not (_is_folder_of_blocks(path) if folder else path.is_file()):
-        raise InputError(f"{path}: exists and is not a {'folder of blocks' if folder else 'file'}")
+    elif not (_is_folder_of_chunks(path) if folder else path.is_file()):
+        raise InputError(f"{path}: exists and is not a {'folder of chunks' if folder else 'file'}")
     else:
         kind = "exists already"
     if not overwrite:
         raise InputError(f"{path}: {kind}; give --overwrite to replace it, or another name with -o")
 
 
-def _is_folder_of_blocks(path: Path) -> bool:
-    """Whether a folder, no link to one and neither "." nor "..", holds files of blocks and nothing else."""
+def _is_folder_of_chunks(path: Path) -> bool:
+    """Whether a folder, no link to one and neither "." nor "..", holds files of chunks and nothing else."""
     named = path.name not in ("", "..") and not path.is_symlink()
-    return named and path.is_dir() and all(map(_BLOCK_FILE.fullmatch, os.listdir(path)))
+    return named and path.is_dir() and all(map(_CHUNK_FILE.fullmatch, os.listdir(path)))
 
 
 def _identity(file: Read) -> tuple[int, int] | None:

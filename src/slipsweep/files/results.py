@@ -22,7 +22,7 @@ from slipsweep.errors import InputError
 from slipsweep.files import guard
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import RECORD_DIM
-from slipsweep.grid.blocks import BLOCK_CELLS, grid_blocks
+from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tally import Tally
 from slipsweep.model.variables import (
@@ -94,11 +94,11 @@ def read_through(path: Path, next_step: Callable[[], None]) -> None:
     with ResultFile(path) as file:
         for variable in file.variables.values():
             left = _TRIED_CELLS if variable.is_text or not variable.in_one_piece else 0
-            for block in grid_blocks(variable.sizes, _STEP_CELLS):
+            for chunk in grid_chunks(variable.sizes, _STEP_CELLS):
                 if left <= 0:
                     break
                 next_step()
-                left -= variable.read(block).size
+                left -= variable.read(chunk).size
 
 
 @contextmanager
@@ -539,19 +539,19 @@ def _count(file: ResultFile) -> Tally:
     for name, missing in codes.items():
         variable = file[name]
         tally.cells = variable.size
-        for block in grid_blocks(variable.sizes, BLOCK_CELLS):
-            tally.add({name: variable.read_codes(block, missing)})
+        for chunk in grid_chunks(variable.sizes, CHUNK_CELLS):
+            tally.add({name: variable.read_codes(chunk, missing)})
     return tally
 
 
 def _values_text(variable: FileVariable) -> str:
-    """The values of a coordinate in words, read in blocks: it may lie over the whole grid."""
+    """The values of a coordinate in words, read in chunks: it may lie over the whole grid."""
     if variable.is_text:
         return ", ".join(map(str, variable.read({}).data.ravel()))
     units = _units_text(variable, " ")
     low, high, count = math.inf, -math.inf, 0
-    for block in grid_blocks(variable.sizes, BLOCK_CELLS):
-        there = variable.read(block).compressed()
+    for chunk in grid_chunks(variable.sizes, CHUNK_CELLS):
+        there = variable.read(chunk).compressed()
         if there.size:
             low, high, count = min(low, there.min()), max(high, there.max()), count + there.size
     missing = f", {variable.size - count} missing" if count < variable.size else ""

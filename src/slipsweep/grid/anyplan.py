@@ -1,17 +1,17 @@
-"""What all plans have in common: enough to carry them out in blocks, without what solves them."""
+"""What all plans have in common: enough to carry them out in chunks, without what solves them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 
-from slipsweep.grid.blocks import Block
+from slipsweep.grid.chunks import Chunk
 from slipsweep.grid.tables import Empty, Table
 from slipsweep.grid.tally import Tally
 
 
 class AnyPlan(Protocol):
-    """What every study is, and all that it takes to carry it out in blocks: a grid, and results over it."""
+    """What every study is, and all that it takes to carry it out in chunks: a grid, and results over it."""
 
     @property
     def sizes(self) -> Mapping[str, int]:
@@ -47,8 +47,8 @@ class AnyPlan(Protocol):
     def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
         """Compute everything at once; `progress` and `empty` as in `engine.solve`."""
 
-    def part(self, block: Block) -> "AnyPlan":
+    def part(self, chunk: Chunk) -> "AnyPlan":
         """The plan of a part of the grid, which gives the same bits as the whole does there."""
 
     def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
-        """Modes and flags in a block of results."""
+        """Modes and flags in a chunk of results."""

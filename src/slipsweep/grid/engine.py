@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import RunError
 from slipsweep.grid import threads
-from slipsweep.grid.blocks import slabs
+from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import check_served, is_ordinary
 from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics

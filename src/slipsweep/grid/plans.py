@@ -15,7 +15,7 @@ import numpy as np
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
-from slipsweep.grid.blocks import Block, places
+from slipsweep.grid.chunks import Chunk, places
 from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
@@ -139,16 +139,16 @@ class Plan:
         """Number of cells of the grid."""
         return math.prod(self.sizes.values())
 
-    def part(self, block: Block) -> "Plan":
-        """The plan cut to a block of its grid."""
-        tasks = tuple(task.part(tuple(places(block, task.sizes).values())) for task in self.tasks)
-        sizes = {dim: cut.stop - cut.start for dim, cut in places(block, self.sizes).items()}
+    def part(self, chunk: Chunk) -> "Plan":
+        """The plan cut to a chunk of its grid."""
+        tasks = tuple(task.part(tuple(places(chunk, task.sizes).values())) for task in self.tasks)
+        sizes = {dim: cut.stop - cut.start for dim, cut in places(chunk, self.sizes).items()}
         return replace(
-            self, sizes=sizes, coords={name: one.cut(block) for name, one in self.coords.items()}, tasks=tasks
+            self, sizes=sizes, coords={name: one.cut(chunk) for name, one in self.coords.items()}, tasks=tasks
         )
 
     def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
-        """Modes and flags in a block of results."""
+        """Modes and flags in a chunk of results."""
         tally = Tally()
         tally.add(results)
         return tally

@@ -28,9 +28,9 @@ class Variable:
         """Dimensions and their lengths."""
         return dict(zip(self.dims, self.values.shape, strict=True))
 
-    def cut(self, block: Mapping[str, slice]) -> "Variable":
-        """Its part in a block of the grid; dimensions not named are taken whole."""
-        return Variable(self.dims, self.values[tuple(block.get(dim, slice(None)) for dim in self.dims)], self.attrs)
+    def cut(self, chunk: Mapping[str, slice]) -> "Variable":
+        """Its part in a chunk of the grid; dimensions not named are taken whole."""
+        return Variable(self.dims, self.values[tuple(chunk.get(dim, slice(None)) for dim in self.dims)], self.attrs)
 
     def item(self) -> Any:
         """The one value of an array of size 1."""

@@ -19,7 +19,7 @@ class Tally:
     flags: dict[Validity, int] | None = None
 
     def add(self, results: Mapping[str, NDArray[Any]]) -> None:
-        """Count one block; `results` holds its arrays by variable name."""
+        """Count one chunk; `results` holds its arrays by variable name."""
         if "sliding_mode" in results:
             self.modes = self.modes or dict.fromkeys(SlidingMode, 0)
             for mode in SlidingMode:

@@ -1,9 +1,9 @@
-"""Blocks of a sweep solved by the workers of a dask.distributed cluster.
+"""Chunks of a sweep solved by the workers of a dask.distributed cluster.
 
-The client (this process) sends the plan of a block, a few kilobytes, and gets its results
+The client (this process) sends the plan of a chunk, a few kilobytes, and gets its results
 back as plain arrays; it alone writes the file, so that workers need no shared folder.  A task
 runs on a thread of its worker, hence on one core (`slipsweep.grid.threads`): a worker with n threads
-solves n blocks at a time.  What a dead worker had is solved again by another.
+solves n chunks at a time.  What a dead worker had is solved again by another.
 """
 
 import importlib.util
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.blocks import Block
+from slipsweep.grid.chunks import Chunk
 from slipsweep.grid.tables import Table
 from slipsweep.runs.parts import installation
 from slipsweep.runs.solving import Progress, Solved
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 #: Most processes that `--workers` starts on one machine.
 MOST_WORKERS = 1024
 
-#: Blocks sent ahead for each thread of the workers: none waits for the client between two blocks,
+#: Chunks sent ahead for each thread of the workers: none waits for the client between two chunks,
 #: and no more results than these wait on the workers for the client to write.
 _AHEAD = 2
 
@@ -53,9 +53,9 @@ def cluster(
     scheduler: str | None = None,
     patience: float = _PATIENCE,
 ) -> Iterator[Solved]:
-    """Yield a function that solves blocks on a cluster: the `solved` of `slipsweep.runs.store.run`.
+    """Yield a function that solves chunks on a cluster: the `solved` of `slipsweep.runs.store.run`.
 
-    The cluster is started, or the scheduler connected to, when the first block is asked for;
+    The cluster is started, or the scheduler connected to, when the first chunk is asked for;
     both end with the context.
 
     Parameters
@@ -73,17 +73,17 @@ def cluster(
         Both or neither are given, a number or address that is none, or no package distributed.
     RunError
         The scheduler or all workers cannot be reached, or have been lost; a worker has another
-        version of slipsweep; a block has killed several workers in turn.
+        version of slipsweep; a chunk has killed several workers in turn.
     """
     _check(workers, scheduler)
     with ExitStack() as stack:
 
         def solved(
-            plan: AnyPlan, blocks: Mapping[int, Block], progress: Progress | None = None
+            plan: AnyPlan, chunks: Mapping[int, Chunk], progress: Progress | None = None
         ) -> Iterator[tuple[int, Table]]:
-            if blocks:
+            if chunks:
                 client, name = _connect(stack, workers, scheduler)
-                yield from _Run(client, name, patience).solve(plan, blocks, progress)
+                yield from _Run(client, name, patience).solve(plan, chunks, progress)
 
         yield solved
 
@@ -132,7 +132,7 @@ def _connect(stack: ExitStack, workers: int | None, scheduler: str | None) -> "t
                 # no dashboard; what status pages are left must not ask for port 8787, which another may have
                 dashboard_address=None,
                 scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-                memory_limit=0,  # blocks are sized to fit: no worker is to be paused or killed over them
+                memory_limit=0,  # chunks are sized to fit: no worker is to be paused or killed over them
                 preload=[__name__],  # calls `dask_setup`
                 silence_logs=logging.CRITICAL,
             )
@@ -159,7 +159,7 @@ def _close(client: "Client") -> None:
 
 
 def _solve(client: dict[str, str], part: bytes) -> Table:
-    """Solve one block, on a worker: its plan, which only the same installation can read."""
+    """Solve one chunk, on a worker: its plan, which only the same installation can read."""
     if client != installation():  # a worker that came after `_check_installations`
         from distributed import get_worker
 
@@ -186,20 +186,20 @@ class _Run:
         self.finished: queue.SimpleQueue[Future] = queue.SimpleQueue()
 
     def solve(
-        self, plan: AnyPlan, blocks: Mapping[int, Block], progress: Progress | None
+        self, plan: AnyPlan, chunks: Mapping[int, Chunk], progress: Progress | None
     ) -> Iterator[tuple[int, Table]]:
-        """Yield blocks as they come back; a bounded number of them is under way."""
+        """Yield chunks as they come back; a bounded number of them is under way."""
         self._wait_for_workers()
         self._check_installations()
-        remaining = iter(blocks.items())
-        pending: dict[Any, tuple[int, int]] = {}  # by key of the task: the block's number and its cells
+        remaining = iter(chunks.items())
+        pending: dict[Any, tuple[int, int]] = {}  # by key of the task: the chunk's number and its cells
         while True:
-            for number, block in itertools.islice(remaining, max(0, _AHEAD * self.threads - len(pending))):
-                part = plan.part(block)
+            for number, chunk in itertools.islice(remaining, max(0, _AHEAD * self.threads - len(pending))):
+                part = plan.part(chunk)
                 future = self._submit(pickle.dumps(part))
                 pending[future.key] = number, part.cells
                 future.add_done_callback(self.finished.put)
-                del future  # the workers may forget a block once it is here
+                del future  # the workers may forget a chunk once it is here
             if not pending:
                 return
             done = self._next()
@@ -223,7 +223,7 @@ class _Run:
                 raise self._lost() from error
 
     def _next(self) -> "Future | None":
-        """The next block that is finished, one way or the other; None after `_LOOK` seconds."""
+        """The next chunk that is finished, one way or the other; None after `_LOOK` seconds."""
         if time.monotonic() - self.looked > _LOOK:
             self._look()
         try:
@@ -245,13 +245,13 @@ class _Run:
             raise self._lost() from None
         except KilledWorker as error:
             raise RunError(
-                f"block {number + 1} was lost with {error.allowed_failures + 1} workers in turn, the last at "
+                f"chunk {number + 1} was lost with {error.allowed_failures + 1} workers in turn, the last at "
                 f"{error.last_worker.address}: do they run out of memory?"
             ) from None
         except Exception as error:  # whatever an unlike installation may raise
             if self.client.status != "running":
                 raise self._lost() from None
-            raise RunError(f"a worker failed at block {number + 1}: {type(error).__name__}: {error}") from error
+            raise RunError(f"a worker failed at chunk {number + 1}: {type(error).__name__}: {error}") from error
         return results
 
     def _lost(self) -> RunError:

@@ -1,21 +1,21 @@
-"""A run's work folder: which blocks are finished, so that an interrupted run can go on.
+"""A run's work folder: which chunks are finished, so that an interrupted run can go on.
 
 Beside an output ``OUT.nc`` lies, while it is being made, the folder ``OUT.nc.parts``:
 
 ``lock``
     Held by the run that writes, so that a second is refused.
 ``manifest.json``
-    What the blocks belong to: the sweep file's text, the solver, the versions of all that
-    computes, the size of the blocks; under a checksum.
+    What the chunks belong to: the sweep file's text, the solver, the versions of all that
+    computes, the size of the chunks; under a checksum.
 ``journal``
-    One line for each finished block: its number and a checksum.  A line
-    is written after the block itself, so that a run that is killed has all that its journal
+    One line for each finished chunk: its number and a checksum.  A line
+    is written after the chunk itself, so that a run that is killed has all that its journal
     promises.  Both are brought to the disk itself some time later: after a power cut the
     journal may promise more than there is, which is why it holds checksums.
 ``data.nc``, or with --split the folder ``data``
-    The blocks.
+    The chunks.
 
-The data are renamed to the output when all blocks are there; then the folder is removed.
+The data are renamed to the output when all chunks are there; then the folder is removed.
 """
 
 import hashlib
@@ -42,15 +42,15 @@ from slipsweep.runs.placed import Layout
 
 _COMPLETE = "complete"
 
-#: The file of a block with --split, and what it is called until it is whole.
-_BLOCK = re.compile(r"block-\d{6,}\.(nc|tmp)")
+#: The file of a chunk with --split, and what it is called until it is whole.
+_CHUNK = re.compile(r"chunk-\d{6,}\.(nc|tmp)")
 
 #: A line of the journal, which a run that was killed may have left without its end.
 _LINE = re.compile(r"(\d+) ([0-9a-f]+)\n")
 
 
 def identity(asked: Mapping[str, Any], split: bool) -> dict[str, Any]:
-    """What two runs must have in common for one to go on with the blocks of the other; `asked` as in `jobs.Job`."""
+    """What two runs must have in common for one to go on with the chunks of the other; `asked` as in `jobs.Job`."""
     return {
         **asked,
         "--split": split,
@@ -71,7 +71,7 @@ def installation() -> dict[str, str]:
 
 
 def checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """XXH3 of 128 bits of the variables of a block, names and types among them.
+    """XXH3 of 128 bits of the variables of a chunk, names and types among them.
 
     It is to find flipped bits and missing sectors, not forgeries, and is made for every byte that
     a run writes: at 45 GB/s, where zlib's CRC-32 made 4.3 and SHA-256 1.8.
@@ -85,26 +85,26 @@ def checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
 
 @dataclass
 class Manifest:
-    """What the blocks in a work folder belong to.
+    """What the chunks in a work folder belong to.
 
     Attributes
     ----------
     identity : dict
         See `identity`.
-    block_cells : int
-        Largest number of cells of a block: with the grid, it says how blocks are cut.
+    chunk_cells : int
+        Largest number of cells of a chunk: with the grid, it says how chunks are cut.
     overwrite : bool
         Whether the run may replace an output that exists.
     history : str
         The `history` of the files.
     layout : Layout, optional
-        Where the results lie in the file that has all blocks (None: each has its own).
+        Where the results lie in the file that has all chunks (None: each has its own).
     head : str
         Checksum of what is no result in it.
     """
 
     identity: dict[str, Any]
-    block_cells: int
+    chunk_cells: int
     overwrite: bool
     history: str
     layout: Layout | None = None
@@ -140,14 +140,14 @@ class Folder:
         self.output = path
         self.path = path.parent / f"{path.name}.parts"
         self.manifest: Manifest | None = None
-        self.finished: dict[int, str] = {}  # number of a block: checksum
+        self.finished: dict[int, str] = {}  # number of a chunk: checksum
         self.complete = False
         self.known = False  # whether `finished` and `complete` are what the folder holds
         self.done = False
         self._descriptor: int | None = None  # of the folder, while it is locked
 
     def data(self, split: bool) -> Path:
-        """Where the blocks are."""
+        """Where the chunks are."""
         return self.path / ("data" if split else "data.nc")
 
     def read(self) -> None:
@@ -156,7 +156,7 @@ class Folder:
         Raises
         ------
         InputError
-            The manifest is damaged although there are finished blocks.
+            The manifest is damaged although there are finished chunks.
         """
         with suppress(FileNotFoundError):
             for line in (self.path / "journal").read_text(errors="replace").splitlines(keepends=True):
@@ -175,7 +175,7 @@ class Folder:
             if self.finished:
                 raise InputError(
                     f"{self.path / 'manifest.json'}: damaged or missing: what the {len(self.finished)} finished "
-                    "blocks belong to cannot be told; start anew with --overwrite"
+                    "chunks belong to cannot be told; start anew with --overwrite"
                 ) from None
 
     def hold(self) -> None:
@@ -205,7 +205,7 @@ class Folder:
         RunError
         """
         if not self.is_there():
-            raise RunError(f"{self.path}: was removed during the run, and the finished blocks with it; start again")
+            raise RunError(f"{self.path}: was removed during the run, and the finished chunks with it; start again")
 
     def clear(self) -> None:
         """Remove all that an earlier run left, and nothing else that may lie there."""
@@ -215,7 +215,7 @@ class Folder:
         data = self.path / "data"
         if data.is_dir():
             for entry in data.iterdir():
-                if _BLOCK.fullmatch(entry.name):
+                if _CHUNK.fullmatch(entry.name):
                     entry.unlink()
             data.rmdir()
         self.manifest, self.finished, self.complete, self.known = None, {}, False, True
@@ -228,19 +228,19 @@ class Folder:
             self.path.rmdir()
 
     def begin(self, manifest: Manifest) -> None:
-        """Write the manifest, after which blocks may be added."""
+        """Write the manifest, after which chunks may be added."""
         self.manifest = manifest
         content = json.dumps(asdict(manifest), indent=1)
         self._write("manifest.json", f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}")
         sync(self.path.parent)
 
     def keep(self, finished: Mapping[int, str]) -> None:
-        """Set the journal to those blocks that were found to be as they were written."""
+        """Set the journal to those chunks that were found to be as they were written."""
         self.finished = dict(finished)
         self._write("journal", "".join(f"{number} {digest}\n" for number, digest in finished.items()))
 
     def add(self, number: int, digest: str) -> None:
-        """Put a block that is written on record."""
+        """Put a chunk that is written on record."""
         self.check()
         self._append(f"{number} {digest}")
         self.finished[number] = digest
@@ -251,7 +251,7 @@ class Folder:
         sync(self.path)
 
     def close(self) -> None:
-        """Put on record that all blocks are there, hence that data which are missing have become the output."""
+        """Put on record that all chunks are there, hence that data which are missing have become the output."""
         self.check()
         self._append(_COMPLETE)
         self.sync()
@@ -273,8 +273,8 @@ class Folder:
 def opened(path: Path) -> Iterator[Folder]:
     """Make or find the work folder of an output, and hold its lock.
 
-    On the way out the folder is removed if the run is `done` or no block is finished.
-    An exception that passes through gets a note of how many blocks are kept.
+    On the way out the folder is removed if the run is `done` or no chunk is finished.
+    An exception that passes through gets a note of how many chunks are kept.
 
     Raises
     ------

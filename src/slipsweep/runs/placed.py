@@ -1,7 +1,7 @@
 """Results as bytes of a netCDF file: written to their places, past what the system keeps of files in memory.
 
 The netCDF library makes a file with all but the results in it.  Those are stored contiguous and
-uncompressed: each value has its place before any is known, and a block, which is one run of values of each
+uncompressed: each value has its place before any is known, and a chunk, which is one run of values of each
 result, is written there as it is.  Nothing else of the file changes from then on, so that what is no result can be
 checked byte by byte.
 
@@ -28,7 +28,7 @@ import xxhash
 from numpy.typing import NDArray
 
 from slipsweep.files.netcdf import Head, new_file, write_head
-from slipsweep.grid.blocks import places
+from slipsweep.grid.chunks import places
 from slipsweep.grid.tables import Table
 
 #: What is written directly begins and ends at multiples of this, in the file and in memory: as much as any disk asks.
@@ -112,13 +112,13 @@ def _between(path: Path, layout: Layout) -> Iterator[tuple[str | None, bytes]]:
         yield None, file.read(layout.nbytes - at)
 
 
-def runs_of(block: Mapping[str, slice], sizes: Mapping[str, int]) -> tuple[list[int], int]:
-    """Where a block's values lie in a result of these dimensions: the first of each run of values, and its length.
+def runs_of(chunk: Mapping[str, slice], sizes: Mapping[str, int]) -> tuple[list[int], int]:
+    """Where a chunk's values lie in a result of these dimensions: the first of each run of values, and its length.
 
-    Blocks that are whole along the last dimensions, as `blocks.grid_blocks` cuts them where no others are to be kept
+    Chunks that are whole along the last dimensions, as `chunks.grid_chunks` cuts them where no others are to be kept
     together, are one run.
     """
-    parts = places(block, sizes)
+    parts = places(chunk, sizes)
     strides = dict(zip(sizes, [math.prod([*sizes.values()][at + 1 :]) for at in range(len(sizes))], strict=True))
     count, inner = 1, True
     starts: list[Iterable[int]] = []

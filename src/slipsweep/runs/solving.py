@@ -1,4 +1,4 @@
-"""How large the blocks of a run are, and how they are solved in this process."""
+"""How large the chunks of a run are, and how they are solved in this process."""
 
 import itertools
 import math
@@ -9,31 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid import blocks
+from slipsweep.grid import chunks
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.blocks import Block
+from slipsweep.grid.chunks import Chunk
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table
 
 #: Called with a number of cells just solved, from any thread.
 Progress: TypeAlias = Callable[[int], None]
 
-#: What solves blocks, given with their numbers: yields each with its number, in any order.
-#: A block's results are let go of before the next is asked for, but for one: whose memory may be
+#: What solves chunks, given with their numbers: yields each with its number, in any order.
+#: A chunk's results are let go of before the next is asked for, but for one: whose memory may be
 #: used for those of the next but one.
-Solved: TypeAlias = Callable[[AnyPlan, Mapping[int, Block], Progress | None], Iterator[tuple[int, Table]]]
+Solved: TypeAlias = Callable[[AnyPlan, Mapping[int, Chunk], Progress | None], Iterator[tuple[int, Table]]]
 
-#: Resident memory of a run beside its blocks, with the compiler: a run of 10^9 cells peaked at
-#: 469 MB, of which 96 MB were its blocks.
+#: Resident memory of a run beside its chunks, with the compiler: a run of 10^9 cells peaked at
+#: 469 MB, of which 96 MB were its chunks.
 _BASE_MEMORY = 400_000_000
 
-#: Resident memory of a worker process on this machine beside its blocks (220 MB seen).
+#: Resident memory of a worker process on this machine beside its chunks (220 MB seen).
 _WORKER_MEMORY = 250_000_000
 
-#: Blocks for each worker process of a cluster, so that all end at about the same time, where
-#: that leaves blocks of this much work at least, in cells of the cycle solver: tens of
-#: milliseconds, against the two that a block takes on its way.
-_BLOCKS_A_WORKER = 16
+#: Chunks for each worker process of a cluster, so that all end at about the same time, where
+#: that leaves chunks of this much work at least, in cells of the cycle solver: tens of
+#: milliseconds, against the two that a chunk takes on its way.
+_CHUNKS_A_WORKER = 16
 _LEAST_WORK = 500_000
 
 #: Processes reckoned with where a scheduler has them.
@@ -43,32 +43,32 @@ _UNKNOWN_WORKERS = 64
 def default_cells(plan: AnyPlan) -> int:
     """Return how many cells are solved and written at a time if nothing else is asked for.
 
-    No more than seconds of work are to be lost with a block.
+    No more than seconds of work are to be lost with a chunk.
     """
-    return max(1, int(blocks.BLOCK_CELLS / plan.cost))
+    return max(1, int(chunks.CHUNK_CELLS / plan.cost))
 
 
-def block_memory(plan: AnyPlan, most: int) -> int:
-    """Return the memory that blocks of at most `most` cells take, in bytes.
+def chunk_memory(plan: AnyPlan, most: int) -> int:
+    """Return the memory that chunks of at most `most` cells take, in bytes.
 
     Two are there at a time, one being solved and one being written, with 8 bytes a cell
     for conversion and counting.
     """
-    lengths = blocks.block_lengths(plan.sizes, most, plan.together)
+    lengths = chunks.chunk_lengths(plan.sizes, most, plan.together)
     return plan.memory + math.prod(lengths.values()) * _cell_memory(plan)
 
 
 def cells_within(memory: int, plan: AnyPlan, workers: int = 0) -> int:
-    """Return how many cells a block may have for a run to stay within `memory` bytes.
+    """Return how many cells a chunk may have for a run to stay within `memory` bytes.
 
-    With `workers` processes beside this one, of which each has a block being solved and two
+    With `workers` processes beside this one, of which each has a chunk being solved and two
     waiting or on their way, that is the memory of all together.  Where a cell takes more work than
-    one of the cycle solver, blocks are no larger than `default_cells`, however much memory there is.
+    one of the cycle solver, chunks are no larger than `default_cells`, however much memory there is.
 
     Raises
     ------
     InputError
-        Not even a small block fits.
+        Not even a small chunk fits.
     """
     base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
     cell = _cell_memory(plan, 2 + 3 * workers)
@@ -83,13 +83,13 @@ def cells_within(memory: int, plan: AnyPlan, workers: int = 0) -> int:
 
 
 def cells_shared(plan: AnyPlan, workers: int | None) -> int:
-    """Return how many cells a block should have for workers to share a run evenly (None: a number unknown)."""
-    share = math.prod(plan.sizes.values()) // (_BLOCKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
+    """Return how many cells a chunk should have for workers to share a run evenly (None: a number unknown)."""
+    share = math.prod(plan.sizes.values()) // (_CHUNKS_A_WORKER * (workers or _UNKNOWN_WORKERS))
     return min(default_cells(plan), max(math.ceil(_LEAST_WORK / plan.cost), share))
 
 
 def _cell_memory(plan: AnyPlan, count: int = 2) -> int:
-    """Bytes that a cell of the grid takes in so many blocks."""
+    """Bytes that a cell of the grid takes in so many chunks."""
     own = (
         result.values.dtype.itemsize * math.prod(size for dim, size in result.sizes.items() if dim not in plan.sizes)
         for result in plan.empty().data_vars.values()
@@ -98,30 +98,30 @@ def _cell_memory(plan: AnyPlan, count: int = 2) -> int:
 
 
 def solve_here(
-    plan: AnyPlan, missing: Mapping[int, Block], progress: Progress | None = None
+    plan: AnyPlan, missing: Mapping[int, Chunk], progress: Progress | None = None
 ) -> Iterator[tuple[int, Table]]:
-    """Solve blocks one after the other in this process.
+    """Solve chunks one after the other in this process.
 
     Parameters
     ----------
     plan : AnyPlan
-    missing : mapping of int to Block
-        The blocks to solve, by their numbers.
+    missing : mapping of int to Chunk
+        The chunks to solve, by their numbers.
     progress : callable, optional
 
     Yields
     ------
     int, Table
-        The number of a block, and its results with their coordinates: its own until the next but
+        The number of a chunk, and its results with their coordinates: its own until the next but
         one is asked for, whose arrays take their memory.
     """
     # one set of arrays is being written while the other is solved into
-    for (number, block), memory in zip(missing.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
-        yield number, plan.part(block).solve(progress, memory.rewound().empty)
+    for (number, chunk), memory in zip(missing.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
+        yield number, plan.part(chunk).solve(progress, memory.rewound().empty)
 
 
 class _Memory:
-    """Memory that is used again for each block: the system takes 0.2 to 1 µs for every 4 KB that are new."""
+    """Memory that is used again for each chunk: the system takes 0.2 to 1 µs for every 4 KB that are new."""
 
     def __init__(self) -> None:
         self.pieces: list[NDArray[np.uint8]] = []
@@ -133,7 +133,7 @@ class _Memory:
         return self
 
     def empty(self, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
-        """As `np.empty`; what an earlier block had at this place is overwritten."""
+        """As `np.empty`; what an earlier chunk had at this place is overwritten."""
         nbytes = math.prod(shape) * np.dtype(dtype).itemsize
         if self.used == len(self.pieces):
             self.pieces.append(np.empty(nbytes, np.uint8))

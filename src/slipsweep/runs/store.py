@@ -1,6 +1,6 @@
-"""A sweep computed and written block by block.
+"""A sweep computed and written chunk by chunk.
 
-Each value has its place in the file before any is known: once the empty file is on the disk a block is written
+Each value has its place in the file before any is known: once the empty file is on the disk a chunk is written
 without a change to anything but its own bytes (`slipsweep.runs.placed`).  A run that is killed leaves a file that can
 be read and gone on with (`slipsweep.runs.parts`), and no value is written twice.
 
@@ -29,14 +29,14 @@ from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import TooLarge, history_of, rounded
 from slipsweep.files.outputs import appear, check_outputs, sync, writing
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.blocks import Block, block_lengths, grid_blocks, places
+from slipsweep.grid.chunks import Chunk, chunk_lengths, grid_chunks, places
 from slipsweep.grid.resources import available_memory, grid_text, size_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.runs import parts
 from slipsweep.runs.jobs import Job
 from slipsweep.runs.placed import PlacedFile, file_checksum, make_file, runs_of
-from slipsweep.runs.solving import Progress, Solved, block_memory, default_cells, solve_here
+from slipsweep.runs.solving import Progress, Solved, chunk_memory, default_cells, solve_here
 
 #: Seconds after which what is written is brought to the disk itself.
 _SYNC_SECONDS = 1.0
@@ -47,7 +47,7 @@ class Report:
     """What `run` did."""
 
     path: Path
-    block_cells: int
+    chunk_cells: int
     seconds: float
     nbytes: int
     tally: Tally
@@ -61,14 +61,14 @@ def run(
     overwrite: bool = False,
     resume: bool = False,
     split: bool = False,
-    block_cells: int | None = None,
+    chunk_cells: int | None = None,
     shared_cells: int | None = None,
     progress: Progress | None = None,
     solved: Solved = solve_here,
 ) -> Report:
     """Solve a plan and write its results as netCDF, complete or not at all.
 
-    Finished blocks of a run that failed or was killed are kept beside the output
+    Finished chunks of a run that failed or was killed are kept beside the output
     (`slipsweep.runs.parts`).
 
     Parameters
@@ -79,21 +79,21 @@ def run(
     command : str
         The command as typed, for the file's `history`.
     overwrite : bool
-        Replace `path` and the blocks of an interrupted run, if they exist.
+        Replace `path` and the chunks of an interrupted run, if they exist.
     resume : bool
-        Go on with the blocks of an interrupted run, if there are any.
+        Go on with the chunks of an interrupted run, if there are any.
     split : bool
-        Write a folder with a netCDF file for each block.
-    block_cells : int, optional
-        Most cells to solve and write at a time; two such blocks are in memory.  By default
+        Write a folder with a netCDF file for each chunk.
+    chunk_cells : int, optional
+        Most cells to solve and write at a time; two such chunks are in memory.  By default
         `solving.default_cells`, or what an interrupted run had.
     shared_cells : int, optional
-        As many cells or fewer, so that those who solve blocks share them evenly; but what an
+        As many cells or fewer, so that those who solve chunks share them evenly; but what an
         interrupted run had goes before.
     progress : callable
         Called with a number of cells just solved, from any thread.
     solved : callable
-        What solves the blocks, in any order (`solving.Solved`).
+        What solves the chunks, in any order (`solving.Solved`).
 
     Returns
     -------
@@ -103,11 +103,11 @@ def run(
     ------
     InputError
         The output exists or cannot be written, the grid is too large for disk or memory, there
-        are blocks of an interrupted run but neither `resume` nor `overwrite` is given, or they
+        are chunks of an interrupted run but neither `resume` nor `overwrite` is given, or they
         are of another sweep or version.
     RunError
         Writing failed, memory ran out, or another run is writing `path`.  A note tells how many
-        blocks are kept.
+        chunks are kept.
     """
     check_output(job, path, overwrite=overwrite or resume, split=split)
     plan = job.plan
@@ -117,37 +117,37 @@ def run(
             work.read()
         if work.finished and not (resume or overwrite):
             raise InputError(
-                f"{path}: {work.path.name} holds {len(work.finished)} finished blocks of an interrupted run; "
+                f"{path}: {work.path.name} holds {len(work.finished)} finished chunks of an interrupted run; "
                 "go on with --resume, or start anew with --overwrite"
             )
         if resume and work.finished and work.manifest is not None:
-            _check_same(work, identity, block_cells)
-            block_cells, overwrite = work.manifest.block_cells, work.manifest.overwrite
+            _check_same(work, identity, chunk_cells)
+            chunk_cells, overwrite = work.manifest.chunk_cells, work.manifest.overwrite
             data = work.data(split)
             if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
                 # killed between giving the output its name and clearing the folder away
                 work.done = True
                 tally = Tally(plan.cells)
-                for block, arrays in stored_blocks(plan, path, block_cells):
-                    _count(tally, plan, block, arrays)
-                return Report(path, block_cells, 0.0, _nbytes(path), tally)
+                for chunk, arrays in stored_chunks(plan, path, chunk_cells):
+                    _count(tally, plan, chunk, arrays)
+                return Report(path, chunk_cells, 0.0, _nbytes(path), tally)
         else:
             work.clear()
-            block_cells = min(filter(None, (block_cells, shared_cells)), default=default_cells(plan))
+            chunk_cells = min(filter(None, (chunk_cells, shared_cells)), default=default_cells(plan))
         # once more: a run that was writing it may have ended before this one got hold of the lock
         check_outputs([path], overwrite, reads=job.files, folder=split)
         data = work.data(split)
-        _check_size(job, path, block_cells, _nbytes(data))
+        _check_size(job, path, chunk_cells, _nbytes(data))
 
         started = time.perf_counter()
         tally = Tally(plan.cells)
-        cut = dict(enumerate(grid_blocks(plan.sizes, block_cells, plan.together)))
+        cut = dict(enumerate(grid_chunks(plan.sizes, chunk_cells, plan.together)))
         try:
-            manifest = work.manifest or parts.Manifest(identity, block_cells, overwrite, history_of(command))
+            manifest = work.manifest or parts.Manifest(identity, chunk_cells, overwrite, history_of(command))
             with closing((_Files if split else _OneFile)(job, data, manifest)) as target:
                 _ready(work, target, cut, tally, progress)
-                missing = {number: block for number, block in cut.items() if number not in work.finished}
-                _write_blocks(work, target, cut, _named(job, solved(plan, missing, progress)), tally)
+                missing = {number: chunk for number, chunk in cut.items() if number not in work.finished}
+                _write_chunks(work, target, cut, _named(job, solved(plan, missing, progress)), tally)
                 target.check(len(cut))
             with writing(path):
                 work.close()
@@ -156,7 +156,7 @@ def run(
             work.clear()  # no --resume could finish it
             raise InputError(f"{job.source}: {large}") from None
         except MemoryError:
-            error = RunError(f"{path}: out of memory at a block of {_block_text(plan, block_cells)}")
+            error = RunError(f"{path}: out of memory at a chunk of {_chunk_text(plan, chunk_cells)}")
             raise _noted(error, work, data, len(cut)) from None
         except BaseException as error:
             if isinstance(error, RunError):
@@ -164,7 +164,7 @@ def run(
             _noted(error, work, data, len(cut))
             raise
         work.done = True
-    return Report(path, block_cells, time.perf_counter() - started, _nbytes(path), tally)
+    return Report(path, chunk_cells, time.perf_counter() - started, _nbytes(path), tally)
 
 
 def check_output(job: Job, path: Path, *, overwrite: bool, split: bool) -> None:
@@ -172,27 +172,27 @@ def check_output(job: Job, path: Path, *, overwrite: bool, split: bool) -> None:
     check_outputs([path], overwrite, reads=job.files, folder=split, work=parts.Folder(path).path)
 
 
-def stored_blocks(plan: AnyPlan, path: Path, block_cells: int) -> Iterator[tuple[Block, dict[str, NDArray[Any]]]]:
-    """Read a result as it was written: blocks, and the arrays of their results."""
+def stored_chunks(plan: AnyPlan, path: Path, chunk_cells: int) -> Iterator[tuple[Chunk, dict[str, NDArray[Any]]]]:
+    """Read a result as it was written: chunks, and the arrays of their results."""
     sizes = {name: result.sizes for name, result in plan.empty().data_vars.items()}
-    cut = grid_blocks(plan.sizes, block_cells, plan.together)
+    cut = grid_chunks(plan.sizes, chunk_cells, plan.together)
     if path.is_dir():
-        for number, block in enumerate(cut):
-            with _opened(path / _block_name(number)) as file:
-                yield block, {name: np.asarray(file[name][...]) for name in sizes}
+        for number, chunk in enumerate(cut):
+            with _opened(path / _chunk_name(number)) as file:
+                yield chunk, {name: np.asarray(file[name][...]) for name in sizes}
         return
     with _opened(path) as file:
-        for block in cut:
+        for chunk in cut:
             yield (
-                block,
+                chunk,
                 {
-                    name: np.asarray(file[name][tuple(places(block, own).values()) or ...])
+                    name: np.asarray(file[name][tuple(places(chunk, own).values()) or ...])
                     for name, own in sizes.items()
                 },
             )
 
 
-def stored_table(plan: AnyPlan, path: Path, block_cells: int, names: Collection[str]) -> Table:
+def stored_table(plan: AnyPlan, path: Path, chunk_cells: int, names: Collection[str]) -> Table:
     """Read some results of a plan that were written as `run` told."""
     table = plan.empty()
     found = {
@@ -200,9 +200,9 @@ def stored_table(plan: AnyPlan, path: Path, block_cells: int, names: Collection[
         for name, one in table.data_vars.items()
         if name in names
     }
-    for block, arrays in stored_blocks(plan, path, block_cells) if found else ():
+    for chunk, arrays in stored_chunks(plan, path, chunk_cells) if found else ():
         for name, one in found.items():
-            one.values[tuple(places(block, one.sizes).values())] = arrays[name]
+            one.values[tuple(places(chunk, one.sizes).values())] = arrays[name]
     return Table(table.coords, found, table.attrs)
 
 
@@ -217,47 +217,47 @@ def _named(job: Job, found: Iterator[tuple[int, Table]]) -> Iterator[tuple[int, 
         yield from found
 
 
-def _count(tally: Tally, plan: AnyPlan, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Count a block, but for what other blocks along a dimension that a result lacks have as well."""
+def _count(tally: Tally, plan: AnyPlan, chunk: Chunk, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Count a chunk, but for what other chunks along a dimension that a result lacks have as well."""
     whole = plan.empty().data_vars
     tally.merge(
         plan.tally(
             {
                 name: values
                 for name, values in arrays.items()
-                if not any(part.start for dim, part in block.items() if dim not in whole[name].dims)
+                if not any(part.start for dim, part in chunk.items() if dim not in whole[name].dims)
             }
         )
     )
 
 
-def _check_same(work: parts.Folder, identity: Mapping[str, Any], block_cells: int | None) -> None:
-    """Refuse to go on with blocks of another sweep, solver or version, or larger than allowed."""
+def _check_same(work: parts.Folder, identity: Mapping[str, Any], chunk_cells: int | None) -> None:
+    """Refuse to go on with chunks of another sweep, solver or version, or larger than allowed."""
     assert work.manifest is not None
     if difference := work.manifest.difference(identity):
-        raise InputError(f"{work.output}: cannot go on with the blocks in {work.path.name}: {difference}")
-    if block_cells is not None and block_cells < work.manifest.block_cells:
+        raise InputError(f"{work.output}: cannot go on with the chunks in {work.path.name}: {difference}")
+    if chunk_cells is not None and chunk_cells < work.manifest.chunk_cells:
         raise InputError(
-            f"--memory: too little for the blocks of {work.manifest.block_cells} cells that {work.path.name} "
+            f"--memory: too little for the chunks of {work.manifest.chunk_cells} cells that {work.path.name} "
             "was begun with; give more, or start anew with --overwrite"
         )
 
 
-def _noted(error: BaseException, work: parts.Folder, data: Path, blocks: int) -> BaseException:
+def _noted(error: BaseException, work: parts.Folder, data: Path, chunks: int) -> BaseException:
     """Tell with an error how much of the run is kept."""
     if work.finished and work.is_there() and data.exists():
-        error.add_note(f"{len(work.finished)} of {blocks} blocks are kept; go on with --resume")
+        error.add_note(f"{len(work.finished)} of {chunks} chunks are kept; go on with --resume")
     return error
 
 
 def _ready(
     work: parts.Folder,
     target: "_OneFile | _Files",
-    cut: Mapping[int, Block],
+    cut: Mapping[int, Chunk],
     tally: Tally,
     progress: Progress | None,
 ) -> None:
-    """Take over the finished blocks that are as they were written, or begin with none."""
+    """Take over the finished chunks that are as they were written, or begin with none."""
     kept = {}
     if work.finished and target.open():
         for number in sorted(work.finished.keys() & cut.keys()):
@@ -277,14 +277,14 @@ def _ready(
             work.begin(target.manifest)
 
 
-def _write_blocks(
+def _write_chunks(
     work: parts.Folder,
     target: "_OneFile | _Files",
-    cut: Mapping[int, Block],
+    cut: Mapping[int, Chunk],
     found: Iterator[tuple[int, Table]],
     tally: Tally,
 ) -> None:
-    """Write blocks and put them on record, each while the next is being solved.
+    """Write chunks and put them on record, each while the next is being solved.
 
     Beside the writing cells are counted, and what is written is brought to the disk itself.
     """
@@ -311,7 +311,7 @@ def _write_blocks(
         target.sync()
         work.sync()
 
-    # leaving them waits, for the writer first: a block that is being written is finished
+    # leaving them waits, for the writer first: a chunk that is being written is finished
     with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as counter, ThreadPoolExecutor(1) as writer:
         for number, table in found:
             if pending is not None:
@@ -327,7 +327,7 @@ def _write_blocks(
 
 
 class _OneFile:
-    """All blocks in one netCDF file, each in its place."""
+    """All chunks in one netCDF file, each in its place."""
 
     def __init__(self, job: Job, data: Path, manifest: parts.Manifest) -> None:
         self.job, self.data, self.manifest = job, data, manifest
@@ -341,7 +341,7 @@ class _OneFile:
             self.file = None
 
     def create(self) -> None:
-        """Make the file, with all but the blocks in it."""
+        """Make the file, with all but the chunks in it."""
         head = replace(self.job.head, labels=self.job.labels)
         layout = make_file(self.data, head, self.table, self.job.dtype, self.manifest.history)
         self.manifest.layout, self.manifest.head = layout, file_checksum(self.data, layout)
@@ -349,40 +349,40 @@ class _OneFile:
         self.file = PlacedFile(self.data, layout)
 
     def open(self) -> bool:
-        """Open the file of an earlier run; whether all but its blocks is as it was made."""
+        """Open the file of an earlier run; whether all but its chunks is as it was made."""
         layout = self.manifest.layout
         if layout is None:
             return False
         try:
-            # what the system refuses (rights, a disk that does not answer) is no damage: blocks are not thrown away
+            # what the system refuses (rights, a disk that does not answer) is no damage: chunks are not thrown away
             self.file = PlacedFile(self.data, layout)
         except FileNotFoundError:
             return False
-        # what was cut off is zeros: the blocks that are whole can be read
+        # what was cut off is zeros: the chunks that are whole can be read
         self.file.restore_size()
         return file_checksum(self.data, layout) == self.manifest.head
 
-    def find(self, number: int, block: Block, digest: str) -> dict[str, NDArray[Any]] | None:
-        """Return the values of a block, as they are stored, or None if they are not those on record."""
+    def find(self, number: int, chunk: Chunk, digest: str) -> dict[str, NDArray[Any]] | None:
+        """Return the values of a chunk, as they are stored, or None if they are not those on record."""
         assert self.file is not None
         arrays = {}
         for name, result in self.table.data_vars.items():
-            shape = [part.stop - part.start for part in places(block, result.sizes).values()]
+            shape = [part.stop - part.start for part in places(chunk, result.sizes).values()]
             try:
-                values = self.file.read(name, runs_of(block, result.sizes), self.job.dtype(name))
+                values = self.file.read(name, runs_of(chunk, result.sizes), self.job.dtype(name))
             except OSError:  # a sector that cannot be read; that the file can was seen when it was opened
                 return None
             arrays[name] = values.reshape(shape)
         return arrays if parts.checksum(arrays) == digest else None
 
-    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Write a block, with its values as they are to be stored; return what is to go on record."""
+    def write(self, number: int, chunk: Chunk, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
+        """Write a chunk, with its values as they are to be stored; return what is to go on record."""
         assert self.file is not None
         for name, result in self.table.data_vars.items():
-            self.file.write(name, runs_of(block, result.sizes), arrays[name])
+            self.file.write(name, runs_of(chunk, result.sizes), arrays[name])
         return parts.checksum(arrays)
 
-    def check(self, blocks: int) -> None:
+    def check(self, chunks: int) -> None:
         """Refuse to take another file for the one that was written (RunError)."""
         assert self.file is not None
         if not self.file.has_name(self.data):
@@ -394,7 +394,7 @@ class _OneFile:
 
 
 class _Files:
-    """A folder with a netCDF file for each block, complete by itself."""
+    """A folder with a netCDF file for each chunk, complete by itself."""
 
     def __init__(self, job: Job, data: Path, manifest: parts.Manifest) -> None:
         self.job, self.data, self.manifest = job, data, manifest
@@ -411,8 +411,8 @@ class _Files:
         """Whether there is a folder of an earlier run."""
         return self.data.is_dir()
 
-    def find(self, number: int, block: Block, digest: str) -> dict[str, NDArray[Any]] | None:
-        """Return the values of a block, as they are stored, or None if its file is not that on record."""
+    def find(self, number: int, chunk: Chunk, digest: str) -> dict[str, NDArray[Any]] | None:
+        """Return the values of a chunk, as they are stored, or None if its file is not that on record."""
         try:
             with self._name(number).open("rb") as content:
                 if hashlib.file_digest(content, xxhash.xxh3_128).hexdigest() != digest:
@@ -424,15 +424,15 @@ class _Files:
         with _opened(self._name(number)) as file:
             return {name: np.asarray(file[name][...]) for name in self.job.plan.names}
 
-    def write(self, number: int, block: Block, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Write a block, with its values as they are to be stored; return what is to go on record."""
+    def write(self, number: int, chunk: Chunk, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
+        """Write a chunk, with its values as they are to be stored; return what is to go on record."""
         coords = dict(table.coords)
         labels = self.job.labels
-        if "case" in block:
+        if "case" in chunk:
             # files are put together by the coordinates of their dimensions, which rows of [[cases]] lack
-            rows = np.arange(block["case"].start, block["case"].stop, dtype=np.int32) + 1
+            rows = np.arange(chunk["case"].start, chunk["case"].stop, dtype=np.int32) + 1
             coords["case"] = Variable(("case",), rows, {"long_name": "row of [[cases]]", "units": "1"})
-            labels = labels[block["case"]]
+            labels = labels[chunk["case"]]
         path = self._name(number)
         temporary = path.with_suffix(".tmp")
         head = replace(self.job.head, labels=labels)
@@ -447,9 +447,9 @@ class _Files:
         self.unsynced.append(path)
         return file_checksum(path, layout, arrays)
 
-    def check(self, blocks: int) -> None:
+    def check(self, chunks: int) -> None:
         """Refuse to take the folder for whole where a file is missing (RunError)."""
-        for number in range(blocks):
+        for number in range(chunks):
             if not self._name(number).exists():
                 raise _removed(self._name(number))
 
@@ -460,11 +460,11 @@ class _Files:
         sync(self.data)
 
     def _name(self, number: int) -> Path:
-        return self.data / _block_name(number)
+        return self.data / _chunk_name(number)
 
 
-def _block_name(number: int) -> str:
-    return f"block-{number:06}.nc"
+def _chunk_name(number: int) -> str:
+    return f"chunk-{number:06}.nc"
 
 
 def _removed(path: Path) -> RunError:
@@ -478,8 +478,8 @@ def _nbytes(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
-def _check_size(job: Job, path: Path, block_cells: int, written: int) -> None:
-    """Refuse a grid whose file cannot fit on the disk, or whose blocks cannot fit in memory."""
+def _check_size(job: Job, path: Path, chunk_cells: int, written: int) -> None:
+    """Refuse a grid whose file cannot fit on the disk, or whose chunks cannot fit in memory."""
     plan = job.plan
     results = plan.empty().data_vars
     nbytes = sum(result.values.size * job.dtype(name).itemsize for name, result in results.items())
@@ -491,14 +491,14 @@ def _check_size(job: Job, path: Path, block_cells: int, written: int) -> None:
             'output.dtype = "float32" or another disk'
         )
     memory = available_memory()
-    needed = block_memory(plan, block_cells)
+    needed = chunk_memory(plan, chunk_cells)
     if memory is not None and needed > memory:
         raise InputError(
-            f"{job.source}: blocks of {_block_text(plan, block_cells)} need {size_text(needed)} of memory, "
+            f"{job.source}: chunks of {_chunk_text(plan, chunk_cells)} need {size_text(needed)} of memory, "
             f"but {size_text(memory)} is free: close other programs or take fewer output.variables"
         )
 
 
-def _block_text(plan: AnyPlan, block_cells: int) -> str:
-    lengths = block_lengths(plan.sizes, block_cells, plan.together)
+def _chunk_text(plan: AnyPlan, chunk_cells: int) -> str:
+    lengths = chunk_lengths(plan.sizes, chunk_cells, plan.together)
     return f"{math.prod(lengths.values())} cells ({grid_text(lengths)})"

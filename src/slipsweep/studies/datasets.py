@@ -441,21 +441,21 @@ def _dataset(table: Table, brought: Mapping[Hashable, xr.Variable]) -> xr.Datase
 
 def _lazy(plan: Plan, chunks: Any) -> Table:
     """The results as dask arrays."""
-    blocks = _blocks(chunks, plan.sizes)
-    return plan.table(lambda task: _lazy_arrays(task, {dim: blocks[dim] for dim in task.sizes}))
+    lengths = _chunk_lengths(chunks, plan.sizes)
+    return plan.table(lambda task: _lazy_arrays(task, {dim: lengths[dim] for dim in task.sizes}))
 
 
-def _lazy_arrays(task: Task, blocks: Mapping[str, tuple[int, ...]]) -> dict[str, Any]:
+def _lazy_arrays(task: Task, chunks: Mapping[str, tuple[int, ...]]) -> dict[str, Any]:
     """One task as dask arrays: a node a chunk solves all results, another picks each out."""
     from dask.array import Array
     from dask.base import tokenize
     from dask.highlevelgraph import HighLevelGraph
 
-    starts = [list(itertools.accumulate(lengths, initial=0)) for lengths in blocks.values()]
-    token = tokenize(task.solver.__name__, task.problem, task.names, blocks, task.inputs)
+    starts = [list(itertools.accumulate(lengths, initial=0)) for lengths in chunks.values()]
+    token = tokenize(task.solver.__name__, task.problem, task.names, chunks, task.inputs)
     solved = f"slipsweep-{token}"
     layers: dict[str, dict[Any, Any]] = {solved: {}} | {f"{name}-{token}": {} for name in task.names}
-    for index in itertools.product(*(range(len(lengths)) for lengths in blocks.values())):
+    for index in itertools.product(*(range(len(lengths)) for lengths in chunks.values())):
         slices = tuple(slice(begin[at], begin[at + 1]) for begin, at in zip(starts, index, strict=True))
         layers[solved][solved, *index] = (task.part(slices).solve,)
         for name in task.names:
@@ -464,11 +464,11 @@ def _lazy_arrays(task: Task, blocks: Mapping[str, tuple[int, ...]]) -> dict[str,
     for name in task.names:
         layer = f"{name}-{token}"
         graph = HighLevelGraph({solved: layers[solved], layer: layers[layer]}, {solved: set(), layer: {solved}})
-        arrays[name] = Array(graph, layer, tuple(blocks.values()), dtype=RESULT_DTYPES.get(name, "float64"))
+        arrays[name] = Array(graph, layer, tuple(chunks.values()), dtype=RESULT_DTYPES.get(name, "float64"))
     return arrays
 
 
-def _blocks(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
+def _chunk_lengths(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
     """Chunk lengths along every dimension; "auto" leaves frequency, which costs next to nothing, whole."""
     from dask.array.core import normalize_chunks
 

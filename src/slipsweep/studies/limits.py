@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
-from slipsweep.grid.blocks import slabs
+from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Problem, Request
 from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.grid.tables import Variable

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, threads
-from slipsweep.grid.blocks import Block, slabs
+from slipsweep.grid.chunks import Chunk, slabs
 from slipsweep.grid.engine import Problem, Request
 from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes, plan_sweep
 from slipsweep.grid.resources import check_memory, grid_text
@@ -560,9 +560,9 @@ class SamplePlan:
         """Grid points solved together."""
         return max(_CELLS // self.sampling.samples, 1)
 
-    def part(self, block: Block) -> "SamplePlan":
-        """The plan cut to a block of its grid."""
-        coords = {name: one.cut(block) for name, one in self.coords.items()}
+    def part(self, chunk: Chunk) -> "SamplePlan":
+        """The plan cut to a chunk of its grid."""
+        coords = {name: one.cut(chunk) for name, one in self.coords.items()}
         return SamplePlan(self.sampling, self.draws, self.problem, coords, self.attrs)
 
     def empty(self) -> Table:

@@ -1,4 +1,4 @@
-"""How a grid is cut into blocks."""
+"""How a grid is cut into chunks."""
 
 import itertools
 import math
@@ -6,16 +6,16 @@ from collections.abc import Collection, Hashable, Iterator, Mapping
 from typing import TypeAlias, TypeVar
 
 #: A part of a grid: where it lies along each dimension.
-Block: TypeAlias = dict[str, slice]
+Chunk: TypeAlias = dict[str, slice]
 
 #: Cells read, solved or written at a time: 80 MB of results, yet enough to keep the kernels busy.
-BLOCK_CELLS = 4_000_000
+CHUNK_CELLS = 4_000_000
 
 Dim = TypeVar("Dim", bound=Hashable)
 
 
-def block_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> dict[Dim, int]:
-    """Return the block of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
+def chunk_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> dict[Dim, int]:
+    """Return the chunk of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
 
     Its cells then follow one another in the file.  Among the last dimensions is the frequency, of which a
     whole axis costs `sweep` hardly more than one value.  Dimensions `together` are cut only where no other is left.
@@ -23,18 +23,18 @@ def block_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim]
     lengths: dict[Dim, int] = {}
     cells = 1
     for dim in reversed([*(dim for dim in shape if dim not in together), *(dim for dim in shape if dim in together)]):
-        # equal shares rather than full blocks and a remnant
+        # equal shares rather than full chunks and a remnant
         pieces = math.ceil(shape[dim] / max(1, most // cells))
         lengths[dim] = math.ceil(shape[dim] / pieces)
         cells *= lengths[dim]
     return {dim: lengths[dim] for dim in shape}
 
 
-def grid_blocks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> Iterator[dict[Dim, slice]]:
-    """Cut a grid into blocks as `block_lengths` says, in the order of the file; a grid without cells has none."""
+def grid_chunks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> Iterator[dict[Dim, slice]]:
+    """Cut a grid into chunks as `chunk_lengths` says, in the order of the file; a grid without cells has none."""
     if 0 in shape.values():
         return
-    lengths = block_lengths(shape, most, together)
+    lengths = chunk_lengths(shape, most, together)
     starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
     for corner in itertools.product(*starts):
         yield {
@@ -44,10 +44,10 @@ def grid_blocks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] =
 
 def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
     """Cut a grid whose dimensions have no names."""
-    for block in grid_blocks(dict(enumerate(shape)), most):
-        yield tuple(block.values())
+    for chunk in grid_chunks(dict(enumerate(shape)), most):
+        yield tuple(chunk.values())
 
 
-def places(block: Mapping[str, slice], sizes: Mapping[str, int]) -> dict[str, slice]:
-    """Where a block lies in what has these dimensions: in all of those that are none of the grid's."""
-    return {dim: block.get(dim, slice(0, length)) for dim, length in sizes.items()}
+def places(chunk: Mapping[str, slice], sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Where a chunk lies in what has these dimensions: in all of those that are none of the grid's."""
+    return {dim: chunk.get(dim, slice(0, length)) for dim, length in sizes.items()}
