@@ -28,8 +28,8 @@ CYCLES = 5
 #: Inputs, and what is given of each experiment under them.
 INPUTS: dict[str, tuple[dict[str, tuple[float, float]], Any]] = {
     "all estimated": ({}, "mendez"),
-    "Üy measured": ({"yield_acceleration": MEASURED_YIELD}, "mendez"),
-    "Üy measured, recoupling by integration": (
+    "Üy measured, the others estimated": ({"yield_acceleration": MEASURED_YIELD}, "mendez"),
+    "the same, recoupling by integration": (
         {"yield_acceleration": MEASURED_YIELD},
         slipsweep.Mendez(recoupling="integrate"),
     ),
@@ -153,7 +153,9 @@ def main() -> None:
     given = arguments(__doc__)
     by = "Written by `python -m benchmarks.model_trends`.\n"
     (given.folder / "experiments.md").write_text(
-        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. {by}", encoding="utf-8"
+        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. Üy is the yield acceleration, at which "
+        f"sliding begins; λ and Δμ say how friction decays as the plane shakes harder. {by}",
+        encoding="utf-8",
     )
     (given.folder / "sensitivity.md").write_text(
         f"{sensitivity()}\nWith Üy measured, λ and Δμ as printed, {CYCLES} cycles. {by}", encoding="utf-8"
