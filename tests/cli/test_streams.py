@@ -15,7 +15,7 @@ CELL = "".join(
     for name, values in (("theta", [0, 5]), ("mu_s", [0.4]), ("amplitude", [3, 6]), ("frequency", [1, 2]))
 )
 SIMULATE = ("simulate", "--theta", "5", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1")
-COMMANDS = ("run", "info", "export", "limit", "simulate", "chart", "record", "explore")
+COMMANDS = ("run", "info", "export", "limit", "simulate", "chart", "explore")
 
 posix = pytest.mark.skipif(os.name != "posix", reason="opens pipes and devices the POSIX way")
 
@@ -63,7 +63,7 @@ def test_every_command_in_every_alphabet(made: Path, encoding: str) -> None:
             ("run", "a.toml", "-o", "new.nc"), ("info", "a.nc"), ("export", "a.nc", "-o", "new.csv"),
             ("limit", "a.nc", "-d", "5mm", "-o", "limit.nc"), (*SIMULATE, "-o", "h.csv"),
             ("chart", "a.nc", "-k", "contours", "-o", "λ.png"),
-            ("record", "m.csv", "--units", "g", "--theta", "5", "--mu-s", "0.4", "-o", "r.nc"),
+            ("simulate", "--record", "m.csv", "--units", "g", "--theta", "5", "--mu-s", "0.4", "-o", "r.nc"),
             ("explore", "a.nc", "-o", "new.html"), ("info", "λ.nc"),
         )
     ):  # fmt: skip
@@ -165,7 +165,7 @@ def test_a_record_beside_a_sweep_from_a_pipe_is_that_of_the_working_folder(made:
     (tmp_path / "r.toml").write_text(text)
     for source in ("cat r.toml | $S run - ", "$S run /dev/stdin < r.toml ", "$S run <(cat r.toml) "):
         assert shell(tmp_path, source + " -o r.nc --overwrite").returncode == 0
-    done = shell(tmp_path, "$S record <(cat m.csv) --units g --theta 5 --mu-s 0.4 -o s.nc")
+    done = shell(tmp_path, "$S simulate --record <(cat m.csv) --units g --theta 5 --mu-s 0.4 -o s.nc")
     assert done.returncode == 0
 
 
@@ -179,7 +179,7 @@ def test_a_record_beside_a_sweep_from_a_pipe_is_that_of_the_working_folder(made:
         ("$S run - -o b.nc <&-", "axes.theta: missing"),
         ("$S run . -o b.nc", ".: cannot be read: Is a directory"),
         ("$S run /dev/zero -o b.nc", "/dev/zero: not a sweep file: it has more than 200000000 bytes"),
-        ("$S record /dev/zero --theta 5 --mu-s 0.4", "/dev/zero: more than 200000000 bytes"),
+        ("$S simulate --record /dev/zero --theta 5 --mu-s 0.4", "/dev/zero: more than 200000000 bytes"),
         ("$S info pipe.nc", "is not a file"),
         ("$S export pipe.nc -o b.csv", "is not a file"),
         ("$S explore pipe.nc -o b.html", "is not a file"),

@@ -33,7 +33,11 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
     "run a record": (("run", "r.toml"), "m.csv", ("", ".nc")),
     "run statistics": (("run", "IN"), "s.toml", ("", ".nc")),
     "run --resume": (("run", "IN", "--resume"), "a.toml", ("", ".nc")),
-    "record": (("record", "IN", "--theta", "5", "--mu-s", "0.4", "--units", "g"), "m.csv", ("", ".nc")),
+    "simulate a record": (
+        ("simulate", "--record", "IN", "--theta", "5", "--mu-s", "0.4", "--units", "g"),
+        "m.csv",
+        (".nc", ".csv", ".png"),
+    ),
     "export": (("export", "IN"), "a.nc", (".csv", ".parquet")),
     "explore": (("explore", "IN"), "a.nc", ("", ".html")),
     "chart": (("chart", "IN", "--kind", "contours"), "a.nc", (".png", ".svg", ".pdf")),

@@ -1,13 +1,9 @@
 """Recorded motions: against closed forms, independent programs, the sine's own solver, and by their symmetries."""
 
-import os
-import subprocess
-import sys
 import warnings
 from collections.abc import Callable
 from functools import partial
 from math import pi, radians, tan
-from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -662,30 +658,3 @@ def test_dimensions(shaking: Record) -> None:
     one = sweep(5.0, 0.4, scale=1.5, polarity=-1, excitation=shaking, model="newmark")
     picked = result.sel(mu_s=0.4, scale=1.5, time_scale=1.0, polarity=-1, case="b")
     assert float(picked.permanent_displacement) == float(one.permanent_displacement)
-
-
-def command(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "slipsweep", *map(str, arguments)], capture_output=True, text=True, env=os.environ
-    )
-
-
-def test_command(tmp_path: Path, shaking: Record) -> None:
-    path = tmp_path / "motion.csv"
-    np.savetxt(path, np.column_stack([shaking.times, shaking.acceleration]), delimiter=",", header="s, acc (m/s2)")
-    output = tmp_path / "out.nc"
-    arguments = ("record", path, "--theta", "0:10:3", "--mu-s", "0.3,0.4", "--polarity", "both", "-o", output)
-    done = command(*arguments)
-    assert done.returncode == 0, done.stderr
-    assert "12 cells (3 theta x 2 mu_s x 2 polarity)" in done.stdout
-    with xr.open_dataset(output) as stored:
-        direct = sweep([0.0, 5.0, 10.0], [0.3, 0.4], polarity="both", excitation=shaking)
-        np.testing.assert_array_equal(stored.permanent_displacement, direct.permanent_displacement)
-        assert stored.attrs["record_units"] == "m/s2"
-        np.testing.assert_array_equal(stored.record_acceleration, shaking.acceleration)
-        assert stored.permanent_displacement.attrs["units"] == "m"
-    assert command(*arguments).returncode == 2, "an output that exists is left alone"
-    wrong = command("record", path, "--theta", "0:10", "--mu-s", "0.3")
-    assert wrong.returncode == 2
-    assert "--theta 0:10: must be" in wrong.stderr
-    assert "Traceback" not in wrong.stderr

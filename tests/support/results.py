@@ -69,20 +69,34 @@ distribution = "norm"
 loc = 0.4
 scale = 0.03
 """
+RECORD = """
+[excitation]
+record = "motion.csv"
+units = "m/s2"
+[axes.theta]
+values = [5]
+[axes.mu_s]
+values = [0.4]
+[axes.scale]
+values = [1, 2]
+"""
 
 
 def made(folder: Path) -> list[Path]:
     """Write a result of every command that writes them; the first is that of `GRID`."""
     paths = []
+    motion(folder)
     for name, text in (("grid", GRID), ("cases", CASES), ("cell", CELL), ("statistics", STATISTICS)):
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
         paths.append(folder / f"{name}.nc")
         assert is_served("run", folder / f"{name}.toml", "-o", paths[-1], "-q")
     block = ["--theta", "5", "--mu-s", "0.4"]
+    (folder / "record.toml").write_text(RECORD, encoding="utf-8")
     commands: dict[str, list[object]] = {
         "limit": ["limit", paths[0], "--displacement", "50mm", "-q"],
         "history": ["simulate", *block, "--frequency", "1", "--amplitude", "4", "--points", "8", "--cycles", "2", "-q"],
-        "record": ["record", motion(folder), *block, "--scale", "1,2", "--units", "m/s2", "-q"],
+        "record": ["run", folder / "record.toml", "-q"],
+        "recorded": ["simulate", *block, "--record", folder / "motion.csv", "--units", "m/s2", "-q"],
     }
     for name, command in commands.items():
         paths.append(folder / f"{name}.nc")

@@ -26,6 +26,9 @@ SYMBOLS = {
     "delta_mu": "Δμ",
     "minimum_friction": "μmin",
     "structure_frequency": "fs",
+    "scale": "scale",
+    "time_scale": "time scale",
+    "polarity": "polarity",
 }
 
 _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
@@ -68,7 +71,9 @@ def model_text(attributes: Mapping[str, Any]) -> str:
     """The model and the shaking of a result: ``model: mendez, monotone, eq12; 10 cycles of a sine``."""
     model = MODELS.from_attributes(attributes)
     words = [model.name, *(value for value in model.options.values() if isinstance(value, str))]
-    return f"model: {', '.join(words)}; {WAVEFORMS.from_attributes(attributes)}"
+    recorded = "record" in attributes
+    shaking = f"record {plain(str(attributes['record']))}" if recorded else WAVEFORMS.from_attributes(attributes)
+    return f"model: {', '.join(words)}; {shaking}"
 
 
 def drawn_text(attributes: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import chart, explore, export, info, limit, record, run, simulate, streams
+from slipsweep.cli import chart, explore, export, info, limit, run, simulate, streams
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -32,7 +32,6 @@ app.command(epilog=export.EXAMPLE)(export.export)
 app.command(epilog=limit.EXAMPLE)(limit.limit)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 app.command(epilog=chart.EXAMPLE)(chart.chart)
-app.command(epilog=record.EXAMPLE)(record.record)
 app.command(epilog=explore.EXAMPLE)(explore.explore)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments

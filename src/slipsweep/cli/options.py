@@ -19,29 +19,42 @@ def option_name(text: str) -> str:
 
 
 def chooses(**families: Family[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the options of families, and hand it the choices made, by the names of its parameters."""
+    """Give a command the options of families, and hand it the choices made, by the names of its parameters.
+
+    Of a family whose parameter has a default there may be none: the command is handed the default then.
+    """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         def made(given: dict[str, Any], parameter: str) -> Any:
             family = families[parameter]
             name = given.pop(family.attribute)
             options = _given(given, family.options)
-            return family.made(name, options, lambda text: option_name(text.replace(family.key, family.attribute, 1)))
+            if name is None and not options:
+                return None
+            return family.made(
+                name or family.default, options, lambda text: option_name(text.replace(family.key, family.attribute, 1))
+            )
 
-        return _replaced(command, {name: _family_parameters(family) for name, family in families.items()}, made)
+        parameters = {}
+        for name, family in families.items():
+            needed = inspect.signature(command).parameters[name].default is inspect.Parameter.empty
+            parameters[name] = _family_parameters(family, family.default if needed else None)
+        return _replaced(command, parameters, made)
 
     return decorate
 
 
 def reads_record(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `Reading` in the place of its parameter `reading`, and hand it a mapping."""
+    """Give a command the options of `Reading` in the place of its parameter `reading`, and hand it those typed."""
     options = {one.name: one for one in declared(Reading)}
 
     def made(given: dict[str, Any], parameter: str) -> Any:
+        typed = _given(given, options)
         try:
-            return Reading(**_given(given, options)).options
+            Reading(**typed)
         except InputError as error:
             raise InputError(option_name(str(error))) from None
+        return typed
 
     return _replaced(command, {"reading": [_parameter(one) for one in options.values()]}, made)
 
@@ -82,13 +95,13 @@ def _replaced(
     return wrapped
 
 
-def _family_parameters(family: Family[Any]) -> list[inspect.Parameter]:
+def _family_parameters(family: Family[Any], default: str | None) -> list[inspect.Parameter]:
     """Which choice, and the options of all."""
     names = Literal[tuple(family.names)]  # type: ignore[valid-type]
-    about = typer.Option(f"--{family.attribute}", help=f"The {family.keyword}.")
-    first = inspect.Parameter(
-        family.attribute, inspect.Parameter.KEYWORD_ONLY, default=family.default, annotation=Annotated[names, about]
-    )
+    note = "" if default else f" (default: {family.default})"
+    about = typer.Option(f"--{family.attribute}", help=f"The {family.keyword}{note}.")
+    kind: Any = Annotated[names if default else names | None, about]
+    first = inspect.Parameter(family.attribute, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
     return [first, *(_parameter(one, family) for one in family.options.values())]
 
 

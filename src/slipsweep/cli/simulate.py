@@ -1,46 +1,69 @@
 """`slipsweep simulate`: one time history."""
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
-from slipsweep.cli.options import chooses
+from slipsweep.cli.options import chooses, option_name, reads_record
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
-from slipsweep.model.variables import HISTORY, VALIDITY_TEXT, FlagKind, SlidingMode, Validity, flags_of
+from slipsweep.model.variables import (
+    HISTORY,
+    RECORD_COUNTS,
+    VALIDITY_TEXT,
+    FlagKind,
+    SlidingMode,
+    Validity,
+    flags_of,
+)
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
     from slipsweep.grid.tables import Table
+    from slipsweep.motion.records import Record
 
 EXAMPLE = examples(
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8",
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o history.png -o history.csv",
     "slipsweep simulate --theta 10 --mu-s 0.5 --displacement-amplitude 0.05 --frequency 2 --model newmark",
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 --waveform triangle --ramp-in 2",
+    "slipsweep simulate --theta 5 --mu-s 0.38 --record motion.AT2 --scale 2 -o history.csv -o history.png",
 )
 
 
+@reads_record
 @chooses(excitation=WAVEFORMS, model=MODELS)
 def simulate(
     *,
     theta: Annotated[float, typer.Option(help="Plane inclination, degrees.")],
     mu_s: Annotated[float, typer.Option(help="Static friction coefficient.")],
-    frequency: Annotated[float, typer.Option(help="Excitation frequency, Hz.")],
-    amplitude: Annotated[float | None, typer.Option(help="Peak ground acceleration, m/s².")] = None,
+    frequency: Annotated[float | None, typer.Option(help="Excitation frequency, Hz; not with a record.")] = None,
+    amplitude: Annotated[
+        float | None, typer.Option(help="Peak ground acceleration, m/s²; a record is scaled to it.")
+    ] = None,
     displacement_amplitude: Annotated[
-        float | None, typer.Option(help="Peak ground displacement, m, instead of the acceleration.")
+        float | None, typer.Option(help="Peak ground displacement, m, instead of the acceleration; not with a record.")
     ] = None,
     output: Annotated[
         list[Path] | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .csv, .png, .svg or .pdf; may be repeated."),
     ] = None,
     overwrite: Overwrite = False,
-    excitation: Waveform,
+    excitation: Waveform | None = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A recorded motion: CSV (time, acceleration), PEER AT2, COSMOS or ESM text."),
+    ] = None,
+    reading: Mapping[str, Any],
+    scale: Annotated[float | None, typer.Option(help="Factor on a record's acceleration (default: 1).")] = None,
+    time_scale: Annotated[float | None, typer.Option(help="Factor on a record's time (default: 1).")] = None,
+    polarity: Annotated[
+        Literal["1", "-1"] | None, typer.Option(help="Sign that a record is taken with (default: 1).")
+    ] = None,
     yield_acceleration: Annotated[
         float | None, typer.Option(help="Yield acceleration, m/s² (default: Coulomb's).")
     ] = None,
@@ -51,11 +74,14 @@ def simulate(
         float | None, typer.Option(help="Natural frequency of the structure, Hz, for the flexible_block flag.")
     ] = None,
     model: Model,
-    points: Annotated[int, typer.Option(min=4, help="Points in time per cycle.")] = 512,
+    points: Annotated[
+        int | None,
+        typer.Option(min=4, help="Points in time per cycle (default: 512); of a record, its samples are the points."),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    writers: dict[str, Callable[[Table, Path, bool], None]] = {
+    writers: dict[str, Callable[[Table, Path, bool, Waveform | Record], None]] = {
         ".nc": _write_netcdf,
         ".csv": _write_csv,
         **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
@@ -65,17 +91,22 @@ def simulate(
         if path.suffix not in writers:
             raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
 
+    motion = _motion(record, reading, excitation)
+
     from slipsweep.files import outputs
     from slipsweep.studies.history import history_table
 
-    outputs.check_outputs(paths, overwrite, reads=())
+    outputs.check_outputs(paths, overwrite, reads=[record] if record else ())
     table = history_table(
         theta=theta,
         mu_s=mu_s,
         amplitude=amplitude,
         displacement_amplitude=displacement_amplitude,
         frequency=frequency,
-        excitation=excitation,
+        excitation=motion,
+        scale=scale,
+        time_scale=time_scale,
+        polarity=None if polarity is None else int(polarity),
         yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
@@ -85,12 +116,16 @@ def simulate(
         points_per_cycle=points,
     )
     for path in paths:
-        writers[path.suffix](table, path, overwrite)
+        writers[path.suffix](table, path, overwrite, motion)
     if quiet:
         return
     typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
-    typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
+    if "sliding_mode" in table:
+        typer.echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
+    for name in RECORD_COUNTS:
+        if name in table:
+            typer.echo(f"{name.replace('_', ' '):<24}{table[name].item()}")
     for kind in FlagKind:
         for flag in Validity(table["validity"].item()) & flags_of(kind):
             typer.echo(f"{kind:<24}{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
@@ -98,7 +133,20 @@ def simulate(
         typer.echo(path)
 
 
-def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
+def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":
+    """The motion of the plane that the options name."""
+    if record is None:
+        for name in reading:
+            raise InputError(f"{option_name(name)}: only with --record, the file of a recorded motion")
+        return waveform or WAVEFORMS.of(WAVEFORMS.default)
+    if waveform is not None:
+        raise InputError(f"--waveform {waveform.name}: not allowed with --record, which is the shaking itself")
+    from slipsweep.motion.records import read_record
+
+    return read_record(record, **reading)
+
+
+def _write_netcdf(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import netcdf
 
     netcdf.write_table(
@@ -107,10 +155,11 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool) -> None:
         title="Time history of a sliding block",
         command=typed_command(),
         overwrite=overwrite,
+        record=None if isinstance(motion, Waveform) else motion,
     )
 
 
-def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
+def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import outputs
 
     columns = {name: table[name] for name in ("time", *HISTORY)}
@@ -123,7 +172,7 @@ def _write_csv(table: "Table", path: Path, overwrite: bool) -> None:
         writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
 
 
-def _write_figure(table: "Table", path: Path, overwrite: bool) -> None:
+def _write_figure(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.charts import figures
     from slipsweep.files import outputs
 

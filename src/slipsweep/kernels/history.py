@@ -11,10 +11,11 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle
-from slipsweep.kernels.block import Block, Options, block_at, response
+from slipsweep.kernels.block import Block, Options, block_at, cell_of, response
 from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, Room
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
 from slipsweep.kernels.pulse import STATE_ROWS, beginning, first_pulse
+from slipsweep.kernels.record import block_in_pulse, end_of_following, one_pulse, slides_on
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP
 from slipsweep.motion.pieces import BEGIN, END, FINISH, START, Wave
@@ -71,13 +72,52 @@ def sample_leg(
 
 
 @scalar
-def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
-    """Fill Ü, V and W of a stick-slip (or Newmark) block at increasing phases φ."""
+def history_room(wave: Wave) -> Room:
+    """Room with a record of as many legs as a pulse may have."""
     longest = 0
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
     legs = np.zeros((longest * MOST_LEGS + wave.pieces.shape[0] + 2, LEG_COLUMNS))
-    room = Room(np.zeros(STATE_ROWS), legs, np.zeros((2, 0)))
+    return Room(np.zeros(STATE_ROWS), legs, np.zeros((2, MOST_LEGS)))
+
+
+@scalar
+def begins_at(block: Block, wave: Wave, k: int) -> float:
+    """The table's phase at which the pulse of stretch k begins; infinite past the last."""
+    if k >= wave.height.size:
+        return math.inf
+    p, tau = beginning(block, wave, k)
+    return phase_at(wave.pieces, p, tau)
+
+
+@scalar
+def sample_pulse(
+    block: Block, wave: Wave, legs: np.ndarray, start: float, until: float, offset: float, displacement: float,
+    gained: float, phases: np.ndarray, at: int, history: np.ndarray,
+) -> int:  # fmt: skip
+    """Fill Ü, V and W up to phase `until`, from the legs of a pulse that begins at `start`; the first sample beyond.
+
+    W is `displacement` before the pulse and `gained` more after it; phases of the table are less by `offset`.
+    """
+    row = 1
+    while at < phases.size and phases[at] < until:
+        phi = phases[at] - offset
+        while row <= legs[0, 0] and phi >= legs[row, 4]:
+            row += 1
+        moved = 0.0
+        if phases[at] >= start:
+            moved = gained if row > legs[0, 0] else legs[row, 7]
+        history[at, DISPLACEMENT] = displacement + moved
+        if row <= legs[0, 0] and phi >= legs[row, 3]:
+            sample_leg(block, wave, legs, row, phi, history[at], displacement)
+        at += 1
+    return at
+
+
+@scalar
+def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
+    """Fill Ü, V and W of a stick-slip (or Newmark) block at increasing phases φ."""
+    room = history_room(wave)
     at, velocity, displacement = 0, 0.0, 0.0
     k, repeat = first_pulse(block, wave, 0), 0
     stretches = wave.height.size
@@ -85,26 +125,12 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         # the plain cycle of the table comes again and again
         again = first_pulse(block, wave, k + 1)
         offset = 2.0 * math.pi * repeat
-        legs[0, 0] = 0.0
-        p, tau = beginning(block, wave, k)
-        start = phase_at(wave.pieces, p, tau) + offset
+        room.legs[0, 0] = 0.0
+        start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, again) + offset
         now = cycle.follow_pulse(block, options, wave, room, k, again, velocity)
-        until = math.inf
-        if again < stretches:
-            p, tau = beginning(block, wave, again)
-            until = phase_at(wave.pieces, p, tau) + offset
-        row = 1
-        while at < phases.size and phases[at] < until:
-            phi = phases[at] - offset
-            while row <= legs[0, 0] and phi >= legs[row, 4]:
-                row += 1
-            moved = 0.0
-            if phases[at] >= start:
-                moved = now.displacement if row > legs[0, 0] else legs[row, 7]
-            history[at, DISPLACEMENT] = displacement + moved
-            if row <= legs[0, 0] and phi >= legs[row, 3]:
-                sample_leg(block, wave, legs, row, phi, history[at], displacement)
-            at += 1
+        at = sample_pulse(
+            block, wave, room.legs, start, until, offset, displacement, now.displacement, phases, at, history
+        )
         velocity = now.velocity
         displacement += now.displacement
         if again < stretches and repeat < wave.repeats - 1 and wave.stretch[again, 0] >= wave.cycle[wave.lead + 1]:
@@ -116,37 +142,129 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
 
 
 @scalar
+def sample_following(
+    block: Block, wave: Wave, p: int, tau: float, until: int, tau_until: float, offset: float, moving: np.ndarray,
+    phases: np.ndarray, at: int, history: np.ndarray,
+) -> int:  # fmt: skip
+    """Fill Ü, V and W under Eq. 4 from τ on piece p to `tau_until` on piece `until`; the first sample beyond.
+
+    `moving` has V and W before, and then after; phases of the table are less by `offset`.
+    """
+    for q in range(p, min(until + 1, wave.pieces.shape[0])):
+        start = tau if q == p else wave.pieces[q, BEGIN]
+        end, end_phase = wave.pieces[q, FINISH], wave.pieces[q, END]
+        if q == until:
+            end, end_phase = tau_until, phase_at(wave.pieces, q, tau_until)
+        if end <= start:
+            continue
+        start_phase = phase_at(wave.pieces, q, start) + offset
+        while at < phases.size and phases[at] < end_phase + offset:
+            since = max(phases[at] - start_phase, 0.0)
+            gained, moved = cycle.eq4_integrals(block, wave.pieces, q, start, min(start + since, end))
+            history[at, BLOCK] = response(block, history[at, GROUND])
+            history[at, VELOCITY] = moving[0] + gained
+            history[at, DISPLACEMENT] = moving[1] + moving[0] * since + moved
+            at += 1
+        gained, moved = cycle.eq4_integrals(block, wave.pieces, q, start, end)
+        moving[1] += moving[0] * (end - start) + moved
+        moving[0] += gained
+    return at
+
+
+@scalar
 def continuous_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
     """Fill Ü, V and W of a continuously sliding block at increasing phases φ, piece by piece."""
     k = first_pulse(block, wave, 0)
     if k == wave.height.size:
         return
     first, began = beginning(block, wave, k)
-    at, velocity, displacement = 0, 0.0, 0.0
+    at, moving = 0, np.zeros(2)
     while at < phases.size and phases[at] < phase_at(wave.pieces, first, began):
         at += 1
     for n in range(options.cycles):
         c = table_cycle(wave, n)
-        offset = 2.0 * math.pi * (n - c)
-        for p in range(max(wave.cycle[c], first), wave.cycle[c + 1]):
-            start = began if p == first and n == c else wave.pieces[p, BEGIN]
-            start_phase = phase_at(wave.pieces, p, start) + offset
-            while at < phases.size and phases[at] < wave.pieces[p, END] + offset:
-                since = max(phases[at] - start_phase, 0.0)
-                gained, moved = cycle.eq4_integrals(
-                    block, wave.pieces, p, start, min(start + since, wave.pieces[p, FINISH])
-                )
-                history[at, BLOCK] = response(block, history[at, GROUND])
-                history[at, VELOCITY] = velocity + gained
-                history[at, DISPLACEMENT] = displacement + velocity * since + moved
-                at += 1
-            gained, moved = cycle.eq4_integrals(block, wave.pieces, p, start, wave.pieces[p, FINISH])
-            displacement += velocity * (wave.pieces[p, FINISH] - start) + moved
-            velocity += gained
+        p, until = max(wave.cycle[c], first), wave.cycle[c + 1]
+        if p < until:
+            tau = began if p == first and n == c else wave.pieces[p, BEGIN]
+            tau_until = wave.pieces[until, BEGIN] if until < wave.pieces.shape[0] else 0.0
+            offset = 2.0 * math.pi * (n - c)
+            at = sample_following(block, wave, p, tau, until, tau_until, offset, moving, phases, at, history)
         if c == wave.lead:
             first = 0 if wave.cycle[c] == 0 else min(first, wave.cycle[c])
     for rest in range(at, phases.size):
-        history[rest, VELOCITY], history[rest, DISPLACEMENT] = velocity, displacement
+        history[rest, VELOCITY], history[rest, DISPLACEMENT] = moving[0], moving[1]
+
+
+@scalar
+def sample_continuous_pulse(
+    block: Block, wave: Wave, k: int, following: int, peak: float, moving: np.ndarray, times: np.ndarray, at: int,
+    history: np.ndarray,
+) -> int:  # fmt: skip
+    """Fill Ü, v and u of a continuous pulse of a record (`record.continuous_pulse`); the first sample beyond.
+
+    `moving` has v and u before it.
+    """
+    p, tau = beginning(block, wave, k)
+    until, tau_until, ends, begins = end_of_following(block, wave, k, following)
+    while at < times.size and times[at] < phase_at(wave.pieces, p, tau):
+        at += 1
+    at = sample_following(block, wave, p, tau, until, tau_until, 0.0, moving, times, at, history)
+    held, speed, side = response(block, peak), abs(moving[0]), math.copysign(1.0, moving[0])
+    while at < times.size and times[at] < begins:
+        since = max(times[at] - ends, 0.0)
+        left = eq.attenuated_velocity(speed, held, since)
+        history[at, BLOCK] += side * held if left > 0.0 else 0.0
+        history[at, VELOCITY] = side * left
+        history[at, DISPLACEMENT] = moving[1] + side * eq.attenuated_displacement(speed, held, since)
+        at += 1
+    return at
+
+
+@scalar
+def recorded_ground(wave: Wave, scale: float, times: np.ndarray, history: np.ndarray) -> None:
+    """Fill the plane's acceleration under a record; at a jump, the value after it."""
+    p, pieces = 0, wave.pieces.shape[0]
+    for at in range(times.size):
+        while p < pieces and wave.pieces[p, END] <= times[at]:
+            p += 1
+        if p < pieces and times[at] >= wave.pieces[p, START]:
+            tau = wave.pieces[p, BEGIN] + (times[at] - wave.pieces[p, START])
+            history[at, GROUND] = plane(wave.pieces, p, scale, min(tau, wave.pieces[p, FINISH]))
+
+
+def _record_history(cells: np.ndarray, options: Options, wave: Wave, times: np.ndarray, history: np.ndarray) -> None:
+    cell = cell_of(cells, 0)
+    history[:] = 0.0
+    recorded_ground(wave, cell.amplitude, times, history)
+    history[:, BLOCK] = history[:, GROUND]
+    block, room, moving = block_in_pulse(cell, options, cell.amplitude * wave.highest), history_room(wave), np.zeros(2)
+    at, velocity, displacement = 0, 0.0, 0.0
+    k = first_pulse(block, wave, 0)
+    while at < times.size and k < wave.height.size:
+        following, peak = first_pulse(block, wave, k + 1), cell.amplitude * wave.height[k]
+        block = block_in_pulse(cell, options, peak)
+        room.legs[0, 0] = 0.0
+        now = one_pulse(block, options, wave, k, following, peak, velocity, room)
+        if slides_on(block, peak):
+            moving[0], moving[1] = velocity, displacement
+            at = sample_continuous_pulse(block, wave, k, following, peak, moving, times, at, history)
+        else:
+            start, until = begins_at(block, wave, k), begins_at(block, wave, following)
+            at = sample_pulse(
+                block, wave, room.legs, start, until, 0.0, displacement, now.displacement, times, at, history
+            )
+        velocity, displacement = now.velocity, displacement + now.displacement
+        k = following
+    fill_friction(block, history)
+
+
+@scalar
+def fill_friction(block: Block, history: np.ndarray) -> None:
+    """Fill what Eq. 1 gives for the accelerations of plane and block."""
+    for at in range(history.shape[0]):
+        history[at, FRICTION] = eq.mobilised_friction(
+            history[at, GROUND], history[at, BLOCK], block.mu_s, block.tan_theta, block.g
+        )
 
 
 def _history(cells: np.ndarray, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
@@ -158,11 +276,10 @@ def _history(cells: np.ndarray, options: Options, wave: Wave, phases: np.ndarray
         continuous_history(block, options, wave, phases, history)
     elif block.sliding_mode == STICK_SLIP:
         stick_slip_history(block, options, wave, phases, history)
-    for at in range(phases.size):
-        history[at, FRICTION] = eq.mobilised_friction(
-            history[at, GROUND], history[at, BLOCK], block.mu_s, block.tan_theta, block.g
-        )
+    fill_friction(block, history)
 
 
-#: Fills rows of ground and block acceleration, friction, V and W for one cell at increasing phases.
+#: Fill rows of ground and block acceleration, friction, V and W for one cell: at increasing phases of a waveform, and
+#: at increasing times of a record at time scale 1.
 history = Kernel(_history)
+record_history = Kernel(_record_history)

@@ -82,16 +82,18 @@ def half_wave_after(wave: Wave, k: int) -> int:
 
 
 @scalar
-def continuous_pulse(
-    block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float, room: Room
-) -> Pulse:
-    """A continuous pulse, of that `peak`, from Üg = Üy in stretch k to the pulse of the `following` one.
+def slides_on(block: Block, peak: float) -> bool:
+    """Whether the block slides continuously in a pulse of that peak.
 
-    Eq. 4 holds through the negative half wave and, if the pulse follows at once, up to it; else Eq. 12
-    takes V, of either sign, to zero from there on.
+    Not its own mode, which is missing where the harmonic motion of that peak would uplift.
     """
+    return block.rise != NEWMARK and peak > block.limiting_acceleration
+
+
+@scalar
+def end_of_following(block: Block, wave: Wave, k: int, following: int) -> tuple[int, float, float, float]:
+    """Where Eq. 4 ends of a continuous pulse in stretch k: a piece, τ on it, its phase; and that of the next pulse."""
     pieces, last = wave.pieces.shape[0], following >= wave.height.size
-    p, tau = beginning(block, wave, k)
     until = half_wave_after(wave, k)
     tau_until, ends = 0.0, wave.pieces[pieces - 1, END]
     if until < pieces:
@@ -103,6 +105,20 @@ def continuous_pulse(
         begins = phase_at(wave.pieces, next_p, next_tau)
         if following == k + 1 and wave.stretch[following, 0] == until:
             until, tau_until, ends = next_p, next_tau, begins
+    return until, tau_until, ends, begins
+
+
+@scalar
+def continuous_pulse(
+    block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float, room: Room
+) -> Pulse:
+    """A continuous pulse, of that `peak`, from Üg = Üy in stretch k to the pulse of the `following` one.
+
+    Eq. 4 holds through the negative half wave and, if the pulse follows at once, up to it; else Eq. 12
+    takes V, of either sign, to zero from there on.
+    """
+    p, tau = beginning(block, wave, k)
+    until, tau_until, ends, begins = end_of_following(block, wave, k, following)
     gained, moved, most = follow_through(block, wave, p, tau, until, tau_until, options.wants_peak, room.zeros)
     state = room.state
     state[VELOCITY] = velocity + gained
@@ -111,6 +127,17 @@ def continuous_pulse(
     if begins > ends:
         attenuate(state, begins - ends)
     return Pulse(state[VELOCITY], state[DISPLACEMENT], velocity + most, 0.0, 0.0, 0)
+
+
+@scalar
+def one_pulse(
+    block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float, room: Room
+) -> Pulse:
+    """A pulse, in the mode of its `peak`, from Üg = Üy in stretch k to the pulse of the `following` one."""
+    if slides_on(block, peak):
+        return continuous_pulse(block, options, wave, k, following, peak, velocity, room)
+    # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
+    return pulse(block, options, wave, room.legs, k, following, max(velocity, 0.0), room.state)
 
 
 @scalar
@@ -133,25 +160,22 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
         following, peak = first_pulse(block, wave, k + 1), scale * wave.height[k]
         block = block_in_pulse(cell, options, peak)
         validity |= block.validity & FRICTION_NOT_DECAYING
-        # not the block's own mode, which is missing where the harmonic motion of that peak would uplift
-        slides_on = peak > block.limiting_acceleration
+        continues = slides_on(block, peak)
         remarks = remarks_on(cell, block.acceleration_ratio)
-        if not slides_on and stays_below_yield(block, block.yield_acceleration, peak):
+        if not continues and stays_below_yield(block, block.yield_acceleration, peak):
             remarks = YIELD_GOVERNS | (remarks & ~FRICTION_ESTIMATED)
         validity |= remarks
-        if not slides_on and block.rise == LITERAL and response(block, peak) <= 0.0:
+        if not continues and block.rise == LITERAL and response(block, peak) <= 0.0:
             validity |= KD_NOT_POSITIVE
         if validity & NO_VALUE:
             break
-        if slides_on:
+        now = one_pulse(block, options, wave, k, following, peak, velocity, room)
+        if continues:
             continuous += 1
             if velocity == 0.0:
                 room.state[SLIPS] += 1.0
-            now = continuous_pulse(block, options, wave, k, following, peak, velocity, room)
         else:
             stick_slips += 1
-            # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
-            now = pulse(block, options, wave, room.legs, k, following, max(velocity, 0.0), room.state)
             # of a record there is a value if b > 0 at the end of the last rise
             validity |= now.validity if math.isnan(now.displacement) else 0
             if now.velocity > 0.0 and following < wave.height.size:

@@ -157,11 +157,14 @@ def simulate(
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
-    excitation: Waveform | str = "sine",
+    excitation: Waveform | Record | str = "sine",
     model: Model | str = "mendez",
     times: Sequence[float] | np.ndarray | None = None,
-    points_per_cycle: int = 512,
+    points_per_cycle: int | None = None,
     displacement_amplitude: float | None = None,
+    scale: float | None = None,
+    time_scale: float | None = None,
+    polarity: int | None = None,
     yield_acceleration: float | None = None,
     decay_rate: float | None = None,
     delta_mu: float | None = None,
@@ -175,19 +178,20 @@ def simulate(
     theta, mu_s, amplitude, frequency : float
         One case; these and the remaining parameters as in `slipsweep.sweep`.
     times : array, optional
-        Times to sample, s, increasing and not negative; by default `points_per_cycle` a
-        cycle, from 0 to the end of the shaking, or until the block has come to rest if later.  A
-        slide that lasts for more than 100 cycles after the shaking has as many points as 100
-        cycles have, evenly spaced from there on.
-    points_per_cycle : int
-        Samples a cycle where `times` is not given.
+        Times to sample, s, increasing, and not negative under a waveform; by default `points_per_cycle` a
+        cycle, from 0 to the end of the shaking, or the times of a record's samples; and on until the block has
+        come to rest, if that is later.  A slide that lasts long after the shaking has as many points as 100 cycles
+        have (after a record 20 000, or as many as it has samples), evenly spaced.
+    points_per_cycle : int, optional
+        Samples a cycle where `times` is not given, 512 by default; not with a record.
 
     Returns
     -------
     Dataset
         Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²),
         `friction_coefficient` (what Eq. 1 gives for the two), `relative_velocity` (m/s)
-        and `relative_displacement` (m); and the results of `sweep` for the case.  NaN where
+        and `relative_displacement` (m); and the results of `sweep` for the case.  Where the plane's acceleration
+        jumps, as at the end of a record, the values are those after the jump.  NaN where
         the case has no value (`validity`).
 
     Raises

@@ -1,89 +1,166 @@
 """One time history, exact: the cycle solver's legs sampled on any time grid."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
+from slipsweep.grid.engine import Problem, Request
 from slipsweep.grid.plans import check_problem, plan_sweep
 from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
-from slipsweep.kernels.history import history
+from slipsweep.kernels.history import history, record_history
 from slipsweep.model.parameters import MOST_POINTS, check_numbers, check_whole, number_text
-from slipsweep.model.variables import HISTORY, PARAMETERS, VALUELESS
-from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.model.variables import HISTORY, VALUELESS, SlidingMode
+from slipsweep.motion.cutting import wave_of, wave_of_record
+from slipsweep.motion.records import Record
+
+Floats = NDArray[np.float64]
+
+#: Points a cycle where none are asked for.
+POINTS_PER_CYCLE = 512
 
 #: Cycles after the shaking that have as many points each as one of the shaking; longer slides have no more points.
 _CYCLES_BEYOND = 100
 
+#: Points after a record at its mean interval; longer slides have no more.
+_POINTS_BEYOND = 20_000
+
 
 def history_table(
-    *, times: Any = None, points_per_cycle: int = 512, excitation: Any = "sine", model: Any = "mendez", **given: Any
+    *,
+    times: Any = None,
+    points_per_cycle: int | None = None,
+    excitation: Any = "sine",
+    model: Any = "mendez",
+    **given: Any,
 ) -> Table:
     """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
-    motion = WAVEFORMS.of(excitation)
-    problem = check_problem(motion, model, "cycle")
-    for name in PARAMETERS:
-        value = given.get(name)
-        if value is not None and check_numbers(name, value.values if isinstance(value, Variable) else value).ndim:
+    problem = check_problem(excitation, model, "cycle")
+    if points_per_cycle is not None and isinstance(problem.excitation, Record):
+        raise InputError("points_per_cycle: not allowed with a Record, whose samples are the points; give times")
+    plan = plan_sweep(**given, excitation=problem.excitation, model=problem.model)
+    for name, variable in plan.coords.items():
+        if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    summary = plan_sweep(**given, excitation=motion, model=problem.model).solve()
-    own = {name: variable.values for name, variable in summary.coords.items()}
-    omega = 2.0 * math.pi * float(own["frequency"])
-    cells = np.repeat([float(values) for values in engine.cell_inputs(own, 0)], TILE)
-    wave = wave_of(motion)
-    valueless = int(summary["validity"].item()) & VALUELESS
-
-    def sampled(phases: np.ndarray) -> np.ndarray:
-        table = np.empty((phases.size, len(HISTORY)))
-        history(cells, problem.options(True), wave, phases, table)
-        if valueless:  # from the beginning on, also where the flag is raised later
-            table[:, 1:] = math.nan
-        return table
-
+    summary = plan.solve()
+    one = _History(problem, {name: variable.values for name, variable in summary.coords.items()}, summary)
     if times is None:
-        points = check_whole("points_per_cycle", points_per_cycle, 4, MOST_POINTS)
-        last = sampled(np.array([2.0 * math.pi * motion.cycles]))[0]
-        # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
-        braking = last[1] - last[0]
-        with np.errstate(divide="ignore", over="ignore"):
-            after = last[3] / braking if summary["sliding_mode"].item() == 1 and last[3] > 0.0 else 0.0
-        phases = _phases(points, motion.cycles, float(after))
-        grid = phases / omega
+        points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
+        points = check_whole("points_per_cycle", points, 4, MOST_POINTS)
+        phases = one.points(points)
+        grid = phases * one.unit
     else:
-        grid = np.atleast_1d(check_numbers("times", times))
-        if grid.ndim != 1 or not np.isfinite(grid).all() or (grid < 0.0).any() or (np.diff(grid) <= 0.0).any():
-            raise InputError("times: must be one row of finite, increasing numbers >= 0")
+        grid = _checked(times, least=-math.inf if isinstance(problem.excitation, Record) else 0.0)
         with np.errstate(over="ignore"):
-            phases = grid * omega
-        if not np.isfinite(phases[-1:]).all():
+            phases = grid / one.unit
+        if not np.isfinite(phases[[0, -1]]).all():
             raise InputError(f"times = ..., {number_text(float(grid[-1]))}: too many cycles for double precision")
-    table = sampled(phases)
-    with np.errstate(over="ignore"):
-        table[:, 3] /= omega
-        table[:, 4] /= omega * omega
-    if not valueless:
-        moved = {name: table[:, at] for at, name in enumerate(HISTORY)}
-        check_served(problem.model.g, own, moved, np.zeros(len(table), np.int16))
-    columns = {
-        name: Variable(("time",), np.ascontiguousarray(column), attributes)
-        for (name, attributes), column in zip(HISTORY.items(), table.T, strict=True)
-    }
-    time = Variable(("time",), grid, {"units": "s", "long_name": "time"})
+    columns = one.columns(phases)
     return Table(
-        {**summary.coords, "time": time},
+        {**summary.coords, "time": Variable(("time",), grid, {"units": "s", "long_name": "time"})},
         columns | summary.data_vars,
         summary.attrs | {"title": "Time history of a rigid block"},
     )
 
 
-def _phases(points: int, cycles: int, after: float) -> np.ndarray:
-    """Phases of so many points a cycle, to the end of the shaking and, `after` it (rad), to the end of the slide.
+def _checked(times: Any, least: float) -> Floats:
+    """Times that a caller gives."""
+    grid = np.atleast_1d(check_numbers("times", times))
+    increasing = grid.ndim == 1 and np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()
+    if not increasing or (grid < least).any():
+        bound = " >= 0" if least == 0.0 else ""
+        raise InputError(f"times: must be one row of finite, increasing numbers{bound}")
+    return grid
+
+
+@dataclass(frozen=True)
+class _History:
+    """One case, and its results as a sweep gives them.
+
+    Phases are ωt; under a record the times at time scale 1 stand in their place.
+    """
+
+    problem: Problem
+    inputs: Mapping[str, Floats]
+    summary: Table
+
+    @property
+    def unit(self) -> float:
+        """Seconds that a phase takes: 1/ω, or the factor on the time of a record."""
+        return float(engine.kernel_inputs(self._asked)[1])
+
+    @property
+    def _asked(self) -> Request:
+        return Request(self.problem, (), self.inputs, ())
+
+    @property
+    def _valueless(self) -> int:
+        return int(self.summary["validity"].item()) & VALUELESS
+
+    def sampled(self, phases: Floats) -> Floats:
+        """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
+        motion, options = self.problem.excitation, self.problem.options(True)
+        cells = np.repeat([float(values) for values in engine.kernel_inputs(self._asked)[0]], TILE)
+        table = np.empty((phases.size, len(HISTORY)))
+        if isinstance(motion, Record):
+            wave = wave_of_record(motion, float(self.inputs["polarity"]))
+            record_history(cells, options, wave, phases, table)
+        else:
+            history(cells, options, wave_of(motion), phases, table)
+        if self._valueless:  # from the beginning on, also where the flag is raised later
+            table[:, 1:] = math.nan
+        return table
+
+    def columns(self, phases: Floats) -> dict[str, Variable]:
+        """The variables of a history."""
+        table, unit = self.sampled(phases), self.unit
+        with np.errstate(over="ignore"):
+            table[:, 3] *= unit
+            table[:, 4] *= unit * unit
+        if not self._valueless:
+            moved = {name: table[:, at] for at, name in enumerate(HISTORY)}
+            check_served(self.problem.model.g, self.inputs, moved, np.zeros(len(table), np.int16))
+        return {
+            name: Variable(("time",), np.ascontiguousarray(column), attributes)
+            for (name, attributes), column in zip(HISTORY.items(), table.T, strict=True)
+        }
+
+    def points(self, points_per_cycle: int) -> Floats:
+        """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
+        motion = self.problem.excitation
+        if isinstance(motion, Record):
+            step = float(motion.times[-1] - motion.times[0]) / (motion.times.size - 1)
+            _check_memory(motion.times.size + _POINTS_BEYOND)
+            return _to_the_end(motion.times, step, max(_POINTS_BEYOND, motion.times.size), self._runs_on())
+        step, shaken = 2.0 * math.pi / points_per_cycle, points_per_cycle * motion.cycles
+        _check_memory(shaken + _CYCLES_BEYOND * points_per_cycle)
+        return _to_the_end(
+            step * np.arange(shaken + 1, dtype=np.float64), step, _CYCLES_BEYOND * points_per_cycle, self._runs_on()
+        )
+
+    def _runs_on(self) -> float:
+        """How long the block slides on after the shaking."""
+        motion = self.problem.excitation
+        slides = isinstance(motion, Record) or self.summary["sliding_mode"].item() == SlidingMode.STICK_SLIP
+        if not slides or self._valueless:
+            return 0.0
+        end = motion.times[-1] if isinstance(motion, Record) else 2.0 * math.pi * motion.cycles
+        ground, block, _, velocity, _ = self.sampled(np.array([end]))[0]
+        # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
+        with np.errstate(divide="ignore", over="ignore"):
+            return float(velocity / (block - ground)) if velocity != 0.0 else 0.0
+
+
+def _to_the_end(shaken: Floats, step: float, most: int, after: float) -> Floats:
+    """Phases of the shaking, and others a `step` apart, `most` of them, to the end of the slide `after` it.
 
     A slide that brakes by 1e-7 m/s² lasts for months.  Under a constant deceleration few points tell
     all: they are spaced further apart then.
@@ -93,14 +170,13 @@ def _phases(points: int, cycles: int, after: float) -> np.ndarray:
             "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
             "larger yield_acceleration"
         )
-    step, shaken = 2.0 * math.pi / points, points * cycles
-    beyond = math.ceil(min(after, 2.0 * math.pi * _CYCLES_BEYOND) / step)
-    _check_memory(shaken + beyond)
-    if after <= 2.0 * math.pi * _CYCLES_BEYOND:
-        return np.arange(shaken + beyond + 1) * step
-    # a hair further than the end, which is rounded
-    rest = np.linspace(0.0, after * (1.0 + 1e-12), beyond + 1)[1:]
-    return np.concatenate([np.arange(shaken + 1) * step, shaken * step + rest])
+    beyond = math.ceil(min(after, most * step) / step)
+    if after <= most * step:
+        rest = np.arange(1, beyond + 1) * step
+    else:
+        # a hair further than the end, which is rounded
+        rest = np.linspace(0.0, after * (1.0 + 1e-12), beyond + 1)[1:]
+    return np.concatenate([shaken, shaken[-1] + rest])
 
 
 def _check_memory(samples: int) -> None:

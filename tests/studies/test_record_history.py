@@ -1,0 +1,211 @@
+"""Time histories under a record: what they must have in common with a sweep, with a waveform, and with mechanics."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import slipsweep
+from slipsweep import InputError, Mendez, Record, Triangle, read_record, simulate, sweep
+from slipsweep.model.variables import HISTORY, RECORD_RESULTS
+from tests.support.processes import slipsweep as command
+
+SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
+
+MODELS: dict[str, Any] = {
+    "mendez": "mendez",
+    "literal": Mendez(rise="literal"),
+    "integrate": Mendez(recoupling="integrate"),
+    "newmark": "newmark",
+}
+
+
+@pytest.fixture(scope="module")
+def shaking() -> Record:
+    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
+    rng = np.random.default_rng(7)
+    times = np.arange(0.0, 20.0, 0.01)
+    phases = rng.uniform(0, 2 * np.pi, 60)
+    bands = np.sin(2 * np.pi * np.linspace(0.3, 9.0, 60)[:, None] * times + phases[:, None]).sum(0)
+    wave = bands * (times / 4) ** 2 * np.exp(-times / 2.5)
+    return Record(times, 6.0 * wave / np.abs(wave).max())
+
+
+def case_of(seed: int) -> dict[str, Any]:
+    """A case of any kind, by its number."""
+    rng = np.random.default_rng(seed)
+    given: dict[str, Any] = {
+        "theta": rng.uniform(0, 15),
+        "mu_s": rng.uniform(0.3, 0.8),
+        "scale": rng.uniform(0.3, 3),
+        "time_scale": rng.uniform(0.3, 3),
+        "polarity": int(rng.choice([1, -1])),
+        "model": MODELS[str(rng.choice(list(MODELS)))],
+    }
+    return given | ({"yield_acceleration": rng.uniform(0.1, 2)} if rng.random() < 0.5 else {})
+
+
+def test_a_history_ends_where_the_sweep_does(shaking: Record) -> None:
+    """At rest, with the results of the sweep to the last bit and the displacement to rounding."""
+    valued, modes = 0, set()
+    for seed in range(120):
+        given = case_of(seed)
+        found, swept = simulate(excitation=shaking, **given), sweep(excitation=shaking, **given)
+        for name in RECORD_RESULTS:
+            np.testing.assert_array_equal(found[name], swept[name])
+        if np.isnan(swept.permanent_displacement):
+            assert np.isnan(found.relative_displacement).all()
+            assert np.isfinite(found.ground_acceleration).all()
+            continue
+        valued += 1
+        modes |= {(bool(swept.stick_slip_pulses > 0), bool(swept.continuous_pulses > 0))}
+        assert found.relative_displacement.values[-1] == pytest.approx(swept.permanent_displacement.item(), rel=1e-12)
+        assert abs(found.relative_velocity.values[-1]) <= 1e-9 * swept.peak_relative_velocity.item()
+        peak, time = swept.peak_relative_velocity.item(), found.time.values
+        at = np.clip(found.relative_velocity.values.argmax(), 1, time.size - 2)
+        # everywhere, and closely where a short slide may have its peak
+        places = np.unique([*np.linspace(0.0, time[-1], 40_000), *np.linspace(time[at - 1], time[at + 1], 2_000)])
+        fine = simulate(excitation=shaking, **given, times=places)
+        assert 0.999 * peak <= fine.relative_velocity.max().item() <= peak * (1 + 1e-12)
+    assert valued > 60
+    assert modes >= {(False, False), (True, False), (True, True)}
+
+
+@pytest.mark.parametrize("seed", [3, 5, 9, 17, 40])
+def test_velocity_and_displacement_are_integrals(shaking: Record, seed: int) -> None:
+    """v̇ = Üg − Ü and u̇ = v, but for velocities upslope that a stick-slip pulse neglects."""
+    given = case_of(seed) | {"model": "newmark" if seed % 2 else Mendez(recoupling="integrate"), "scale": 2.0}
+    found = simulate(excitation=shaking, **given, times=np.linspace(0.0, 60.0, 600_001))
+    velocity, step = found.relative_velocity.values, 1e-4
+    assert velocity.max() > 0.0
+    moved = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
+    np.testing.assert_allclose(moved, found.relative_displacement, atol=1e-4 * abs(moved).max())
+    rate = (found.ground_acceleration - found.block_acceleration).values
+    gained = 0.5 * (rate[1:] + rate[:-1]) * step
+    # at an onset, a stop or a jump of the block's acceleration inside a step the two differ
+    wrong = np.abs(np.diff(velocity) - gained) > 1e-6 * velocity.max()
+    neglected = (velocity[:-1] < 0.0) & (velocity[1:] == 0.0)
+    assert (wrong & ~neglected).mean() < 1e-3
+
+
+def test_a_triangle_given_by_its_corners_moves_as_the_waveform() -> None:
+    """In stick-slip, whose rules are the same under a record."""
+    cycles, frequency = 4, 1.3
+    corners = np.array([0.0, 1.0, 0.0, -1.0])
+    times = np.arange(4 * cycles + 1) / (4 * frequency)
+    record = Record(times, 3.0 * np.append(np.tile(corners, cycles), 0.0))
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.45, "yield_acceleration": 1.1}
+    at = np.linspace(0.0, 5.0, 4001)
+    wave = simulate(**block, amplitude=3.0, frequency=frequency, excitation=Triangle(cycles=cycles), times=at)
+    assert wave.sliding_mode == slipsweep.SlidingMode.STICK_SLIP
+    own = simulate(**block, excitation=record, times=at)
+    for name in HISTORY:
+        np.testing.assert_allclose(own[name], wave[name], rtol=1e-9, atol=1e-11, err_msg=name)
+
+
+def test_time_and_sign_only_scale(shaking: Record) -> None:
+    """v ∝ time_scale, u ∝ time_scale²; a record turned and taken with the other sign is the same motion."""
+    given: dict[str, Any] = {"theta": 4.0, "mu_s": 0.4, "scale": 1.7}
+    one = simulate(excitation=shaking, **given)
+    slow = simulate(excitation=shaking, **given, time_scale=2.5)
+    np.testing.assert_allclose(slow.time, 2.5 * one.time, rtol=1e-15)
+    for name, power in zip(HISTORY, (0, 0, 0, 1, 2), strict=True):
+        np.testing.assert_allclose(slow[name], one[name] * 2.5**power, rtol=1e-14, err_msg=name)
+    turned = Record(shaking.times, -shaking.acceleration)
+    other = simulate(excitation=turned, **given, polarity=-1)
+    for name in HISTORY:
+        np.testing.assert_array_equal(other[name], one[name])
+    assert float(one.permanent_displacement) > 0.0
+
+
+def test_the_plane_moves_as_recorded(shaking: Record) -> None:
+    """Straight between the samples, and at rest before and after them."""
+    late = Record(shaking.times + 3.0, shaking.acceleration)
+    times = np.linspace(-1.0, 30.0, 12_345)
+    found = simulate(5.0, 0.4, excitation=late, amplitude=4.0, polarity=-1, times=times)
+    expected = np.interp(times, late.times, -4.0 / late.peak * late.acceleration, left=0.0, right=0.0)
+    np.testing.assert_allclose(found.ground_acceleration, expected, atol=1e-13)
+    before = times < 3.0
+    assert (found.relative_displacement.values[before] == 0.0).all()
+    # its samples are the points, where none are asked for
+    own = simulate(5.0, 0.4, excitation=late, amplitude=4.0)
+    np.testing.assert_array_equal(own.time.values[: late.times.size], late.times)
+
+
+def test_a_slide_after_the_record_has_a_bounded_number_of_points(shaking: Record) -> None:
+    half = Record(shaking.times[:900], shaking.acceleration[:900])
+    found = simulate(0.0, 0.4, excitation=half, model="newmark", yield_acceleration=1e-6)
+    assert found.time.size == 900 + 20_000
+    assert found.relative_velocity.values[-1] == 0.0
+    assert found.relative_velocity.values[-2] > 0.0
+    assert found.relative_displacement.values[-1] == pytest.approx(found.permanent_displacement.item(), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"points_per_cycle": 16}, "points_per_cycle: not allowed with a Record"),
+        ({"scale": [1.0, 2.0]}, "scale: simulate takes one case"),
+        ({"polarity": "both"}, "polarity: simulate takes one case"),
+        ({"polarity": 0}, "polarity = 0: must be 1, -1"),
+        ({"frequency": 2.0}, "frequency: not allowed with a Record"),
+        ({"amplitude": 1.0, "scale": 1.0}, "amplitude, scale: must not both be given"),
+        ({"times": [2.0, 1.0]}, "times: must be one row of finite, increasing numbers"),
+    ],
+)
+def test_refusals(shaking: Record, given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(5.0, 0.4, excitation=shaking, **given)
+
+
+# ------------------------------------------------------------------------------ command line
+
+CASE = ("simulate", "--theta", "5", "--mu-s", "0.38")
+
+
+def test_on_the_command_line(tmp_path: Path) -> None:
+    outputs = [word for name in ("h.nc", "h.csv", "h.png", "h.svg") for word in ("-o", name)]
+    done = command(
+        tmp_path, *CASE, "--record", SYNTHETIC, "--scale", "2", "--polarity", "-1", "--baseline", "linear", *outputs
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    record = read_record(SYNTHETIC, baseline="linear")
+    expected = simulate(5.0, 0.38, excitation=record, scale=2.0, polarity=-1)
+    with xr.open_dataset(tmp_path / "h.nc", mask_and_scale=False) as found:
+        for name in (*HISTORY, *RECORD_RESULTS):
+            np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+        np.testing.assert_array_equal(found.record_acceleration, record.acceleration)
+        assert found.attrs["record"] == "synthetic.csv"
+        assert found.scale.item() == 2.0
+    table = np.loadtxt(tmp_path / "h.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(table[:, 0], expected.time)
+    assert f"permanent displacement  {expected.permanent_displacement.item():.6g} m" in done.stdout
+    assert f"number of slips         {expected.number_of_slips.item()}" in done.stdout
+    told = command(tmp_path, "info", "h.nc")
+    assert (told.returncode, told.stderr) == (0, "")
+    assert "scale = 2" in (tmp_path / "h.svg").read_text() or (tmp_path / "h.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--units", "g"), "--units: only with --record"),
+        (("--record", "no.csv"), "no.csv: cannot be read"),
+        (("--record", "m.csv"), "m.csv: units: must be given"),
+        (("--record", "m.csv", "--units", "g", "--waveform", "sine"), "--waveform sine: not allowed with --record"),
+        (("--record", "m.csv", "--units", "g", "--cycles", "4"), "--waveform sine: not allowed with --record"),
+        (("--record", "m.csv", "--units", "g", "--frequency", "4"), "frequency: not allowed with a Record"),
+        (("--record", "m.csv", "--units", "g", "--points", "40"), "points_per_cycle: not allowed with a Record"),
+        (("--amplitude", "3"), "frequency: must be given"),
+        (("--amplitude", "3", "--frequency", "1", "--time-scale", "2"), "time_scale: not allowed with a waveform"),
+    ],
+)
+def test_refusals_on_the_command_line(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+    (tmp_path / "m.csv").write_text("0,0\n0.1,0.5\n0.2,-0.5\n0.3,0\n")
+    done = command(tmp_path, *CASE, *arguments, "-o", "h.nc")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "h.nc").exists()
