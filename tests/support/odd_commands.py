@@ -51,8 +51,8 @@ GOOD = [
     "chart grid.nc --kind contours --at theta=5 --at mu_s=0.3 -o new.png",
     "chart statistics.nc -k fragility -o new.svg",
     "chart grid.nc --kind families --x frequency --y amplitude --variable peak_relative_velocity -o new.pdf",
-    f"record motion.csv {_BLOCK} --scale 1,2 --units m/s2 -o new.nc",
-    f"record motion.csv {_BLOCK} --scale 0.5:2:3 --time-scale 1 --polarity both --units g --baseline mean --format csv",
+    f"simulate --record motion.csv {_BLOCK} --scale 2 --units m/s2 -o new.nc",
+    f"simulate --record motion.csv {_BLOCK} --amplitude 2 --time-scale 2 --polarity -1 --units g --format csv",
     "explore grid.nc -o new.html --size 1MB", "explore statistics.nc -o new.html",
 ]  # fmt: skip
 
