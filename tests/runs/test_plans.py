@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from slipsweep import Record
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
@@ -31,6 +32,17 @@ values = [1, 2, 4, 7, 11]
 [axes.frequency]
 values = [0.5, 1, 3]
 """
+
+#: A short recorded motion, over blocks that are zipped; its sign and its time are dimensions.
+RECORD = """
+[excitation]
+record = "short.csv"
+polarity = "both"
+[axes.time_scale]
+values = [0.5, 1, 3]
+"""
+SHORT = Record.sampled(4.0 * np.sin(np.arange(40) ** 1.2 / 2.0), 0.05, "short.csv")
+STRONG = "[axes.amplitude]\nvalues = [1, 2, 4, 7, 11]\n"
 
 #: Rows after the frequency: what a chunk of some of them gives lies in many places of the file.
 CASES = "".join(
@@ -61,6 +73,14 @@ SINGLE = f"[axes.mu_s]\nvalues = [0.4]\n{AXES}{DRAWN}[uncertainty.theta]\ndistri
 
 VARIABLES = '[output]\nvariables = ["permanent_displacement", "sliding_mode", "validity", "limiting_acceleration"]\n'
 
+BLOCKS = CASES.replace("structure_frequency = 2\n", "")
+
+
+def recorded(text: str) -> spec.SweepSpec:
+    """A sweep of the recorded motion."""
+    return spec.parse(RECORD + text, "a.toml", record=SHORT)
+
+
 PLANS: dict[str, Callable[[], Job]] = {
     "sweep": lambda: sweep_job(spec.parse(AXES + CASES + VARIABLES, "a.toml")),
     "samples": lambda: sweep_job(spec.parse((AXES + CASES + DRAWN).replace("structure_frequency = 2\n", ""), "a.toml")),
@@ -70,6 +90,8 @@ PLANS: dict[str, Callable[[], Job]] = {
     "single samples": lambda: sweep_job(spec.parse(SINGLE, "a.toml")),
     "limits": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), [0.001, 0.01, 0.1, 1.0]),
     "one limit": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), 0.02, 8.0),
+    "record": lambda: sweep_job(recorded(STRONG + BLOCKS)),
+    "limits of a record": lambda: limit_job(recorded(BLOCKS), [0.001, 0.1]),
 }
 
 

@@ -290,7 +290,7 @@ def test_a_grid_too_large_for_memory_is_refused() -> None:
 
 
 def test_other_commands_on_the_result(folder: Path) -> None:
-    """`info` and `export` know it; charts, pages and limits say that they are of harmonic motions."""
+    """`info`, `export` and `limit` know it; charts and pages say that they are of harmonic motions."""
     done = command("run", folder / "a.toml", "-o", folder / "a.nc")
     assert done.returncode == 0, done.stderr
     assert "96 cells (3 theta x 2 mu_s x 4 scale x 2 time_scale x 2 polarity)" in done.stdout
@@ -305,7 +305,6 @@ def test_other_commands_on_the_result(folder: Path) -> None:
     assert export.export(folder / "a.nc", folder / "samples.csv", variables=["record_acceleration"]) == 500
     for arguments, message in (
         (("chart", folder / "a.nc"), "is the response to a recorded motion"),
-        (("limit", folder / "a.toml", "--displacement", "0.1"), "limit looks for the amplitude of a harmonic motion"),
         (("run", folder / "a.toml", "-o", folder / "b.nc", "--solver", "step"), "--solver step: not allowed"),
     ):
         done = command(*arguments)

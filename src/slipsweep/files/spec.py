@@ -285,15 +285,11 @@ class SweepSpec:
             As `plan`; or it is no sweep of which there are limits.
         """
         with self._named():
-            if self.record is not None:
-                raise InputError(
-                    "excitation.record: limit looks for the amplitude of a harmonic motion; of a record sweep the scale"
-                )
             if self.sampling is not None:
                 raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
             from slipsweep.studies.limits import plan_limits
 
-            given = self._arguments_but("amplitude", "displacement_amplitude", "solver", "variables")
+            given = self._arguments_but("amplitude", "displacement_amplitude", "scale", "solver", "variables")
             return plan_limits(displacement=displacement, maximum_amplitude=maximum_amplitude, **given)
 
     @contextmanager

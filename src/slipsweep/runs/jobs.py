@@ -88,7 +88,7 @@ def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplit
         spec.source,
         spec.files,
         lambda: spec.limits(displacement, maximum_amplitude),
-        Head("Amplitudes at which a tolerable displacement is reached", spec.labels),
+        Head("Amplitudes at which a tolerable displacement is reached", spec.labels, spec.record),
         "float64",  # a limit is exact to the last bit
         {**_asked(spec), "--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
     )

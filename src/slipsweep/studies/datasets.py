@@ -214,10 +214,12 @@ def limit_amplitude(
     displacement: Values,
     theta: Values,
     mu_s: Values,
-    frequency: Values,
+    frequency: Values | None = None,
     *,
-    excitation: Waveform | str = "sine",
+    excitation: Waveform | Record | str = "sine",
     model: Model | str = "mendez",
+    time_scale: Values | None = None,
+    polarity: int | Sequence[int] | str | None = None,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
@@ -239,14 +241,16 @@ def limit_amplitude(
     with ``u >= displacement`` holds it.  The scan runs from the yield acceleration to
     `maximum_amplitude` in `amplitude_steps` equal ratios and has both sides of every change of
     mode seen between two of its points; a peak of u within one sliding mode narrower than a
-    step can be missed.
+    step can be missed.  Under a record the amplitude is that peak ground acceleration to which it is scaled, and the
+    scan has both sides of every amplitude at which a pulse begins to count, or changes its mode.
 
     Parameters
     ----------
     displacement : float, array or DataArray
         Tolerable permanent displacement, m, > 0.
     theta, mu_s, frequency : float, array or DataArray
-        These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".
+        These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".  A record has no frequency,
+        but a `time_scale`.
     maximum_amplitude : float, optional
         Where the search ends, m/s²; by default 5 g.
     amplitude_steps : int
@@ -263,8 +267,8 @@ def limit_amplitude(
         - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of
           itself between neighbouring numbers, with and without a change of sliding mode),
           3 after_gap (no value just below), 4 not_reached, 5 invalid (no value anywhere).
-        - `permanent_displacement`, m, and `sliding_mode` at the limit; more than
-          `displacement` where it is passed in a jump or after a gap.
+        - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
+          limit; more than `displacement` where it is passed in a jump or after a gap.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
 
     Raises
