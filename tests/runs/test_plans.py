@@ -91,6 +91,7 @@ PLANS: dict[str, Callable[[], Job]] = {
     "limits": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), [0.001, 0.01, 0.1, 1.0]),
     "one limit": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), 0.02, 8.0),
     "record": lambda: sweep_job(recorded(STRONG + BLOCKS)),
+    "samples of a record": lambda: sweep_job(recorded(STRONG + BLOCKS + DRAWN)),
     "limits of a record": lambda: limit_job(recorded(BLOCKS), [0.001, 0.1]),
 }
 

@@ -521,8 +521,6 @@ def _check_shaking(file: Any, model: Model) -> None:
         if place := _place(file, name):
             instead = "; give amplitude, or scale" if "amplitude" in name else ""
             raise InputError(f"{place}: {why}{instead}")
-    if file.uncertainty is not None:
-        raise InputError(f"uncertainty: {why}; draw the inputs of a harmonic motion")
     for key in sorted(file.solver.model_fields_set):
         raise InputError(f"solver.{key}: {why}, to which the response is exact")
     for name in ("decay_rate", "delta_mu", "minimum_friction"):
@@ -533,7 +531,8 @@ def _check_shaking(file: Any, model: Model) -> None:
 def _place(file: Any, name: str) -> str | None:
     """Where an input is given first, as errors name it."""
     rows = {f"cases[row {number}]": row for number, row in enumerate(file.cases or (), 1)}
-    tables: dict[str, BaseModel] = {"axes": file.axes, **rows, "model": file.model}
+    drawn = {} if file.uncertainty is None else {"uncertainty": file.uncertainty}
+    tables: dict[str, BaseModel] = {"axes": file.axes, **rows, "model": file.model, **drawn}
     return next((f"{key}.{name}" for key, table in tables.items() if getattr(table, name, None) is not None), None)
 
 

@@ -162,7 +162,7 @@ RECORD_INPUTS = ("amplitude", "scale", "time_scale", "polarity")
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = (
     "theta", "mu_s", "amplitude", "displacement_amplitude", "frequency",
-    "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
+    "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction", "scale", "time_scale",
 )  # fmt: skip
 
 #: Results of a sweep: attributes of the variables.

@@ -297,7 +297,7 @@ def sample(
     frequency: Values | None = None,
     *,
     uncertain: Mapping[str, Any],
-    excitation: Waveform | str = "sine",
+    excitation: Waveform | Record | str = "sine",
     model: Model | str = "mendez",
     solver: Solver | str = "auto",
     samples: int = 4096,
@@ -307,6 +307,9 @@ def sample(
     thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
     correlation: Sequence[tuple[str, str, float]] = (),
     displacement_amplitude: Values | None = None,
+    scale: Values | None = None,
+    time_scale: Values | None = None,
+    polarity: int | Sequence[int] | str | None = None,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
@@ -323,14 +326,15 @@ def sample(
     theta, mu_s, amplitude, frequency : float, array or DataArray
         As in `sweep`.  One that is drawn with ``kind="absolute"`` must not be given.
     uncertain : mapping of str to mapping or frozen distribution
-        For any of `theta`, `mu_s`, `amplitude`, `displacement_amplitude`, `frequency`,
+        For any of `theta`, `mu_s`, `amplitude`, `displacement_amplitude`, `frequency`, `scale`, `time_scale`,
         `yield_acceleration`, `decay_rate`, `delta_mu` and `minimum_friction` either a frozen
         distribution of scipy.stats, or a mapping with
 
         - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
           whose shape parameters, ``loc`` and ``scale`` are further keys;
         - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
-          at the grid point or, for the last four, the estimate) or "offset" (it is added to it);
+          at the grid point or, for the last four, the estimate; under a record for the yield acceleration only) or
+          "offset" (it is added to it);
         - ``units``: of the draws, if not the parameter's own; not with factors.
     samples : int
         Samples a grid point; a power of 2 for Sobol's.
@@ -359,7 +363,8 @@ def sample(
           samples that have a value; NaN where none has.
         - `mode_share`, dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
           all samples, how many slide in which mode, have which flag, and have no value.  They do not
-          depend on the frequency and have no such dimension (but with `displacement_amplitude`).
+          depend on the frequency (of a record: the time scale) and have no such dimension (but with
+          `displacement_amplitude`).  Under a record there is no `mode_share`.
 
         How the inputs were drawn is in the attributes.
 

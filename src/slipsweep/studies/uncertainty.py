@@ -27,7 +27,7 @@ from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes,
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
-from slipsweep.model.options import MODELS, Newmark
+from slipsweep.model.options import MODELS, Model, Newmark
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choice,
@@ -47,11 +47,14 @@ from slipsweep.model.variables import (
     DRAWN,
     FRICTION_PARAMETERS,
     PARAMETERS,
+    RECORD_INPUTS,
     STATISTIC_COORDINATES,
     STATISTICS,
+    WAVEFORM_INPUTS,
     SlidingMode,
     Validity,
 )
+from slipsweep.motion.records import Record
 
 Floats = NDArray[np.float64]
 
@@ -271,8 +274,9 @@ def check_sampling(
         for name in DRAWN
         if name in uncertain
     }
-    if {"amplitude", "displacement_amplitude"} <= distributions.keys():
-        raise InputError(f"{keys or 'uncertain.'}displacement_amplitude: not allowed beside amplitude")
+    for other in ("displacement_amplitude", "scale"):
+        if {"amplitude", other} <= distributions.keys():
+            raise InputError(f"{keys or 'uncertain.'}{other}: not allowed beside amplitude")
 
     method = check_choice(f"{keys}method", method, METHODS)
     samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
@@ -466,14 +470,12 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     names = [name for name in PARAMETERS if given.get(name) is not None]
     if "structure_frequency" in names:
         raise InputError("structure_frequency: not allowed with uncertain inputs: it flags cells, and moves none")
+    recorded = isinstance(given.get("excitation"), Record)
+    _check_drawn(sampling, names, recorded, MODELS.of(given.get("model", "mendez")))
     sampling.check_given(names)
-    for name in ("theta", "mu_s", "frequency"):
+    for name in ("theta", "mu_s", *(() if recorded else ("frequency",))):
         if name not in (*names, *sampling.absolute):
             raise InputError(f"{name}: must be given, or drawn")
-    if isinstance(MODELS.of(given.get("model", "mendez")), Newmark):
-        for name in ("decay_rate", "delta_mu", "minimum_friction"):
-            if name in sampling.distributions:
-                raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
     draws = sampling.draws()
     _check_draws(sampling, draws, sampling.absolute, {})
     # what has no value of its own is planned for with one of its draws
@@ -488,13 +490,29 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     return SamplePlan(sampling, draws, plan.tasks[0].problem, coords, attrs)
 
 
+def _check_drawn(sampling: Sampling, given: Sequence[str], recorded: bool, model: Model) -> None:
+    """Refuse to draw what the model or the shaking does not have."""
+    others = {*(WAVEFORM_INPUTS if recorded else RECORD_INPUTS)} - {*(RECORD_INPUTS if recorded else WAVEFORM_INPUTS)}
+    for name, one in sampling.distributions.items():
+        friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
+        if name in others:
+            raise InputError(f"{sampling.key(name)}: not allowed with {'a Record' if recorded else 'a waveform'}")
+        if friction_law and isinstance(model, Newmark):
+            raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
+        if friction_law and recorded and one.kind != "absolute" and name not in given:
+            raise InputError(
+                f'{sampling.key(name)}: kind = "{one.kind}" wants {name} given: under a record each pulse has an '
+                "estimate of its own"
+            )
+
+
 class SamplePlan:
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
-    A plan as all others are (`anyplan.AnyPlan`); its parts have the draws of the whole.
+    A plan as all others are (`anyplan.AnyPlan`); its parts have the draws of the whole.  Under a record the inverse of
+    the time scale stands for the frequency, and there is no sliding mode.
     """
 
-    names = tuple(_STATISTICS)
     cell_memory = 0
 
     def __init__(
@@ -508,27 +526,30 @@ class SamplePlan:
         self.sampling, self.draws, self.problem = sampling, draws, problem
         self.coords, self.attrs = coords, attrs
         self.by_displacement = "displacement_amplitude" in {*coords, *draws}
+        recorded = isinstance(problem.excitation, Record)
+        self.clock = clock = "time_scale" if recorded else "frequency"
+        self.names = tuple(name for name in _STATISTICS if not (recorded and name == "mode_share"))
         own = {
             name: variable
             for name, variable in coords.items()
-            if name != "frequency" and not (name == "amplitude" and self.by_displacement)
+            if name != clock and not (name == "amplitude" and self.by_displacement)
         }
-        everything = own | ({"frequency": coords["frequency"]} if "frequency" in coords else {})
-        offset = "frequency" in draws and sampling.distributions["frequency"].kind == "offset"
+        everything = own | ({clock: coords[clock]} if clock in coords else {})
+        offset = clock in draws and sampling.distributions[clock].kind == "offset"
         # A = ω²d, and (f + offset)/f, depend on the frequency itself: no scaling law along its dimensions then
         self.sizes = grid_sizes(everything)
         check_dimensions(self.sizes, coords, {*STATISTICS, *STATISTIC_COORDINATES})
         self.solved = grid_sizes(everything if self.by_displacement or offset else own)
         self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in self.solved}
-        self.base = aligned(everything if "frequency" in everything and not self.scaled else own, self.solved)
+        self.base = aligned(everything if clock in everything and not self.scaled else own, self.solved)
 
         dims = (*self.solved, *self.scaled)
-        frequency = coords.get("frequency", Variable((), np.ones(())))
+        frequency = coords.get(clock, Variable((), np.ones(())))
         shape = (*self.solved.values(), math.prod(self.scaled.values()))
         lengths = [frequency.sizes.get(dim, 1) for dim in dims]
         axes = [frequency.dims.index(dim) for dim in dims if dim in frequency.dims]
         values = np.broadcast_to(frequency.values.transpose(axes).reshape(lengths), [self.sizes[dim] for dim in dims])
-        self.frequency: Floats = values.reshape(shape)
+        self.frequency: Floats = 1.0 / values.reshape(shape) if recorded else values.reshape(shape)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # to another process goes what is drawn from, a few numbers, and not what was drawn
@@ -578,11 +599,16 @@ class SamplePlan:
             "flag": np.array([int(flag) for flag in Validity], np.int16),
         }
         results = {}
-        for name, own in _STATISTICS.items():
+        for name in self.names:
+            own = _STATISTICS[name]
             over = [dim for dim in self.sizes if name in _BY_FREQUENCY or dim in self.solved]
             shape = (*(self.sizes[dim] for dim in over), *(coordinates[dim].size for dim in own))
             results[name] = Variable((*over, *own), empty(shape, "float64"), STATISTICS[name])
-        coords = {name: Variable((name,), values, STATISTIC_COORDINATES[name]) for name, values in coordinates.items()}
+        coords = {
+            name: Variable((name,), values, STATISTIC_COORDINATES[name])
+            for name, values in coordinates.items()
+            if any(name in _STATISTICS[one] for one in self.names)
+        }
         return Table(self.coords | coords, results, self.attrs)
 
     def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
@@ -621,32 +647,36 @@ class SamplePlan:
 
     def tally(self, results: Mapping[str, NDArray[Any]]) -> Tally:
         """Samples by sliding mode and by flag, from their shares."""
-        shares = ("mode_share", "flag_share", "valueless_share")
+        shares = [name for name in ("mode_share", "flag_share", "valueless_share") if name in self.names]
         if not {*shares} <= results.keys():
             return Tally()
-        modes, flags, valueless = (
-            np.rint(results[name] * np.float64(self.sampling.samples)).astype(np.int64) for name in shares
-        )
+        counts = {name: np.rint(results[name] * np.float64(self.sampling.samples)).astype(np.int64) for name in shares}
+        by_flag = dict(zip(Validity, counts["flag_share"].reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
+        if "mode_share" not in counts:
+            return Tally(0, None, by_flag)
         known: list[SlidingMode] = [mode for mode in SlidingMode if mode is not SlidingMode.MISSING]
-        by_mode = dict(zip(known, modes.reshape(-1, len(known)).sum(0).tolist(), strict=True))
-        by_flag = dict(zip(Validity, flags.reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
-        return Tally(0, {SlidingMode.MISSING: int(valueless.sum()), **by_mode}, by_flag)
+        by_mode = dict(zip(known, counts["mode_share"].reshape(-1, len(known)).sum(0).tolist(), strict=True))
+        return Tally(0, {SlidingMode.MISSING: int(counts["valueless_share"].sum()), **by_mode}, by_flag)
 
     def _solve(self, slab: tuple[slice, ...], progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
-        """Displacement (at 1 Hz or, where it is drawn, at the frequency over the grid's), mode and flags of a slab."""
+        """Displacement (at 1 Hz or, where it is drawn, at the frequency over the grid's), mode and flags of a slab.
+
+        Under a record at time scale 1, or at the one drawn over the grid's.
+        """
         base = {name: values[..., None] for name, values in engine.cut(self.base, slab).items()}
         one = np.ones((1,) * (len(slab) + 1))
-        frequency = base.pop("frequency", one)
+        clock = self.clock
+        frequency = base.pop(clock, one)
         drawn = self.sampling.distributions
         arrays = {
             name: drawn[name].applied(base.get(name), self._row(name, len(slab))) if name in drawn else base[name]
-            for name in DRAWN
-            if name != "frequency" and (name in base or (name in drawn and drawn[name].kind == "absolute"))
+            for name in (*DRAWN, "polarity")
+            if name != clock and (name in base or (name in drawn and drawn[name].kind == "absolute"))
         }
         relative = one
-        if "frequency" in drawn:
-            row = self._row("frequency", len(slab))
-            relative = 1.0 + row / frequency if drawn["frequency"].kind == "offset" else row
+        if clock in drawn:
+            row = self._row(clock, len(slab))
+            relative = 1.0 + row / frequency if drawn[clock].kind == "offset" else row
         if self.by_displacement:
             omega = 2.0 * math.pi * relative * frequency
             arrays["amplitude"] = omega * omega * arrays.pop("displacement_amplitude")
@@ -654,8 +684,9 @@ class SamplePlan:
         for name in _ESTIMATED:
             if name in drawn and name not in arrays:
                 arrays[name] = self._about_estimate(drawn[name], arrays, lengths)
-        arrays["frequency"] = relative
-        names = ("permanent_displacement", "sliding_mode", "validity")
+        arrays[clock] = relative
+        modes = ("sliding_mode",) if "mode_share" in self.names else ()
+        names = ("permanent_displacement", *modes, "validity")
         return engine.solve(Request(self.problem, lengths, arrays, names, progress))
 
     def _row(self, name: str, dimensions: int) -> Floats:
@@ -674,8 +705,11 @@ class SamplePlan:
     def _reduce(self, solved: Mapping[str, NDArray[Any]], frequency: Floats) -> dict[str, Floats]:
         """Statistics of the samples of each cell (rows), for each of its frequencies (columns)."""
         samples = self.sampling.samples
-        displacement, modes, flags = (
-            solved[name].reshape(-1, samples) for name in ("permanent_displacement", "sliding_mode", "validity")
+        rows_of = {name: values.reshape(-1, samples) for name, values in solved.items()}
+        displacement, flags, modes = (
+            rows_of["permanent_displacement"],
+            rows_of["validity"],
+            rows_of.get("sliding_mode"),
         )
         rows, squares = frequency.shape[0], frequency**2
         quantiles, thresholds = self.sampling.quantiles, self.sampling.thresholds
@@ -683,7 +717,7 @@ class SamplePlan:
             "displacement_quantile": np.full((*squares.shape, quantiles.size), np.nan),
             "mean_displacement": np.full(squares.shape, np.nan),
             "exceedance_probability": np.full((*squares.shape, thresholds.size), np.nan),
-            "mode_share": np.empty((rows, 3)),
+            **({} if modes is None else {"mode_share": np.empty((rows, 3))}),
             "flag_share": np.empty((rows, len(Validity))),
             "valueless_share": np.empty(rows),
         }
@@ -696,7 +730,8 @@ class SamplePlan:
                     values = displacement[row]
                     values.sort()  # NaN goes last
                     count = int(np.searchsorted(values, np.nan))
-                    found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
+                    if modes is not None:
+                        found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
                     found["flag_share"][row] = np.bincount(flags[row], minlength=codes) @ bits / samples
                     found["valueless_share"][row] = (samples - count) / samples
                     if not count:
@@ -714,7 +749,8 @@ class SamplePlan:
             wrong = (~np.isfinite(found[name].reshape(*squares.shape, -1)).all(axis=-1)) & there
             if wrong.any():
                 worst = number_text(float(frequency[wrong].flat[0]))
-                raise InputError(f"frequency = {worst}: {name} is then no finite number; must be nearer to 1")
+                clock = "frequency" if self.clock == "frequency" else "1 / time_scale"
+                raise InputError(f"{clock} = {worst}: {name} is then no finite number; must be nearer to 1")
         return found
 
 

@@ -1,0 +1,173 @@
+"""Uncertain inputs under a record: against sweeps of the draws one by one, and in sweep files."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep import InputError, Record, read_record, sample, sweep
+from slipsweep.model.variables import Validity
+from slipsweep.studies.uncertainty import check_sampling
+from tests.support.processes import slipsweep as command
+
+SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
+SAMPLES = 64
+THRESHOLDS = (0.001, 0.02)
+
+
+@pytest.fixture(scope="module")
+def shaking() -> Record:
+    """Some pulses of different sizes and both signs."""
+    times = np.arange(0.0, 8.0, 0.02)
+    wave = np.sin(2 * np.pi * 1.1 * times) + 0.7 * np.sin(2 * np.pi * 2.7 * times + 1.0)
+    wave *= times**2 * np.exp(-1.2 * times)
+    return Record(times, 2.0 * wave / np.abs(wave).max())
+
+
+def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
+    """The draws along a dimension."""
+    sampling = check_sampling(
+        uncertain, samples=SAMPLES, method="sobol", seed=0, quantiles=[0.5], thresholds=[0.1], correlation=(), g=9.81
+    )
+    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws().items()}
+
+
+NORMAL = {"distribution": "norm", "loc": 0.45, "scale": 0.04}
+ABOUT_ONE = {"distribution": "lognorm", "s": 0.25, "kind": "factor"}
+
+#: What is drawn, what is given, and what a sweep of the draws takes instead.
+CASES: dict[str, tuple[dict[str, Any], dict[str, Any], Any]] = {
+    "friction and amplitude": (
+        {"mu_s": NORMAL, "amplitude": ABOUT_ONE},
+        {"amplitude": [4.0, 9.0], "time_scale": [0.5, 1.0, 3.0], "polarity": "both"},
+        lambda d: {"mu_s": d["mu_s"], "amplitude": xr.DataArray([4.0, 9.0], dims="amplitude") * d["amplitude"]},
+    ),
+    "scale": (
+        {"scale": {"distribution": "uniform", "loc": 1.0, "scale": 4.0}},
+        {"mu_s": [0.4, 0.5]},
+        lambda d: {"scale": d["scale"]},
+    ),
+    "time as it is": (
+        {"time_scale": {"distribution": "uniform", "loc": 0.5, "scale": 2.0}},
+        {"mu_s": 0.4, "scale": [2.0, 4.0]},
+        lambda d: {"time_scale": d["time_scale"]},
+    ),
+    "a factor on the time": (
+        {"time_scale": ABOUT_ONE, "mu_s": NORMAL},
+        {"scale": 3.0, "time_scale": [0.5, 2.0]},
+        lambda d: {"mu_s": d["mu_s"], "time_scale": xr.DataArray([0.5, 2.0], dims="time_scale") * d["time_scale"]},
+    ),
+    "an offset to the time": (
+        {"time_scale": {"distribution": "uniform", "loc": -0.2, "scale": 0.4, "kind": "offset"}},
+        {"mu_s": 0.4, "scale": 3.0, "time_scale": [0.5, 2.0]},
+        lambda d: {"time_scale": xr.DataArray([0.5, 2.0], dims="time_scale") + d["time_scale"]},
+    ),
+    "a factor on Coulomb's yield acceleration": (
+        {"yield_acceleration": ABOUT_ONE},
+        {"mu_s": 0.4, "scale": [2.0, 4.0]},
+        lambda d: {
+            "yield_acceleration": 9.81 * (0.4 - np.tan(np.radians(5))) / (1 + 0.4 * np.tan(np.radians(5)))
+            * d["yield_acceleration"]
+        },
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_statistics_are_those_of_the_draws(shaking: Record, name: str) -> None:
+    uncertain, given, taken = CASES[name]
+    found = sample(
+        theta=5.0, **given, uncertain=uncertain, excitation=shaking, samples=SAMPLES, thresholds=THRESHOLDS,
+        quantiles=[0.1, 0.5, 0.9],
+    )  # fmt: skip
+    assert "mode_share" not in found
+    assert "mode" not in found.coords
+    swept = sweep(theta=5.0, **given | taken(drawn(uncertain)), excitation=shaking)
+    moved = swept.permanent_displacement
+    assert (moved > 0.0).any()
+    assert found.displacement_quantile.dims[:-1] == tuple(dim for dim in moved.dims if dim != "draw")
+    expected = moved.quantile([0.1, 0.5, 0.9], dim="draw").transpose(..., "quantile")
+    np.testing.assert_allclose(found.displacement_quantile, expected, rtol=1e-11, atol=1e-15)
+    np.testing.assert_allclose(found.mean_displacement, moved.mean("draw"), rtol=1e-11)
+    for at, threshold in enumerate(THRESHOLDS):
+        np.testing.assert_array_equal(found.exceedance_probability[..., at], (moved > threshold).mean("draw"))
+    # no flag depends on the time scale
+    first = swept if "time_scale" in found.flag_share.dims else swept.isel(time_scale=0, missing_dims="ignore")
+    for at, flag in enumerate(Validity):
+        share = ((first.validity & int(flag)) != 0).mean("draw")
+        np.testing.assert_array_equal(found.flag_share[..., at], share)
+
+
+@pytest.mark.parametrize(
+    ("given", "uncertain", "message"),
+    [
+        ({}, {"frequency": NORMAL}, "uncertain.frequency: not allowed with a Record"),
+        ({"frequency": 1.0}, {"mu_s": NORMAL}, "frequency: not allowed with a Record"),
+        ({"amplitude": 2.0}, {"scale": NORMAL}, "amplitude, scale: must not both be given"),
+        ({}, {"scale": NORMAL, "amplitude": NORMAL}, "scale: not allowed beside amplitude"),
+        ({}, {"scale": ABOUT_ONE}, 'kind = "factor" wants scale given'),
+        ({}, {"decay_rate": ABOUT_ONE}, "under a record each pulse has an estimate of its own"),
+        ({}, {"time_scale": {"distribution": "norm"}}, r"time_scale = norm.*% of the draws are not"),
+    ],
+)
+def test_refusals(shaking: Record, given: dict[str, Any], uncertain: dict[str, Any], message: str) -> None:
+    block: dict[str, Any] = {"theta": 5.0, **({} if "mu_s" in uncertain else {"mu_s": 0.4})}
+    with pytest.raises(InputError, match=message):
+        sample(**block, **given, uncertain=uncertain, excitation=shaking, samples=16)
+
+
+def test_a_waveform_has_no_scales() -> None:
+    with pytest.raises(InputError, match=r"uncertain\.time_scale: not allowed with a waveform"):
+        sample(5.0, 0.4, 3.0, 1.0, uncertain={"time_scale": ABOUT_ONE})
+
+
+SWEEP = f"""
+[excitation]
+record = "{SYNTHETIC}"
+[axes.theta]
+values = [0, 5]
+[axes.amplitude]
+values = [0.3, 0.6]
+units = "g"
+[axes.time_scale]
+values = [1, 2]
+[uncertainty]
+samples = 64
+thresholds = ["1cm"]
+[uncertainty.mu_s]
+distribution = "norm"
+loc = 0.4
+scale = 0.03
+"""
+
+
+def test_sweep_files(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(SWEEP)
+    done = command(tmp_path, "run", "a.toml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "8 grid points (2 theta x 2 amplitude x 2 time_scale), 64 samples each" in done.stdout
+    assert "sliding modes" not in done.stdout
+    assert "flags" in done.stdout
+    expected = sample(
+        theta=[0, 5],
+        amplitude=np.array([0.3, 0.6]) * 9.81,
+        time_scale=[1, 2],
+        uncertain={"mu_s": {"distribution": "norm", "loc": 0.4, "scale": 0.03}},
+        excitation=read_record(SYNTHETIC),
+        samples=64,
+        thresholds=["1cm"],
+    )
+    with xr.open_dataset(tmp_path / "a.nc") as found:
+        for name in expected.data_vars:
+            np.testing.assert_allclose(found[name], expected[name], rtol=1e-14, err_msg=str(name))
+    assert command(tmp_path, "info", "a.nc").returncode == 0
+    again = command(tmp_path, "run", "a.nc", "-o", "b.nc", "-q", "--workers", "2")
+    assert (again.returncode, again.stderr) == (0, "")
+    with xr.open_dataset(tmp_path / "a.nc") as one, xr.open_dataset(tmp_path / "b.nc") as other:
+        xr.testing.assert_equal(one, other)
+    (tmp_path / "b.toml").write_text(SWEEP.replace("uncertainty.mu_s", "uncertainty.frequency"))
+    wrong = command(tmp_path, "run", "b.toml")
+    assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1)
+    assert "uncertainty.frequency: not allowed with excitation.record" in wrong.stderr
