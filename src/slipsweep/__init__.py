@@ -10,6 +10,7 @@ codes of the results.
 """
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 from slipsweep._version import __version__
@@ -69,7 +70,14 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(importlib.import_module(_LAZY[name]), name)
     globals()[name] = value
+    _register_accessor()
     return value
+
+
+def _register_accessor() -> None:
+    """Make `Dataset.slipsweep` known, wherever there are datasets: xarray is not imported for it."""
+    if "xarray" in sys.modules:
+        importlib.import_module("slipsweep.charts.accessor")
 
 
 def __dir__() -> list[str]:

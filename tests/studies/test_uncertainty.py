@@ -13,7 +13,9 @@ from scipy import stats
 
 import slipsweep
 from slipsweep.charts import uncertainty_figures
+from slipsweep.charts.sheet import Sheet
 from slipsweep.charts.slices import Result
+from slipsweep.charts.style import Look
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
@@ -572,7 +574,7 @@ def test_fragility_curves_are_the_probabilities(folder: Path) -> None:
         table = result.select(
             ["exceedance_probability", "valueless_share"], keep, {"theta": "5deg", "frequency": "2000mHz"}
         )
-    figure = uncertainty_figures.fragility(table, "amplitude", "threshold")
+    figure = uncertainty_figures.fragility(Sheet(table, "amplitude", "threshold", Look()))
     found = xr.load_dataset(folder / "fragile.nc").sel(theta=5, frequency=2).exceedance_probability
     curves = {line.get_label(): line.get_xydata() for line in figure.axes[0].get_lines()}
     assert list(curves) == ["d = 10 mm", "d = 100 mm"]
@@ -586,13 +588,13 @@ def test_bands_are_the_quantiles(folder: Path) -> None:
     with Result(folder / "fragile.nc") as result:
         names = ["displacement_quantile", "valueless_share"]
         table = result.select(names, {"amplitude": slice(None), "quantile": slice(None)}, {"theta": 0, "frequency": 1})
-    figure = uncertainty_figures.quantile_bands(table, "amplitude")
+    figure = uncertainty_figures.quantile_bands(Sheet(table, "amplitude", None, Look()))
     (axes,) = (axes for axes in figure.axes if axes.get_yscale() == "log")
     (median,) = (line for line in axes.get_lines() if line.get_label() == "median")
     found = xr.load_dataset(folder / "fragile.nc").sel(theta=0, frequency=1, quantile=0.5).displacement_quantile * 1000
     slid = found.values > 1
     np.testing.assert_allclose(np.asarray(median.get_ydata())[slid], found.values[slid])
-    assert axes.collections[0].get_label() == "5 to 95 %"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["5 to 95 %", "median"]
 
 
 def test_the_share_without_a_value_is_shown(tmp_path: Path) -> None:
@@ -603,12 +605,12 @@ def test_the_share_without_a_value_is_shown(tmp_path: Path) -> None:
     with Result(tmp_path / "steep.nc") as result:
         names = ["exceedance_probability", "displacement_quantile", "valueless_share"]
         table = result.select(names, {"amplitude": slice(None), "quantile": slice(None)}, {"frequency": 1})
-    figure = uncertainty_figures.fragility(table, "amplitude", None)
+    figure = uncertainty_figures.fragility(Sheet(table, "amplitude", None, Look()))
     assert 0.1 < whole["valueless_share"].values.max() < 0.9
     dotted = [line for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
     np.testing.assert_array_equal(dotted[0].get_ydata(), whole["valueless_share"].values[0])
-    bands = uncertainty_figures.quantile_bands(table, "amplitude")
-    assert any("without a value" in text.get_text() for text in bands.legends[0].get_texts())
+    bands = uncertainty_figures.quantile_bands(Sheet(table, "amplitude", None, Look()))
+    assert "Without a value: up to" in bands.get_supxlabel()
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from slipsweep.charts.charts import plot_curve, set_scale
-from slipsweep.charts.style import SYMBOLS, axis_label, model_text, plain, value_text
+from slipsweep.charts.sheet import curve_looks, plot_curve, set_scale
+from slipsweep.charts.style import SYMBOLS, axis_label, length_text, model_text, plain, value_text
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
 
@@ -60,24 +59,23 @@ def limit_chart(table: Table, labels: Sequence[str] = ()) -> Figure:
     figure = Figure(figsize=(max(6.0, 3.6 * len(across) + 1.2), max(4.2, 2.9 * len(down) + 1.3)), layout="constrained")
     axes = figure.subplots(len(down), len(across), sharex=True, sharey=True, squeeze=False)
     family = shown[curves] if curves else [0]
-    colours = colormaps["viridis"](np.linspace(0.0, 0.88, len(family)))
+    looks = curve_looks(len(family))
     x = _values(table, abscissa, sizes) if abscissa else np.zeros(1)
     g = float(table.attrs["g"])
 
     for (i, at_row), (j, at_column) in itertools.product(enumerate(down), enumerate(across)):
         panel = axes[i, j]
-        for colour, at_curve in zip(colours, family, strict=True):
+        for number, (look, at_curve) in enumerate(zip(looks, family, strict=True)):
             chosen = {**fixed, **{d: k for d, k in ((rows, at_row), (columns, at_column), (curves, at_curve)) if d}}
             where: Any = tuple(chosen.get(dim, slice(None)) for dim in limits.dims)
             y = np.atleast_1d(limits.values[where]) / g
             label = _label(table, curves, at_curve, labels) if curves else None
-            points = {"marker": "."} if x.size <= 12 else {}
-            plot_curve(panel, x, y, color=colour, label=label, **points)
+            plot_curve(panel, x, y, number / len(family), label=label, **look)
             states = np.atleast_1d(status[where])
             abrupt = (states >= LimitStatus.AT_MODE_JUMP) & (states <= LimitStatus.AFTER_GAP)
             panel.plot(
-                x[abrupt], y[abrupt], linestyle="none", marker="o", markersize=4, markerfacecolor="none",
-                markeredgecolor=colour,
+                x[abrupt], y[abrupt], linestyle="none", marker="o", markersize=8, markerfacecolor="none",
+                markeredgecolor="0.3",
             )  # fmt: skip
         title = ", ".join(_label(table, d, k, labels) for d, k in ((columns, at_column), (rows, at_row)) if d)
         panel.set_title(title, fontsize="medium")
@@ -108,7 +106,7 @@ def _values(table: Table, dim: str, sizes: dict[str, int]) -> np.ndarray:
 def _text(name: str, value: float) -> str:
     """A value with symbol and unit; the tolerable displacement in mm below a metre."""
     if name == "displacement":
-        return f"u = {value * 1000:.4g} mm" if value < 1.0 else f"u = {value:.4g} m"
+        return f"u = {length_text(value)}"
     return value_text(name, value) if name in SYMBOLS else f"{name} {value:.4g}"
 
 

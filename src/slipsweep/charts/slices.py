@@ -1,15 +1,13 @@
-"""Slices of a result file: the cells that a chart shows, and no others, read as a table.
+"""Slices of a result: the cells that a chart shows, and no others, read as a table.
 
-`Result` opens a file, finds the nearest values on its axes and reads hyperslabs;
-`boundaries` and `newmark` compute for a slice the accelerations of yield and of the mode limit,
-and what Newmark's block does on the same cells.
+`Result` opens a file and reads hyperslabs.  A slice at a value that is not among those of the file is solved
+anew, with the same options.
 """
 
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.charts.answers import amplitude_of, solve
 from slipsweep.charts.style import drawn_text
 from slipsweep.errors import InputError
 from slipsweep.files.results import ResultFile, Where, open_result
@@ -27,7 +26,7 @@ from slipsweep.motion.waveforms import WAVEFORMS
 
 Floats = NDArray[np.float64]
 
-#: What a file may hold along its axes, and on them.
+#: What a result may hold along its axes, and on them.
 _COORDINATES = PARAMETERS | STATISTIC_COORDINATES
 _RESULTS = RESULTS | STATISTICS
 
@@ -40,13 +39,20 @@ _MOST = 1e75
 #: Points of an axis that a figure shows: more than one for every two dots on paper is lost.
 MOST_POINTS = 600
 
+#: Values as near as this, of the largest on the axis, are the same: single precision keeps seven digits.
+_SAME = 1e-7
+
+#: Where to cut an axis: a number in its own unit, a text with another ("0.3g"), a label, or several of them.
+Cut = float | str | Sequence[float | str]
+
 
 class Result:
-    """A file that `slipsweep run` wrote, open for reading slices; a context manager.
+    """A result of a sweep, open for reading slices; a context manager.
 
     Parameters
     ----------
-    path : Path
+    source : Path or ResultFile
+        A file that `slipsweep run` wrote, or one that has been opened.
 
     Attributes
     ----------
@@ -63,10 +69,10 @@ class Result:
         The file cannot be read, is not netCDF, or was not written by `slipsweep run`.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, source: Path | ResultFile) -> None:
         with ExitStack() as stack:
-            self._file = stack.enter_context(open_result(path))
+            self._file: ResultFile = stack.enter_context(open_result(source)) if isinstance(source, Path) else source
+            path = self.path = self._file.path
             if "record" in self._file.attrs:
                 raise InputError(
                     f"{path}: is the response to a recorded motion; charts are drawn of harmonic sweeps only "
@@ -97,6 +103,11 @@ class Result:
     ) -> None:
         self._open.close()
 
+    @property
+    def g(self) -> float:
+        """Gravity, m/s²."""
+        return float(self.attrs["g"])
+
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a variable."""
         return self._file[name].dims
@@ -121,6 +132,11 @@ class Result:
         """Axes that a chart can be drawn over: those of a parameter that has more than one value."""
         return [dim for dim, values in self.axes.items() if values.size > 1 and dim in self.coordinates]
 
+    @property
+    def groups(self) -> list[str]:
+        """Axes whose values can tell curves or panels apart: also the cases, which have no order."""
+        return [*self.wide, *(["case"] if self.axes.get("case", np.zeros(1)).size > 1 else [])]
+
     def require(self, *names: str) -> None:
         """Refuse a file that has lost a parameter (InputError)."""
         derived = {"amplitude"} if {"displacement_amplitude", "frequency"} <= {*self.coordinates} else set()
@@ -129,14 +145,14 @@ class Result:
                 raise InputError(f"{self.path}: {name}: not in the file, but this chart needs it")
 
     def axis(self, name: str) -> str:
-        """`name` if it is an axis with more than one value.
+        """`name` if it is an axis with more than one value (`case` is one of groups).
 
         Raises
         ------
         InputError
             Naming the axes there are.
         """
-        if name in self.wide:
+        if name in self.groups:
             return name
         if name in self.axes or name in self.coordinates:
             raise InputError(
@@ -150,52 +166,72 @@ class Result:
             raise InputError(f"{self.path}: {name}: no such variable; {_suggest(name, self.variables)}")
         return name
 
-    def nearest(self, at: Mapping[str, float | str]) -> dict[str, int]:
-        """Where on the axes the values nearest to those asked for are.
+    def places(self, at: Mapping[str, Cut]) -> dict[str, list[int] | Floats]:
+        """Where on the axes the values asked for are.
 
         Parameters
         ----------
-        at : mapping of axis name to value
+        at : mapping of axis name to value or values
             In the axis's own unit, or a text with another ("0.3g"); for ``case`` its number or label.
-            A parameter that is one number for the whole file may be named too, with that number.
+            A text may hold several, with commas.  A parameter that is one number for the whole result may be
+            named too, with that number.
 
         Returns
         -------
-        dict of str to int
-            Indices into `axes`.
+        dict of str to list of int, or array
+            Indices into `axes`; the values themselves where one of them is not on the axis: that slice must
+            be solved anew.
 
         Raises
         ------
         InputError
-            An axis that is not there, or a value beyond its range by more than half a step.
+            An axis that is not there, a value beyond its range, or one between its values where no slice
+            can be solved anew.
         """
-        found = {}
-        for name, value in at.items():
+        found: dict[str, list[int] | Floats] = {}
+        for name, cut in at.items():
             known = [*self.axes, *(c for c in self.coordinates if not self.dims(c))]
             if name not in known:
-                raise InputError(f"{self.path}: {name} = {value}: no such axis; {_suggest(name, known)}")
-            if name == "case" and isinstance(value, str) and value in self.labels:
-                found[name] = self.labels.index(value)
-                continue
-            number = self._number(name, value)
+                raise InputError(f"{self.path}: {name} = {cut}: no such axis; {_suggest(name, known)}")
+            if isinstance(cut, str) and not (name == "case" and cut in self.labels):
+                cut = cut.split(",")
+            each = [cut] if isinstance(cut, str) or np.ndim(cut) == 0 else list(cut)  # type: ignore[arg-type]
+            numbers = np.array([self._number(name, one) for one in each])  # type: ignore[arg-type]
             values = self.axes[name] if name in self.axes else np.atleast_1d(self.read(name, {}))
-            steps = np.diff(values)
-            # an axis of one value takes that value, give or take its rounding
-            low, high = (steps[0] / 2, steps[-1] / 2) if steps.size else (1e-6 * abs(values[0]),) * 2
-            slack = 1e-12 * abs(values).max()
-            if not values[0] - low - slack <= number <= values[-1] + high + slack:
-                unit = _COORDINATES[name]["units"] if name in _COORDINATES else "1"
-                there = f"{values[0]:.6g} to {values[-1]:.6g}" if values.size > 1 else f"{values[0]:.6g}"
+            slack = _SAME * np.abs(values).max()
+            for number in numbers:
+                if not values[0] - slack <= number <= values[-1] + slack:
+                    there = f"{values[0]:.6g} to {values[-1]:.6g}" if values.size > 1 else f"{values[0]:.6g}"
+                    raise InputError(
+                        f"{self.path}: {name} = {number:.6g}: outside the file's range, {there}{_units_of(name)}"
+                    )
+            if name not in self.axes:
+                continue
+            indices = [int(np.argmin(np.abs(values - number))) for number in numbers]
+            between = [n for n, index in zip(numbers, indices, strict=True) if abs(values[index] - n) > slack]
+            found[name] = numbers if between else indices
+            if between and (reason := self._unsolvable(name)):
+                above = int(np.searchsorted(values, between[0]))
                 raise InputError(
-                    f"{self.path}: {name} = {number:.6g}: outside the file's range, {there}"
-                    + ("" if unit == "1" else f" {unit}")
+                    f"{self.path}: {name} = {between[0]:.6g}: not among the values of the file, and {reason}; "
+                    f"its neighbours are {values[above - 1]:.6g} and {values[above]:.6g}{_units_of(name)}"
                 )
-            if name in self.axes:
-                found[name] = int(np.argmin(np.abs(values - number)))
         return found
+
+    def _unsolvable(self, dim: str) -> str:
+        """Why no slice at another value of an axis can be solved; empty where it can."""
+        if any(name in STATISTICS for name in self.variables):
+            return "statistics are not drawn anew for a chart"
+        if dim not in PARAMETERS:
+            return "nothing lies between them"
+        derived = {"amplitude"} if dim in ("displacement_amplitude", "frequency") else set()
+        others = [name for name in self.coordinates if name not in (dim, *derived) and dim in self.dims(name)]
+        return f"{others[0]} is known at those values only" if others else ""
 
     def _number(self, name: str, value: float | str) -> float:
         """A value on an axis in the axis's own unit."""
+        if name == "case" and value in self.labels:
+            return 1.0 + self.labels.index(str(value))
         try:
             return float(value)
         except ValueError:
@@ -206,23 +242,24 @@ class Result:
 
         # of the same unit
         parameter = name if name in PARAMETERS else "displacement_amplitude" if name == "threshold" else "mu_s"
-        return quantity(f"{self.path}: {name}", str(value), parameter, float(self.attrs["g"]))
+        return quantity(f"{self.path}: {name}", str(value), parameter, self.g)
 
     # --------------------------------------------------------------------------- reading
 
     def select(
-        self, names: Iterable[str], keep: Mapping[str, slice | Sequence[int]], at: Mapping[str, float | str]
+        self, names: Iterable[str], keep: Mapping[str, slice | Sequence[int] | Floats], at: Mapping[str, Cut]
     ) -> Table:
-        """Read a slice.
+        """Read a slice, or solve it where it is not in the file.
 
         Parameters
         ----------
         names : iterable of str
-            Results.
-        keep : mapping of axis to slice or indices
-            The axes that stay, and what of them to read; they may be missing from a result.
+            Results; the flags are solved for the slice if they are not in the file.
+        keep : mapping of axis to slice, indices, or values
+            The axes that stay, and what of them to read; they may be missing from a result.  Of values
+            (an array of numbers that are not indices) one at least is not on the axis.
         at : mapping of axis to value
-            Where to cut the other axes: at the nearest value.  Those not named are cut in the middle.
+            Where to cut the other axes.  Those not named are cut in the middle.
 
         Returns
         -------
@@ -232,17 +269,26 @@ class Result:
         Raises
         ------
         InputError
-            As `nearest`, or an axis that is both kept and cut.
+            As `places`, or an axis that is both kept and cut.
         """
         for name in at:
             if name in keep:
                 raise InputError(
                     f"{self.path}: {name} = {at[name]}: is an axis of this chart; it cannot be cut there too"
                 )
-        indices = self.nearest(at)
         where: dict[str, Any] = {}
+        exact: dict[str, Floats] = {}
+        cuts = self.places(at)
+        for dim, places in cuts.items():
+            if len(places) > 1:
+                raise InputError(f"{self.path}: {dim} = {at[dim]}: several values tell curves or panels apart only")
         for dim, values in self.axes.items():
-            where[dim] = keep[dim] if dim in keep else indices.get(dim, 0 if dim == "case" else (values.size - 1) // 2)
+            middle = 0 if dim == "case" else (values.size - 1) // 2
+            found: Any = keep[dim] if dim in keep else cuts.get(dim, [middle])
+            if isinstance(found, np.ndarray):
+                exact[dim] = found if dim in keep else found[0]
+                found = np.searchsorted(values[:-1], found).tolist()
+            where[dim] = found if dim in keep or isinstance(found, slice) else found[0]
 
         def variable(name: str) -> Variable:
             dims = self.dims(name)
@@ -250,11 +296,25 @@ class Result:
             return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, where), attrs)
 
         coords = {name: variable(name) for name in self.coordinates}
-        if {"displacement_amplitude", "frequency"} <= coords.keys() and "amplitude" not in coords:
+        coords |= {dim: Variable(coords[dim].dims, values, coords[dim].attrs) for dim, values in exact.items()}
+        if {"displacement_amplitude", "frequency"} <= coords.keys() and ("amplitude" not in coords or exact):
             coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
-        chosen = {"case": self.labels[where["case"]]} if self.labels and "case" not in keep else {}
-        attrs = {**self.attrs, **chosen}
-        return Table(coords, {name: variable(name) for name in names}, attrs)
+        attrs = {**self.attrs}
+        if "case" in keep:
+            numbers = self.axes["case"][where["case"]]
+            coords["case"] = Variable(("case",), numbers)
+            attrs["labels"] = [self.labels[int(n) - 1] if self.labels else f"{n:g}" for n in numbers]
+        elif self.labels:
+            attrs["case"] = self.labels[where["case"]]
+        anew = [name for name in names if exact or name not in self.variables]
+        solved = solve(Table(coords, {}, attrs), anew) if anew else {}
+        return Table(coords, {name: solved[name] if name in solved else variable(name) for name in names}, attrs)
+
+    def members(self, dim: str, number: int, at: Mapping[str, Cut]) -> list[int] | Floats:
+        """The values that tell curves or panels apart: those asked for, or `number` at most from end to end."""
+        if dim in at:
+            return self.places({dim: at[dim]})[dim]
+        return self.spread(dim, number)
 
     def thinned(self, dim: str) -> slice:
         """A slice of an axis of `MOST_POINTS` values at most."""
@@ -308,6 +368,11 @@ def check_sweep(file: ResultFile) -> None:
         raise InputError(f"{file.path}: {error}") from None
 
 
+def _units_of(name: str) -> str:
+    units = _COORDINATES[name]["units"] if name in _COORDINATES else "1"
+    return "" if units == "1" else f" {units}"
+
+
 def _list(names: Sequence[str]) -> str:
     return f"there {'is' if len(names) == 1 else 'are'} {', '.join(names)}" if names else "there is none"
 
@@ -315,63 +380,3 @@ def _list(names: Sequence[str]) -> str:
 def _suggest(name: str, known: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return (f'did you mean "{near[0]}"? ' if near else "") + _list(known)
-
-
-# ------------------------------------------------------------- what is computed on a slice
-
-
-def amplitude_of(displacement_amplitude: Variable, frequency: Variable) -> Variable:
-    """The amplitude A = ω²d on a slice: files do not hold it where d and the frequency span a grid."""
-    from slipsweep.motion.amplitude import peak_acceleration
-
-    dims = (*displacement_amplitude.dims, *(dim for dim in frequency.dims if dim not in displacement_amplitude.dims))
-    both = (
-        variable.values.reshape([variable.sizes.get(dim, 1) for dim in dims])
-        for variable in (displacement_amplitude, frequency)
-    )
-    return Variable(dims, np.asarray(peak_acceleration(*both), np.float64), PARAMETERS["amplitude"])
-
-
-def boundaries(table: Table) -> dict[str, Variable]:
-    """Yield acceleration and, but for Newmark's block, limiting acceleration (Eq. 7) of a slice, m/s².
-
-    Returns
-    -------
-    dict of str to Variable
-        ``yield_acceleration`` and ``limiting_acceleration`` along those dimensions of the slice that
-        they depend on; NaN where the block slides under its own weight.
-    """
-    from slipsweep.grid.plans import plan_friction_parameters
-    from slipsweep.model.options import Mendez
-
-    given = {name: table[name] for name in ("theta", "mu_s", "yield_acceleration") if name in table.coords}
-    # neither depends on the amplitude, nor on what it is taken for otherwise
-    found = plan_friction_parameters(
-        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=float(table.attrs["g"])), **given
-    ).solve()
-    slides_at_rest = found["yield_acceleration"].values <= 0
-    limit = found["limiting_acceleration"]
-    unstable = found["validity"].values != 0
-    lines = {
-        "yield_acceleration": replace(
-            found["yield_acceleration"], values=np.where(slides_at_rest, np.nan, found["yield_acceleration"].values)
-        ),
-        "limiting_acceleration": replace(limit, values=np.where(unstable, np.nan, limit.values)),
-    }
-    return lines if table.attrs["model"] != "newmark" else {"yield_acceleration": lines["yield_acceleration"]}
-
-
-def newmark(table: Table) -> Variable:
-    """Permanent displacement of Newmark's block on the cells of a slice, swept anew."""
-    from slipsweep.grid.plans import plan_sweep
-    from slipsweep.model.options import Newmark
-
-    drive = "displacement_amplitude" if "displacement_amplitude" in table.coords else "amplitude"
-    given = ("theta", "mu_s", drive, "frequency", "yield_acceleration")
-    plan = plan_sweep(
-        **{name: table[name] for name in given if name in table.coords},
-        model=Newmark(g=float(table.attrs["g"])),
-        excitation=WAVEFORMS.from_attributes(table.attrs),
-        variables=["permanent_displacement"],
-    )
-    return plan.solve()["permanent_displacement"]

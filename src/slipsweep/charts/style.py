@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 from slipsweep.errors import InputError
 from slipsweep.grid.tables import Table
@@ -12,7 +13,6 @@ from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
-SKY_BLUE, ORANGE, PURPLE = "#56B4E9", "#E69F00", "#CC79A7"
 
 #: Symbols of the paper.
 SYMBOLS = {
@@ -34,22 +34,61 @@ SYMBOLS = {
 _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
 
 
+@dataclass(frozen=True)
+class Look:
+    """What a reader may choose about all charts.
+
+    Attributes
+    ----------
+    units : {"m/s2", "g"}
+        Unit of accelerations on the main axis and in the caption.
+    show_cautions : bool
+        Draw values whose flags say that they are not to be relied on; otherwise they are left out.
+    levels : tuple of float
+        Contours, in the result's own unit; by default round values among the results.
+    """
+
+    units: Literal["m/s2", "g"] = "m/s2"
+    show_cautions: bool = False
+    levels: tuple[float, ...] = ()
+
+    def scale(self, name: str, g: float) -> float:
+        """What to multiply a parameter by to draw it."""
+        return 1.0 / g if self.units == "g" and is_acceleration(name) else 1.0
+
+    def unit(self, name: str) -> str:
+        """The unit that a parameter or result is drawn in, as people write it."""
+        return "g" if self.units == "g" and is_acceleration(name) else unit(name)
+
+
+def is_acceleration(name: str) -> bool:
+    """Whether a parameter is an acceleration, which people give in m/s² or in g."""
+    return PARAMETERS.get(name, {}).get("units") == "m s-2"
+
+
 def unit(name: str) -> str:
     """The unit of a parameter or result as people write it; nothing for a pure number."""
     units = (PARAMETERS.get(name) or RESULTS[name]).get("units", "1")
     return _UNITS.get(units, units)
 
 
-def axis_label(name: str) -> str:
+def axis_label(name: str, look: Look | None = None) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
     text = f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}"
-    return f"{text} ({unit(name)})" if unit(name) else text
+    units = (look or Look()).unit(name)
+    return f"{text} ({units})" if units else text
 
 
-def value_text(name: str, value: float) -> str:
+def value_text(name: str, value: float, units: str | None = None) -> str:
     """A parameter's value with symbol and unit: ``θ = 5°``."""
-    space = "" if unit(name) in ("", "°") else " "
-    return f"{SYMBOLS[name]} = {value:.4g}{space}{unit(name)}"
+    units = unit(name) if units is None else units
+    space = "" if units in ("", "°") else " "
+    return f"{SYMBOLS[name]} = {value:.4g}{space}{units}"
+
+
+def length_text(metres: float) -> str:
+    """A displacement as people write it: ``30 mm``, ``2 m``."""
+    return f"{metres * 1000:.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
 
 
 def plain(text: str) -> str:
@@ -57,11 +96,13 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def caption(table: Table) -> str:
+def caption(table: Table, look: Look | None = None) -> str:
     """The parameters that have one value, the model and the shaking, on two lines."""
+    look = look or Look()
     single = [name for name in SYMBOLS if name in table.coords and table[name].values.size == 1]
-    parts = [value_text(name, table[name].item()) for name in single]
     attributes = table.attrs
+    g = float(attributes["g"])
+    parts = [value_text(name, table[name].item() * look.scale(name, g), look.unit(name)) for name in single]
     drawn = drawn_text(attributes)
     uncertain = [f"uncertain: {drawn}"] if drawn else []
     return "\n".join([", ".join(parts), *uncertain, model_text(attributes)]).strip()

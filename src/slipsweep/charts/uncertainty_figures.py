@@ -1,109 +1,85 @@
 """Charts of uncertain inputs: fragility curves, and bands of quantiles."""
 
+from typing import Any
+
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from slipsweep.charts import charts
-from slipsweep.charts.style import BLUE, axis_label, value_text
-from slipsweep.grid.tables import Table
-
-Floats = NDArray[np.float64]
+from slipsweep.charts.sheet import Sheet, broadcast, check_positive, curve_looks, log_axis, plot_curve
+from slipsweep.charts.style import BLUE, length_text
 
 #: Least displacement of a logarithmic axis, mm, where the largest is far above.
 _LEAST = 1.0
 
 
-def fragility(table: Table, x: str, family: str | None) -> Figure:
-    """Draw the probability of exceeding a displacement over one axis.
+def fragility(sheet: Sheet) -> Figure:
+    """Draw the probability of exceeding a displacement over one axis, mostly that of the amplitude.
 
     Parameters
     ----------
-    table : Table
-        Slice over `x` and `family` that holds `exceedance_probability` and `valueless_share`.
-    x : str
-        The axis to draw over, mostly that of the amplitude.
-    family : str or None
-        The axis whose values tell the curves apart, mostly the threshold.
+    sheet : Sheet
+        Of a slice that holds `exceedance_probability` and `valueless_share`; mostly the threshold tells
+        curves apart.
 
     Returns
     -------
     matplotlib.figure.Figure
         A dotted line shows the share of samples without a value, where there are any.
     """
-    figure, axes = charts.new_plot()
-    dims = (family, x) if family else (x,)
-    curves = np.atleast_2d(charts.broadcast(table["exceedance_probability"], table, dims))
-    members = table[family].values if family else np.zeros(1)
-    for curve, member, colour in zip(curves, members, charts.curve_colours(members.size), strict=True):
-        text = _threshold_text(table["threshold"].item()) if family is None else _member_text(family, member)
-        charts.plot_curve(axes, table[x].values, curve, color=colour, label=text)
-    shares = np.atleast_2d(charts.broadcast(table["valueless_share"], table, dims))
-    if shares.any():
-        axes.plot(table[x].values, shares.max(axis=0), color="0.4", linestyle=":", label="no value (share)")
-    axes.set_ylim(-0.02, 1.02)
-    given = "u > d" if family in (None, "threshold") else f"u > {_length_text(table['threshold'].item())}"
-    axes.set_ylabel(f"probability of exceedance P({given})")
-    _finish(figure, axes, table, x)
-    return figure
+    sheet.set_axis("x", sheet.x)
+    fixed = None if "threshold" in (sheet.y, sheet.across, sheet.down) else length_text(sheet.table["threshold"].item())
+    for panel in sheet.panels:
+        panel.axes.grid(color="0.9")
+        curves = panel.grid(panel.table["exceedance_probability"])
+        for member, (curve, look) in enumerate(zip(curves, curve_looks(len(curves)), strict=True)):
+            text = panel.member(member) or f"d = {fixed}"
+            line = plot_curve(panel.axes, panel.values(panel.x), curve, member / len(curves), label=text, **look)
+            sheet.legend[text] = line
+        shares = panel.grid(panel.table["valueless_share"])
+        if shares.any():
+            plain: dict[str, Any] = {"color": "0.4", "linestyle": ":"}
+            panel.axes.plot(panel.values(panel.x), shares.max(axis=0), **plain)
+            sheet.legend["no value (share)"] = Line2D([], [], **plain)
+        panel.axes.set_ylim(-0.02, 1.02)
+        given = "u > d" if fixed is None or sheet.y is None else f"u > {fixed}"
+        panel.axes.set_ylabel(f"probability of exceedance P({given})")
+    return sheet.finish("outside right upper")
 
 
-def quantile_bands(table: Table, x: str) -> Figure:
+def quantile_bands(sheet: Sheet) -> Figure:
     """Draw bands between quantiles of the permanent displacement over one axis.
 
     Parameters
     ----------
-    table : Table
-        Slice over `x` and `quantile` that holds `displacement_quantile` and `valueless_share`.
-    x : str
-        The axis to draw over.
+    sheet : Sheet
+        Of a slice over its abscissa and `quantile` that holds `displacement_quantile` and `valueless_share`.
     """
-    figure, axes = charts.new_plot()
-    values = charts.broadcast(table["displacement_quantile"], table, ("quantile", x)) * 1000.0
-    quantiles, xs = np.atleast_1d(table["quantile"].values), table[x].values
-    charts.check_positive("permanent displacement", values)
-    axes.set_yscale("log")
-    charts.limit_decades(axes, values, _LEAST)
-    if (values <= 0).any() and axes.get_ylim()[1] > 10 * _LEAST:
-        axes.set_ylim(bottom=_LEAST / 1.2)
-    # what is zero lies below any logarithmic axis, not nowhere
-    floor = axes.get_ylim()[0] / 10
-    shown = np.where(np.isnan(values), np.nan, np.maximum(values, floor))
-    pairs = [(low, quantiles.size - 1 - low) for low in range(quantiles.size // 2)]
-    for number, (low, high) in enumerate(pairs):
-        axes.fill_between(
-            xs, shown[low], shown[high], color=BLUE, alpha=0.2 + 0.2 * number / len(pairs), linewidth=0,
-            label=f"{quantiles[low] * 100:g} to {quantiles[high] * 100:g} %",
-        )  # fmt: skip
-    if quantiles.size % 2:
-        middle = quantiles.size // 2
-        text = "median" if quantiles[middle] == 0.5 else f"{quantiles[middle] * 100:g} %"
-        axes.plot(xs, shown[middle], color=BLUE, linewidth=1.8, label=text)
-    axes.set_ylabel("permanent displacement (mm)")
-    most = float(table["valueless_share"].values.max())
+    everything = sheet.table["displacement_quantile"].values * 1000.0
+    check_positive("permanent displacement", everything)
+    sheet.set_axis("x", sheet.x)
+    quantiles = np.atleast_1d(sheet.table["quantile"].values)
+    for panel in sheet.panels:
+        log_axis(panel.axes, everything, _LEAST)
+        if (everything <= 0).any() and panel.axes.get_ylim()[1] > 10 * _LEAST:
+            panel.axes.set_ylim(bottom=_LEAST / 1.2)
+        # what is zero lies below any logarithmic axis, not nowhere
+        floor = panel.axes.get_ylim()[0] / 10
+        dims = ("quantile", panel.x)
+        values = broadcast(panel.table["displacement_quantile"], panel.table, dims) * 1000.0
+        shown, xs = np.where(np.isnan(values), np.nan, np.maximum(values, floor)), panel.values(panel.x)
+        pairs = [(low, quantiles.size - 1 - low) for low in range(quantiles.size // 2)]
+        for number, (low, high) in enumerate(pairs):
+            look: dict[str, Any] = {"color": BLUE, "alpha": 0.2 + 0.2 * number / len(pairs), "linewidth": 0}
+            panel.axes.fill_between(xs, shown[low], shown[high], **look)
+            sheet.legend[f"{quantiles[low] * 100:g} to {quantiles[high] * 100:g} %"] = Patch(**look)
+        if quantiles.size % 2:
+            middle = quantiles.size // 2
+            text = "median" if quantiles[middle] == 0.5 else f"{quantiles[middle] * 100:g} %"
+            sheet.legend[text] = panel.axes.plot(xs, shown[middle], color=BLUE, linewidth=1.8, label=text)[0]
+        panel.axes.set_ylabel("permanent displacement (mm)")
+    most = float(sheet.table["valueless_share"].values.max())
     if most > 0:
-        axes.plot([], [], linestyle="", label=f"without a value:\nup to {most:.1%} of samples")
-    _finish(figure, axes, table, x)
-    return figure
-
-
-def _finish(figure: Figure, axes: Axes, table: Table, x: str) -> None:
-    charts.set_scale(axes, "x", table[x].values)
-    axes.set_xlabel(axis_label(x))
-    if x == "amplitude":
-        charts.second_scale(axes, table, "x")
-    charts.add_legend(axes, figure)
-    charts.add_caption(figure, table)
-
-
-def _member_text(family: str, member: float) -> str:
-    return _threshold_text(member) if family == "threshold" else value_text(family, member)
-
-
-def _threshold_text(threshold: float) -> str:
-    return f"d = {_length_text(threshold)}"
-
-
-def _length_text(length: float) -> str:
-    return f"{length * 1000:.4g} mm" if length < 1.0 else f"{length:.4g} m"
+        sheet.notes.append(f"Without a value: up to {most:.1%} of the samples.")
+    return sheet.finish("outside right upper")

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.charts.slices import CODES, amplitude_of, check_drawable, check_sweep
+from slipsweep.charts.answers import amplitude_of
+from slipsweep.charts.slices import CODES, check_drawable, check_sweep
 from slipsweep.charts.style import BLUE, VERMILION, axis_label, caption, unit, value_text
 from slipsweep.errors import InputError
 from slipsweep.files import outputs

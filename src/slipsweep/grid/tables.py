@@ -32,6 +32,11 @@ class Variable:
         """Its part in a chunk of the grid; dimensions not named are taken whole."""
         return Variable(self.dims, self.values[tuple(chunk.get(dim, slice(None)) for dim in self.dims)], self.attrs)
 
+    def pick(self, where: Mapping[str, int]) -> "Variable":
+        """Its part at one place along each of some dimensions, which it has no more."""
+        left = tuple(dim for dim in self.dims if dim not in where)
+        return Variable(left, self.values[tuple(where.get(dim, slice(None)) for dim in self.dims)], self.attrs)
+
     def item(self) -> Any:
         """The one value of an array of size 1."""
         return self.values.item()
@@ -58,3 +63,11 @@ class Table:
         for variable in (*self.coords.values(), *self.data_vars.values()):
             sizes |= variable.sizes
         return sizes
+
+    def pick(self, where: Mapping[str, int]) -> "Table":
+        """The table at one place along each of some dimensions, which it has no more."""
+
+        def picked(variables: Mapping[str, Variable]) -> dict[str, Variable]:
+            return {name: one.pick(where) for name, one in variables.items()}
+
+        return Table(picked(self.coords), picked(self.data_vars), self.attrs)

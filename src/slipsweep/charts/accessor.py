@@ -1,0 +1,118 @@
+"""`Dataset.slipsweep`: what the command line draws, from a dataset; importing this module registers it with xarray."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from slipsweep.files.results import ResultFile, Where
+from slipsweep.studies.decoding import flags
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from slipsweep.charts.slices import Cut
+
+
+@xr.register_dataset_accessor("slipsweep")
+class SlipsweepAccessor:
+    """Charts and flags of a result of `slipsweep.sweep` or `sample`, or of a file of one opened with xarray."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def flags(self) -> xr.Dataset:
+        """`slipsweep.flags` of the dataset."""
+        return flags(self._dataset)
+
+    def chart(
+        self,
+        kind: str = "contours",
+        *,
+        at: "Mapping[str, Cut] | None" = None,
+        x: str | None = None,
+        y: str | None = None,
+        panels: Sequence[str] = (),
+        variable: str = "permanent_displacement",
+        levels: Sequence[float | str] = (),
+        units: Literal["m/s2", "g"] = "m/s2",
+        show_cautions: bool = False,
+    ) -> "Figure":
+        """Draw a chart, as `slipsweep chart` does.
+
+        Parameters
+        ----------
+        kind : str
+            "contours", "modes", "families", "dimensionless", "newmark" or "spread"; of `sample` "fragility" or
+            "quantiles".
+        at : mapping of axis to value, optional
+            Where to cut an axis: a number in its own unit, a text with another ("0.3g"), the label of a case;
+            by default its middle.  Several values choose the curves or panels of an axis.
+        x, y : str, optional
+            Axis to draw over; upright axis of a map, or the axis that tells curves apart.
+        panels : sequence of str
+            One or two axes to draw panels over, across and down.
+        variable : str
+            What contours and families show.
+        levels : sequence of float or str
+            Contours, in the variable's own unit or as texts with another ("5cm").
+        units : {"m/s2", "g"}
+            Unit of accelerations on the main axis and in the caption.
+        show_cautions : bool
+            Draw values flagged `not_recoupled` too, which are left out otherwise.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Write it with `savefig`; a notebook shows it.
+
+        Raises
+        ------
+        InputError
+            The chart cannot be drawn of this dataset, or what is asked for is not there.
+        """
+        from slipsweep.charts import kinds
+        from slipsweep.charts.slices import Result
+        from slipsweep.charts.style import Look
+
+        with Result(DatasetSource(self._dataset)) as result:
+            look = Look(units, show_cautions, kinds.levels_of(variable, levels, result.g))
+            return kinds.draw(result, kind, kinds.Wish(x, y, at or {}, variable, panels, look=look))
+
+
+class DatasetSource(ResultFile):
+    """A dataset in place of the file that it may be written to."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        # nothing of the file's own start: there is none
+        self.path = Path("dataset")
+        self.attrs = {str(name): value for name, value in dataset.attrs.items()}
+        self.sizes = {str(dim): size for dim, size in dataset.sizes.items()}
+        self.variables: dict[str, Any] = {str(name): _DatasetVariable(one) for name, one in dataset.variables.items()}
+        self.coordinates = [str(name) for name in dataset.coords]
+
+
+class _DatasetVariable:
+    """A variable of a dataset in place of a `FileVariable`."""
+
+    def __init__(self, variable: xr.Variable) -> None:
+        self._variable = variable
+        self.dims = tuple(map(str, variable.dims))
+        self.attrs = {str(name): value for name, value in variable.attrs.items()}
+        self.is_text = variable.dtype.kind in "OUST"
+
+    def read(self, where: Where) -> np.ma.MaskedArray:
+        """Read a hyperslab."""
+        return np.ma.MaskedArray(self._variable.isel({dim: where[dim] for dim in self.dims if dim in where}).values)
+
+    def read_floats(self, where: Where) -> NDArray[Any]:
+        """Read a hyperslab of numbers, NaN where there is no value."""
+        return np.asarray(self.read(where).data)
+
+    def read_codes(self, where: Where, missing: int = -1) -> NDArray[Any]:
+        """Read a hyperslab of codes, `missing` where there is none (xarray reads those as NaN)."""
+        values = self.read_floats(where)
+        return np.where(np.isnan(values), missing, values).astype(np.int16)

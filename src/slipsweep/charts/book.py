@@ -1,0 +1,75 @@
+"""All charts of a result as one PDF: a title page that says what they show, then a chart a page."""
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+
+from slipsweep._version import __version__
+from slipsweep.charts.maps import HATCHES
+from slipsweep.charts.slices import Result
+from slipsweep.charts.style import SYMBOLS, drawn_text, model_text, plain, unit
+from slipsweep.model.variables import PARAMETERS, REFERENCE, VALIDITY_TEXT
+
+#: Characters in a line, after a heading.
+_WIDTH, _INDENT = 96, 2
+
+
+def write(path: Path, result: Result, figures: Iterable[Figure]) -> None:
+    """Write a title page and some charts as pages of one PDF."""
+    with PdfPages(path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}) as pages:
+        for figure in (title_page(result), *figures):
+            pages.savefig(figure)
+
+
+def title_page(result: Result) -> Figure:
+    """What was computed, of which inputs, by which model and estimates, and by which versions."""
+    attributes = result.attrs
+    hatched = [f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in HATCHES]
+    sections: Mapping[str, list[str]] = {
+        "Inputs": [*_inputs(result), *filter(None, [drawn_text(attributes)])],
+        "Model": [model_text(attributes)],
+        "Range in which the model was compared with measurements": [
+            "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
+        ],
+        "Flags that the charts hatch": hatched,
+        "Origin": [
+            plain(f"{result.path}"),
+            f"solved by {attributes.get('source', 'slipsweep')}",
+            f"drawn by slipsweep {__version__}, matplotlib {mpl.__version__}",
+            *plain(str(attributes.get("history", ""))).splitlines(),
+            REFERENCE,
+        ],
+    }
+    figure = Figure(figsize=(8.27, 11.69))
+    figure.text(0.08, 0.94, plain(textwrap.fill(str(attributes.get("title", "")), 60)), fontsize="xx-large", va="top")
+    lines = []
+    for heading, texts in sections.items():
+        lines += ["", heading.upper()]
+        for text in texts:
+            lines += textwrap.wrap(text, _WIDTH, initial_indent=" " * _INDENT, subsequent_indent=" " * 2 * _INDENT)
+    figure.text(0.08, 0.86, "\n".join(lines), fontsize="small", va="top", linespacing=1.4)
+    return figure
+
+
+def _inputs(result: Result) -> list[str]:
+    """A line an input: its range, or its value."""
+    texts = []
+    for name in result.coordinates:
+        if name not in PARAMETERS:
+            continue
+        values: Any = result.axes[name] if name in result.axes else np.unique(result.read(name, {}))
+        units = unit(name)
+        space = "" if units in ("", "°") else " "
+        ends = f"{values[0]:.4g}{space}{units}"
+        if len(values) > 1:
+            ends = f"{values[0]:.4g} to {values[-1]:.4g}{space}{units}, {len(values)} values"
+        texts.append(f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}: {ends}")
+    if result.labels:
+        texts.append(f"cases: {plain(', '.join(result.labels))}")
+    return texts
