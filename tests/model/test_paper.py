@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 import slipsweep
+from slipsweep import Validity
 
 STICK_SLIP: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "yield_acceleration": 0.59}
 CONTINUOUS: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "yield_acceleration": 0.08}
@@ -87,3 +88,36 @@ def test_figures_with_the_printed_decay_rate(
     assert printed(result.permanent_displacement * 1000, 0) == displacement, "displacement, mm"
     assert printed(result.peak_relative_velocity, 3) == velocity, "peak relative velocity, m/s"
     assert int(result.validity) == slipsweep.Validity.FRICTION_ESTIMATED, "delta_mu by Eqs. 10, 11"
+
+
+@pytest.mark.parametrize(
+    ("experiment", "frequency", "given", "displacement", "newmark", "flags"),
+    [
+        (STICK_SLIP, 1.8, {"yield_acceleration": None}, "31.0", "31.0", Validity.YIELD_GOVERNS),
+        (CONTINUOUS, 3.5, {"yield_acceleration": None}, "68.9", "64.3", Validity.YIELD_GOVERNS),
+        (STICK_SLIP, 1.8, {}, "1858.7", "548.7", Validity.NOT_RECOUPLED | Validity.FRICTION_ESTIMATED),
+        (CONTINUOUS, 3.5, {}, "377.0", "316.5", Validity.FRICTION_ESTIMATED),
+        (STICK_SLIP, 1.8, {"decay_rate": 2.70}, "331.0", "548.7", Validity.FRICTION_ESTIMATED),
+        (CONTINUOUS, 3.5, {"decay_rate": 2.30}, "159.1", "316.5", Validity.FRICTION_ESTIMATED),
+        (STICK_SLIP, 1.8, {"decay_rate": 2.70, "delta_mu": 0.09}, "340.0", "548.7", Validity(0)),
+        (CONTINUOUS, 3.5, {"decay_rate": 2.30, "delta_mu": 0.11}, "161.8", "316.5", Validity(0)),
+    ],
+)
+def test_what_the_inputs_are_worth(
+    experiment: dict[str, Any],
+    frequency: float,
+    given: dict[str, Any],
+    displacement: str,
+    newmark: str,
+    flags: Validity,
+) -> None:
+    """The two experiments with what is measured, printed or estimated, Newmark's block beside them; mm."""
+    result = slipsweep.sweep(
+        **(experiment | given),
+        frequency=frequency,
+        excitation=slipsweep.Sine(cycles=5),
+        variables=["permanent_displacement", "newmark_displacement", "validity"],
+    )
+    assert printed(result.permanent_displacement * 1000, 1) == displacement
+    assert printed(result.newmark_displacement * 1000, 1) == newmark
+    assert Validity(int(result.validity)) == flags

@@ -18,7 +18,7 @@ from slipsweep import InputError, Record, RunError, read_record, sweep
 from slipsweep.files import export, spec
 from slipsweep.grid import chunks
 from slipsweep.grid.tables import Table
-from slipsweep.model.variables import RECORD_RESULTS
+from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import sweep_job
 
@@ -88,7 +88,7 @@ def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
     assert (expected.number_of_slips == -1).any()
     with xr.open_dataset(folder / "a.nc", mask_and_scale=False) as result:
         assert list(result.permanent_displacement.dims) == ["theta", "mu_s", "scale", "time_scale", "polarity"]
-        for name in RECORD_RESULTS:
+        for name in DEFAULT_RECORD_RESULTS:
             np.testing.assert_array_equal(result[name], expected[name], err_msg=name)
             assert result[name].attrs.get("ancillary_variables") == (None if name == "validity" else "validity")
         np.testing.assert_array_equal(result.record_acceleration, record.acceleration)
@@ -118,7 +118,7 @@ def test_variables_and_type_as_asked_for(folder: Path) -> None:
     run(folder / "a.toml", folder / "a.nc")
     run(folder / "b.toml", folder / "b.nc")
     whole, part = stored(folder / "a.nc"), stored(folder / "b.nc")
-    assert [name for name in RECORD_RESULTS if name in part] == ["peak_relative_velocity", "continuous_pulses"]
+    assert [name for name in DEFAULT_RECORD_RESULTS if name in part] == ["peak_relative_velocity", "continuous_pulses"]
     np.testing.assert_array_equal(part["continuous_pulses"], whole["continuous_pulses"])
     assert part["continuous_pulses"].dtype == np.int32
     np.testing.assert_array_equal(part["peak_relative_velocity"], whole["peak_relative_velocity"].astype(np.float32))
@@ -262,7 +262,7 @@ def test_a_sweep_file_may_scale_the_record_to_its_peak(folder: Path) -> None:
         [0, 5, 25], [0.3, 0.4], excitation=record, scale=amplitude / peak, time_scale=[1, 2], polarity="both"
     )
     assert (scaled.permanent_displacement > 0).any()
-    for name in RECORD_RESULTS:
+    for name in DEFAULT_RECORD_RESULTS:
         assert found[name].dims == tuple(
             dim.replace("scale", "amplitude") if dim == "scale" else dim for dim in scaled[name].dims
         )

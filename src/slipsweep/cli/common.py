@@ -57,6 +57,9 @@ def echo_tally(tally: "Tally") -> None:
             for flag in seen & flags_of(kind):
                 name = (flag.name or "").lower()
                 typer.echo(f"    {name:<22}{tally.flags[flag] / tally.cells:7.2%}  {VALIDITY_TEXT[flag]}")
+    if tally.ratios is not None and tally.ratios.number:
+        low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
+        typer.echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
 
 
 @contextmanager

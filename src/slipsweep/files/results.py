@@ -541,6 +541,10 @@ def _count(file: ResultFile) -> Tally:
         tally.cells = variable.size
         for chunk in grid_chunks(variable.sizes, CHUNK_CELLS):
             tally.add({name: variable.read_codes(chunk, missing)})
+    both = [file[name] for name in ("permanent_displacement", "newmark_displacement") if name in file.results]
+    if len(both) == 2 and both[0].sizes == both[1].sizes and not any(one.is_text for one in both):
+        for chunk in grid_chunks(both[0].sizes, CHUNK_CELLS):
+            tally.add({one.name: np.ma.filled(one.read(chunk).astype(np.float64), math.nan) for one in both})
     return tally
 
 

@@ -28,6 +28,7 @@ from slipsweep.model.parameters import BOUNDS
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import show, unit_factor
 from slipsweep.model.variables import (
+    DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
     DRAWN,
     PARAMETERS,
@@ -609,7 +610,7 @@ def _output(file: Any, parameters: Mapping[str, Parameter]) -> Output:
     """The table [output]; under a record all results are returned if none are named."""
     output: Output = file.output
     if "variables" not in output.model_fields_set:
-        named = RECORD_RESULTS if file.excitation.record is not None else DEFAULT_RESULTS
+        named = DEFAULT_RECORD_RESULTS if file.excitation.record is not None else DEFAULT_RESULTS
         return output.model_copy(update={"variables": list(named)})
     variables = file.output.variables
     if file.uncertainty is not None:

@@ -45,6 +45,9 @@ RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": st
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
+#: Inputs that Newmark's block does not know.
+_NOT_NEWMARKS = ("decay_rate", "delta_mu", "minimum_friction", "structure_frequency")
+
 #: Results that come out of a kernel; the codes in the order of its rows, and those of a record.
 MOTION_CODES = ("sliding_mode", "validity")
 MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", *MOTION_CODES)
@@ -178,6 +181,30 @@ def solve(asked: Request) -> Arrays:
         for name, values in results.items():
             if not np.may_share_memory(values, found[name]):
                 values[where] = found[name]
+    return results
+
+
+def newmark(asked: Request) -> Arrays:
+    """The permanent displacement as `newmark_displacement`: the model is Newmark's; errors as of `solve`."""
+    arrays = {name: values for name, values in asked.arrays.items() if name not in _NOT_NEWMARKS}
+    # along a dimension of the friction law alone its cells are the same
+    shape = np.broadcast_shapes(*(values.shape for values in arrays.values()))
+    same = shape == asked.shape
+    own = replace(
+        asked,
+        shape=shape,
+        arrays=arrays,
+        wanted=("permanent_displacement",),
+        progress=asked.progress if same else None,
+        empty=asked.empty if same else np.empty,
+    )
+    moved = solve(own)["permanent_displacement"]
+    if same:
+        return dict.fromkeys(asked.wanted, moved)
+    results = asked.results()
+    for values in results.values():
+        np.copyto(values, moved)
+    asked.tell(math.prod(asked.shape))
     return results
 
 
@@ -385,7 +412,7 @@ def kernels_of(solver: Callable[..., Any], problem: Problem) -> "list[Kernel]":
     """The kernels that one of the functions above takes for any grid (a sine may need the waves' one besides)."""
     if solver is friction_parameters:
         return [parameter_grid]
-    if solver is not solve:
+    if solver not in (solve, newmark):
         return []
     if isinstance(problem.excitation, Record):
         return [RECORD_KERNEL]

@@ -33,6 +33,7 @@ from slipsweep.model.parameters import (
 )
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
+    DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
     DIMENSION_ORDER,
     FRICTION_PARAMETERS,
@@ -260,11 +261,25 @@ def _polarity(given: Any) -> Variable:
 
 def _plan_record(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
     """Plan of a sweep under a record; `coords` as `check_parameters` gives them."""
-    wanted = tuple(RECORD_RESULTS) if variables is None else check_choices("variables", variables, RECORD_RESULTS)
+    wanted = DEFAULT_RECORD_RESULTS if variables is None else check_choices("variables", variables, RECORD_RESULTS)
     sizes = grid_sizes(coords)
-    task = Task(engine.solve, problem, wanted, sizes, aligned(coords, sizes))
+    tasks = _motion_tasks(problem, wanted, RECORD_RESULTS, sizes, aligned(coords, sizes))
     attrs = about("Response of a rigid block to a recorded motion", problem)
-    return Plan(sizes, coords, (task,), wanted, attrs, cost_of(problem))
+    return Plan(sizes, coords, tasks, wanted, attrs, cost_of(problem) * len(tasks))
+
+
+def _motion_tasks(
+    problem: Problem, wanted: Collection[str], results: Collection[str], sizes: dict[str, int], inputs: Arrays
+) -> tuple[Task, ...]:
+    """The motion of the block, and of Newmark's on the same cells; `results` are those of a motion, in order."""
+    motion = tuple(name for name in results if name in wanted and name != "newmark_displacement")
+    beside = tuple(name for name in ("newmark_displacement",) if name in wanted)
+    classical = replace(problem, model=Newmark(problem.model.g))
+    tasks = (
+        Task(engine.solve, problem, motion, sizes, inputs),
+        Task(engine.newmark, classical, beside, sizes, inputs),
+    )
+    return tuple(task for task in tasks if task.names)
 
 
 def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
@@ -282,12 +297,10 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
             both = aligned(drive, dims)
             coords = coords | {"amplitude": Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])}
 
-    tasks = []
-    motion = tuple(name for name in MOTION_RESULTS if name in wanted)
-    if motion and isinstance(problem.solver, Step):
+    tasks = list(_motion_tasks(problem, wanted, MOTION_RESULTS, sizes, aligned(inputs, sizes)))
+    if tasks and isinstance(problem.solver, Step):
         _check_steps(problem.solver, problem.excitation)
-    if motion:
-        tasks.append(Task(engine.solve, problem, motion, sizes, aligned(inputs, sizes)))
+    cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
     friction = tuple(name for name in FRICTION_PARAMETERS if name in wanted and name not in inputs)
     if friction:
@@ -299,9 +312,9 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
         sizes,
         coords,
         tuple(tasks),
-        tuple(name for name in wanted if name in motion + friction + amplitude),
+        tuple(name for name in wanted if any(name in task.names for task in tasks)),
         about("Permanent displacement of a rigid block, swept", problem),
-        cost_of(problem),
+        cost,
     )
 
 

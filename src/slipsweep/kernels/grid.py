@@ -140,14 +140,24 @@ def scatter(grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.
         elif results.displacement.size:
             for j in range(end - begin):
                 w, from_, to = motion[0, begin + j], period + j * period_stride, result + j * cell_stride
-                for k in range(frequencies):
-                    second = periods[from_ + k * step]
-                    results.displacement[to + k * stride] = w * (second * second)
+                if step == 1 and stride == 1:
+                    seconds, target = periods[from_ : from_ + frequencies], results.displacement[to : to + frequencies]
+                    for k in range(frequencies):
+                        target[k] = w * (seconds[k] * seconds[k])
+                else:
+                    for k in range(frequencies):
+                        second = periods[from_ + k * step]
+                        results.displacement[to + k * stride] = w * (second * second)
         if results.velocity.size:
             for j in range(end - begin):
                 v, from_, to = motion[1, begin + j], period + j * period_stride, result + j * cell_stride
-                for k in range(frequencies):
-                    results.velocity[to + k * stride] = v * periods[from_ + k * step]
+                if step == 1 and stride == 1:
+                    seconds, target = periods[from_ : from_ + frequencies], results.velocity[to : to + frequencies]
+                    for k in range(frequencies):
+                        target[k] = v * seconds[k]
+                else:
+                    for k in range(frequencies):
+                        results.velocity[to + k * stride] = v * periods[from_ + k * step]
 
 
 @scalar

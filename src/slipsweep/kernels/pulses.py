@@ -279,6 +279,14 @@ def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
 @scalar
 def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
     """From Üg = 0 on by integration, χ = φ − π to the stop, which comes before 2π for b ≥ Üy; and all cycles."""
+    sliding = 0
+    for j in range(STRIP):
+        sliding += 1 if lanes[LEFT + j] > 0.0 else 0
+    for j in range(STRIP):
+        lanes[CODE + j] = 0.0
+        lanes[W + j] *= 1.0 if sliding > 0 else cycles
+    if sliding == 0:
+        return
     for j in range(STRIP):
         # vers χ ≥ 2 χ²/π²: this start lies beyond the stop
         b, left = lanes[HELD + j], lanes[LEFT + j]
@@ -294,7 +302,6 @@ def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
         sine = 2.0 * (0.5 * chi - angle_minus_sine(0.5 * chi)) * (1.0 - versine(0.5 * chi))
         lanes[W + j] += (lanes[LEFT + j] - 0.5 * b * chi) * chi - amplitude * (chi - sine)
         lanes[W + j] *= cycles
-        lanes[CODE + j] = 0.0
 
 
 @scalar

@@ -188,6 +188,11 @@ RESULTS: dict[str, dict[str, Any]] = {
         "flag_masks": [int(flag) for flag in Validity],
         "flag_meanings": " ".join((flag.name or "").lower() for flag in Validity),
     },
+    "newmark_displacement": {
+        "units": "m",
+        "long_name": "permanent displacement of Newmark's block, downslope",
+        "ancillary_variables": "validity",
+    },
     "yield_acceleration": {"units": "m s-2", "long_name": "yield acceleration"},
     "limiting_acceleration": {"units": "m s-2", "long_name": "limiting acceleration (Eq. 7)"},
     "acceleration_ratio": {"units": "1", "long_name": "peak ground over limiting acceleration"},
@@ -239,12 +244,13 @@ RECORD_COUNTS: dict[str, dict[str, Any]] = {
     },
 }
 
-#: All that a sweep under a record returns.
+#: Results of a sweep under a record.
 RECORD_RESULTS: dict[str, dict[str, Any]] = {
     "permanent_displacement": RESULTS["permanent_displacement"],
     "peak_relative_velocity": RESULTS["peak_relative_velocity"],
     **RECORD_COUNTS,
     "validity": RESULTS["validity"],
+    "newmark_displacement": RESULTS["newmark_displacement"],
 }
 
 #: The record itself, in the files of results: what is read back to repeat a run.
@@ -305,6 +311,7 @@ RESULT_DTYPES: dict[str, str] = {
 
 #: What `sweep` returns when nothing is asked for by name.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
+DEFAULT_RECORD_RESULTS = ("permanent_displacement", "peak_relative_velocity", *RECORD_COUNTS, "validity")
 
 #: The parameters of Eqs. 7-11.
 FRICTION_PARAMETERS = (

@@ -92,10 +92,11 @@ def sweep(
         Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a record.
     variables : sequence of str, optional
         Results to compute: `permanent_displacement`, `peak_relative_velocity`,
-        `sliding_mode`, `validity` (these by default), the parameters of Eqs. 7-11, and `amplitude`.  Under a record
+        `sliding_mode`, `validity` (these by default), `newmark_displacement` (of Newmark's block on the same cells,
+        with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  Under a record
         `permanent_displacement`, `peak_relative_velocity`, `number_of_slips` (that begin at rest),
         `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension of
-        the paper's harmonic motion) and `validity`, all by default.
+        the paper's harmonic motion) and `validity`, these by default, and `newmark_displacement`.
     chunks : int, tuple, dict or "auto", optional
         Chunks as dask takes them; the result is then lazy.  Frequency is best left whole.
     progress : callable, optional
