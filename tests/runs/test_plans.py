@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import Record
+from slipsweep import Record, Step
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
@@ -194,6 +194,72 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path: Path, name: str, 
         assert stored(tmp_path / "a" / path.name if split else tmp_path / "a") == stored(path)
 
 
+@pytest.mark.parametrize("split", [False, True])
+@pytest.mark.parametrize("name", PLANS)
+def test_what_is_complete_stays_as_it_is(tmp_path: Path, name: str, split: bool) -> None:
+    job, path = PLANS[name](), tmp_path / "a.nc"
+    first = store.run(job, path, command="x", chunk_cells=6, split=split)
+    files = sorted(path.iterdir()) if split else [path]
+    before = [(file.read_bytes(), file.stat().st_mtime_ns) for file in files]
+    again = store.run(PLANS[name](), path, command="y", resume=True, split=split, solved=unsolved)
+    assert (again.found, again.tally, first.found) == (True, first.tally, False)
+    assert [(file.read_bytes(), file.stat().st_mtime_ns) for file in files] == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
+    table = store.stored_table(job.plan, path, again.chunk_cells, job.plan.names)
+    assert_part(job.plan, {}, table, job.plan.solve())
+
+
+def unsolved(*arguments: Any) -> Any:
+    """Solve nothing."""
+    pytest.fail("has begun")
+
+
+def test_what_is_complete_but_of_another_sweep_is_refused(tmp_path: Path) -> None:
+    """By what differs; and so is what is not complete, or nothing of ours."""
+    sweep = spec.parse(AXES + CASES, "a.toml")
+    store.run(sweep_job(sweep), tmp_path / "a.nc", command="x")
+    store.run(limit_job(sweep, 0.05), tmp_path / "l.nc", command="x")
+    store.run(sweep_job(sweep), tmp_path / "split", command="x", chunk_cells=6, split=True)
+    (tmp_path / "split" / "chunk-000001.nc").unlink()
+    (tmp_path / "text.nc").write_text("text")
+    (tmp_path / "cut.nc").write_bytes((tmp_path / "a.nc").read_bytes()[:-4000])
+    other = spec.parse(AXES.replace("[0.5, 1, 3]", "[0.5, 1, 4]") + CASES, "a.toml")
+    before = {path: path.read_bytes() for path in tmp_path.glob("*.nc")}
+    for job, name, message in (
+        (sweep_job(other), "a.nc", r"the sweep file differs: line 5 was 'values = \[0\.5, 1, 3\]'"),
+        (sweep_job(sweep.with_solver(Step())), "a.nc", r"solver was Cycle\(\), is Step"),
+        (limit_job(sweep, 0.05), "a.nc", "--displacement was none, is 0.05|solver was"),
+        (limit_job(sweep, 0.06), "l.nc", r"--displacement was 0\.05, is 0\.06"),
+        (limit_job(other, 0.05), "l.nc", r"\(the sweep file differs\)"),
+        (sweep_job(sweep), "text.nc", "not a netCDF file"),
+        (sweep_job(sweep), "cut.nc", "not a netCDF file, or a damaged one"),
+    ):
+        with pytest.raises(InputError, match=f"{name}: exists already, and is not the complete result.*{message}"):
+            store.run(job, tmp_path / name, command="x", resume=True, solved=unsolved)
+    with pytest.raises(InputError, match="it has 29 files of 30"):
+        store.run(sweep_job(sweep), tmp_path / "split", command="x", resume=True, split=True, solved=unsolved)
+    assert {path: path.read_bytes() for path in tmp_path.glob("*.nc")} == before
+    # without --resume nothing is looked at
+    with pytest.raises(InputError, match="exists already; give --overwrite"):
+        store.run(sweep_job(sweep), tmp_path / "a.nc", command="x")
+
+
+def test_commands_say_that_all_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(AXES + CASES)
+    for arguments in (("run", "a.toml", "-o", "a.nc"), ("limit", "a.toml", "-d", "1cm", "-o", "l.nc")):
+        assert main([*arguments, "--resume"]) == 0
+        assert "complete already" not in capsys.readouterr().out
+        assert main([*arguments, "--resume"]) == 0
+        output = capsys.readouterr()
+        assert f"{arguments[-1]}: complete already, and of this very sweep; nothing was computed" in output.out
+        assert output.err == ""
+        assert main(list(arguments)) == 2
+        assert "exists already; give --overwrite" in capsys.readouterr().err
+
+
 def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
     sweep = spec.parse(AXES + CASES, "a.toml")
     stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 2, chunk_cells=6)
@@ -205,8 +271,6 @@ def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=message):
             store.run(other, tmp_path / "a.nc", command="x", resume=True)
     # the solver that a sweep names is none of the limits'
-    from slipsweep import Step
-
     store.run(limit_job(sweep.with_solver(Step()), 0.05), tmp_path / "a.nc", command="x", resume=True)
 
 

@@ -62,6 +62,11 @@ def echo_tally(tally: "Tally") -> None:
         typer.echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
 
 
+def echo_found(path: Path) -> None:
+    """Say that there was nothing to go on with."""
+    typer.echo(f"{path}: complete already, and of this very sweep; nothing was computed")
+
+
 @contextmanager
 def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Callable[[int], None] | None]:
     """Yield what to call with a number of cells done: a progress bar, if there is a terminal to see it."""

@@ -14,6 +14,7 @@ from slipsweep.cli.common import (
     Scheduler,
     Split,
     Workers,
+    echo_found,
     progress_bar,
 )
 from slipsweep.errors import InputError
@@ -83,6 +84,8 @@ def limit(
         from slipsweep.runs.store import stored_table
 
         report = chunks.run(job, results[0], quiet)
+        if report.found and not quiet:
+            echo_found(report.path)
         # all of it for a figure only
         names = job.plan.names if figures else () if quiet else ("limit_amplitude", "limit_status")
         table = stored_table(job.plan, report.path, report.chunk_cells, names)

@@ -16,6 +16,7 @@ from slipsweep.cli.common import (
     Split,
     Watch,
     Workers,
+    echo_found,
     echo_tally,
     examples,
 )
@@ -81,13 +82,16 @@ def run(
     if quiet:
         return
     grid = grid_text(job.plan.sizes) or "no axes"
-    # drawing counts, reading the sweep file does not
-    took = watch.text(report.tally.cells, unit, report.seconds if checked.sampling is None else None)
-    if checked.sampling is None:
-        typer.echo(f"{report.tally.cells} cells ({grid}) in {took}")
+    if report.found:
+        echo_found(report.path)
     else:
-        points = math.prod(job.plan.sizes.values())
-        typer.echo(f"{points} grid points ({grid}), {checked.sampling.samples} samples each")
-        typer.echo(f"{report.tally.cells} samples solved in {took}")
+        # drawing counts, reading the sweep file does not
+        took = watch.text(report.tally.cells, unit, report.seconds if checked.sampling is None else None)
+        if checked.sampling is None:
+            typer.echo(f"{report.tally.cells} cells ({grid}) in {took}")
+        else:
+            points = math.prod(job.plan.sizes.values())
+            typer.echo(f"{points} grid points ({grid}), {checked.sampling.samples} samples each")
+            typer.echo(f"{report.tally.cells} samples solved in {took}")
     echo_tally(report.tally)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")

@@ -21,6 +21,9 @@ from slipsweep.motion.records import Record
 #: Results that are whole numbers, -1 where there is no value.
 _WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
+#: Attribute that tells of the run that made a file, for programs.
+RUN = "slipsweep_run"
+
 #: Dimension of the samples of a record.
 RECORD_DIM = "record_sample"
 
@@ -120,12 +123,15 @@ class Head:
         The motion that the results are the response to: its samples are written with them.
     sweep : str, optional
         The text of a sweep file, from which the run can be repeated.
+    run : str
+        What another run must have in common with the one that made the file (`slipsweep.runs.parts.stamp`).
     """
 
     title: str
     labels: tuple[str, ...] = ()
     record: Record | None = None
     sweep: str | None = None
+    run: str = ""
 
 
 def write_head(
@@ -135,7 +141,8 @@ def write_head(
     _define(file, table, dtype)
     _label_cases(file, head.labels)
     sweep = {} if head.sweep is None else {"sweep": head.sweep}
-    _describe(file, {**table.attrs, "title": head.title, **_provenance(history), **sweep})
+    run = {RUN: head.run} if head.run else {}
+    _describe(file, {**table.attrs, "title": head.title, **_provenance(history), **sweep, **run})
     file.set_auto_maskandscale(False)
     for name, coordinate in table.coords.items():
         file[name][...] = coordinate.values

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.files import guard
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import RECORD_DIM
+from slipsweep.files.netcdf import RECORD_DIM, RUN
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import available_memory, size_text
 from slipsweep.grid.tally import Tally
@@ -513,7 +513,7 @@ def read_contents(path: Path) -> Contents:
         return Contents(
             path,
             path.stat().st_size,
-            {name: str(value) for name, value in file.attrs.items()},
+            {name: str(value) for name, value in file.attrs.items() if name != RUN},
             {name: _values_text(file[name]) for name in file.coordinates},
             {name: _variable_text(file[name]) for name in file.results}
             | {name: f"not read: {kind}" for name, kind in file.unread.items()},

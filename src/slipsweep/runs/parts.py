@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, RunError
+from slipsweep.files.netcdf import RUN
 from slipsweep.files.outputs import sync
 from slipsweep.jit import sources
 from slipsweep.runs.placed import Layout
@@ -116,10 +117,35 @@ class Manifest:
             value = self.identity.get(name)
             if other.get(name) == value:
                 continue
+            if name == "sweep file" and value is None:
+                return "the sweep file differs"
             if name == "sweep file":
                 return f"the sweep file differs: {_first_difference(str(value), other[name])}"
             return f"{name} was {_shown(value)}, is {_shown(other.get(name))}"
         return None
+
+
+def stamp(manifest: Manifest) -> str:
+    """What a file says of the run that made it, so that a run that would make it again can tell."""
+    cells = {"chunk_cells": manifest.chunk_cells} if manifest.identity["--split"] else {}
+    # the text itself may be long, and most files have it
+    text = _digest(manifest.identity["sweep file"])
+    return json.dumps({"identity": {**manifest.identity, "sweep file": text}, **cells})
+
+
+def read_stamp(attributes: Mapping[str, Any], identity: Mapping[str, Any]) -> Manifest | None:
+    """The run that made a file, by its attributes, to be compared with an `identity`; None where they do not tell."""
+    try:
+        found = json.loads(attributes[RUN])
+        same = found["identity"]["sweep file"] == _digest(identity["sweep file"])
+        text = identity["sweep file"] if same else attributes.get("sweep")
+        return Manifest({**found["identity"], "sweep file": text}, int(found.get("chunk_cells", 0)), False, "")
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _digest(text: str) -> str:
+    return xxhash.xxh3_128_hexdigest(text.encode(errors="surrogatepass"))
 
 
 def _shown(value: object) -> str:

@@ -28,6 +28,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import TooLarge, history_of, rounded
 from slipsweep.files.outputs import appear, check_outputs, sync, writing
+from slipsweep.files.results import open_result
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import Chunk, chunk_lengths, grid_chunks, places
 from slipsweep.grid.resources import available_memory, grid_text, size_text
@@ -51,6 +52,7 @@ class Report:
     seconds: float
     nbytes: int
     tally: Tally
+    found: bool = False  # complete, by an earlier run: nothing was computed
 
 
 def run(
@@ -81,7 +83,8 @@ def run(
     overwrite : bool
         Replace `path` and the chunks of an interrupted run, if they exist.
     resume : bool
-        Go on with the chunks of an interrupted run, if there are any.
+        Go on with the chunks of an interrupted run, if there are any.  An output that is complete and of this very
+        sweep is left as it is.
     split : bool
         Write a folder with a netCDF file for each chunk.
     chunk_cells : int, optional
@@ -110,7 +113,6 @@ def run(
         chunks are kept.
     """
     check_output(job, path, overwrite=overwrite or resume, split=split)
-    plan = job.plan
     identity = parts.identity(job.asked, split)
     with parts.opened(path) as work:
         if not overwrite:
@@ -120,51 +122,91 @@ def run(
                 f"{path}: {work.path.name} holds {len(work.finished)} finished chunks of an interrupted run; "
                 "go on with --resume, or start anew with --overwrite"
             )
+        if resume and not work.finished and path.exists():
+            return _found(job, path, _complete(job, path, identity, split))
         if resume and work.finished and work.manifest is not None:
             _check_same(work, identity, chunk_cells)
-            chunk_cells, overwrite = work.manifest.chunk_cells, work.manifest.overwrite
-            data = work.data(split)
+            manifest, data = work.manifest, work.data(split)
             if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
                 # killed between giving the output its name and clearing the folder away
                 work.done = True
-                tally = Tally(plan.cells)
-                for chunk, arrays in stored_chunks(plan, path, chunk_cells):
-                    _count(tally, plan, chunk, arrays)
-                return Report(path, chunk_cells, 0.0, _nbytes(path), tally)
+                return _found(job, path, manifest.chunk_cells)
         else:
             work.clear()
-            chunk_cells = min(filter(None, (chunk_cells, shared_cells)), default=default_cells(plan))
+            cells = min(filter(None, (chunk_cells, shared_cells)), default=default_cells(job.plan))
+            manifest = parts.Manifest(identity, cells, overwrite, history_of(command))
         # once more: a run that was writing it may have ended before this one got hold of the lock
-        check_outputs([path], overwrite, reads=job.files, folder=split)
-        data = work.data(split)
-        _check_size(job, path, chunk_cells, _nbytes(data))
+        check_outputs([path], manifest.overwrite, reads=job.files, folder=split)
+        return _carry_out(job, path, work, manifest, progress, solved)
 
-        started = time.perf_counter()
-        tally = Tally(plan.cells)
-        cut = dict(enumerate(grid_chunks(plan.sizes, chunk_cells, plan.together)))
-        try:
-            manifest = work.manifest or parts.Manifest(identity, chunk_cells, overwrite, history_of(command))
-            with closing((_Files if split else _OneFile)(job, data, manifest)) as target:
-                _ready(work, target, cut, tally, progress)
-                missing = {number: chunk for number, chunk in cut.items() if number not in work.finished}
-                _write_chunks(work, target, cut, _named(job, solved(plan, missing, progress)), tally)
-                target.check(len(cut))
-            with writing(path):
-                work.close()
-                appear(data, path, overwrite)
-        except TooLarge as large:
-            work.clear()  # no --resume could finish it
-            raise InputError(f"{job.source}: {large}") from None
-        except MemoryError:
-            error = RunError(f"{path}: out of memory at a chunk of {_chunk_text(plan, chunk_cells)}")
-            raise _noted(error, work, data, len(cut)) from None
-        except BaseException as error:
-            if isinstance(error, RunError):
-                work.check()  # what came of that is not worth telling
-            _noted(error, work, data, len(cut))
-            raise
-        work.done = True
+
+def _carry_out(
+    job: Job, path: Path, work: parts.Folder, manifest: parts.Manifest, progress: Progress | None, solved: Solved
+) -> Report:
+    """Solve and write what is missing, and give the output its name."""
+    plan, split, chunk_cells = job.plan, bool(manifest.identity["--split"]), manifest.chunk_cells
+    data = work.data(split)
+    _check_size(job, path, chunk_cells, _nbytes(data))
+    started = time.perf_counter()
+    tally = Tally(plan.cells)
+    cut = dict(enumerate(grid_chunks(plan.sizes, chunk_cells, plan.together)))
+    try:
+        with closing((_Files if split else _OneFile)(job, data, manifest)) as target:
+            _ready(work, target, cut, tally, progress)
+            missing = {number: chunk for number, chunk in cut.items() if number not in work.finished}
+            _write_chunks(work, target, cut, _named(job, solved(plan, missing, progress)), tally)
+            target.check(len(cut))
+        with writing(path):
+            work.close()
+            appear(data, path, manifest.overwrite)
+    except TooLarge as large:
+        work.clear()  # no --resume could finish it
+        raise InputError(f"{job.source}: {large}") from None
+    except MemoryError:
+        error = RunError(f"{path}: out of memory at a chunk of {_chunk_text(plan, chunk_cells)}")
+        raise _noted(error, work, data, len(cut)) from None
+    except BaseException as error:
+        if isinstance(error, RunError):
+            work.check()  # what came of that is not worth telling
+        _noted(error, work, data, len(cut))
+        raise
+    work.done = True
     return Report(path, chunk_cells, time.perf_counter() - started, _nbytes(path), tally)
+
+
+def _complete(job: Job, path: Path, identity: Mapping[str, Any], split: bool) -> int:
+    """The size of the chunks of an output that is complete.
+
+    Raises
+    ------
+    InputError
+        It is not the result of this very sweep.
+    """
+    stored = None
+    try:
+        with open_result(path / _chunk_name(0) if split else path) as file:
+            stored = parts.read_stamp(file.attrs, identity)
+        difference = "it was not made by slipsweep run or limit" if stored is None else stored.difference(identity)
+        if stored is not None and difference is None and split:
+            chunks = len(list(grid_chunks(job.plan.sizes, stored.chunk_cells, job.plan.together)))
+            there = len(list(path.iterdir()))
+            difference = None if there == chunks else f"it has {there} files of {chunks}"
+    except InputError as error:
+        difference = str(error).removeprefix(f"{path}: ")
+    if stored is None or difference is not None:
+        raise InputError(
+            f"{path}: exists already, and is not the complete result of this very sweep ({difference}); give "
+            "--overwrite to replace it, or another name with -o"
+        )
+    return stored.chunk_cells or default_cells(job.plan)
+
+
+def _found(job: Job, path: Path, chunk_cells: int) -> Report:
+    """The report of an output that is complete already."""
+    tally = Tally(job.plan.cells)
+    for chunk, arrays in stored_chunks(job.plan, path, chunk_cells):
+        _count(tally, job.plan, chunk, arrays)
+    return Report(path, chunk_cells, 0.0, _nbytes(path), tally, found=True)
 
 
 def check_output(job: Job, path: Path, *, overwrite: bool, split: bool) -> None:
@@ -342,7 +384,7 @@ class _OneFile:
 
     def create(self) -> None:
         """Make the file, with all but the chunks in it."""
-        head = replace(self.job.head, labels=self.job.labels)
+        head = replace(self.job.head, labels=self.job.labels, run=parts.stamp(self.manifest))
         layout = make_file(self.data, head, self.table, self.job.dtype, self.manifest.history)
         self.manifest.layout, self.manifest.head = layout, file_checksum(self.data, layout)
         sync(self.data)
@@ -435,7 +477,7 @@ class _Files:
             labels = labels[chunk["case"]]
         path = self._name(number)
         temporary = path.with_suffix(".tmp")
-        head = replace(self.job.head, labels=labels)
+        head = replace(self.job.head, labels=labels, run=parts.stamp(self.manifest))
         layout = make_file(temporary, head, replace(table, coords=coords), self.job.dtype, self.manifest.history)
         file = PlacedFile(temporary, layout)
         try:
