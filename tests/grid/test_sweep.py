@@ -4,6 +4,7 @@ import itertools
 import math
 import subprocess
 import sys
+import tomllib
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans
 from slipsweep.grid.chunks import slabs
+from slipsweep.jit import sources
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -49,7 +51,7 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         call.expect = kernel.expect  # type: ignore[attr-defined]
         return call
 
-    monkeypatch.setattr(engine, "CYCLE_KERNEL", counting(engine.CYCLE_KERNEL))
+    monkeypatch.setattr(engine, "SINE_KERNEL", counting(engine.SINE_KERNEL))
     kernels = {rule: counting(kernel) for rule, kernel in engine.STEP_KERNELS.items()}
     monkeypatch.setattr(engine, "STEP_KERNELS", kernels)
     return solved
@@ -537,3 +539,17 @@ def test_peak_memory_is_that_of_the_result(call: str) -> None:
     done = subprocess.run([sys.executable, "-c", MEMORY.format(call=call)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 1.2
+
+
+def test_the_design_chart_takes_one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lanes solve all its cells: what solves those they leave takes as long to compile as they do."""
+    monkeypatch.setattr(engine, "REMAINING_KERNEL", None)
+    with (sources.PACKAGE.parents[1] / "sweeps" / "design_chart.toml").open("rb") as file:
+        axes = tomllib.load(file)["axes"]
+    grid = {name: np.linspace(axes[name]["start"], axes[name]["stop"], axes[name]["num"]) for name in ("theta", "mu_s")}
+    amplitude = 9.81 * np.linspace(axes["amplitude"]["start"], axes["amplitude"]["stop"], axes["amplitude"]["num"])
+    inputs = [values.ravel() for values in np.meshgrid(*grid.values(), amplitude)]
+    arrays = dict(zip((*grid, "amplitude"), inputs, strict=True)) | {"frequency": np.ones(1)}
+    problem = engine.Problem(slipsweep.Mendez(), slipsweep.Sine(10), slipsweep.Cycle())
+    found = engine.solve(engine.Request(problem, inputs[0].shape, arrays, engine.MOTION_RESULTS))
+    assert np.isfinite(found["permanent_displacement"]).mean() > 0.9

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from slipsweep.jit import cache as compiled
-from slipsweep.jit import folders
+from slipsweep.jit import compiling, folders
 
 #: A small kernel, so that compiling it takes a second; says what it gives and whether it was compiled here.
 PROGRAM = """
@@ -294,3 +294,16 @@ def test_a_signal_while_llvm_calls_back_is_heard_after_it(
             assert kernel(2.0) == 4.0, f"compiled before: {known}"
     finally:
         signal.signal(number, before)
+
+
+def test_which_kernel_of_how_many_is_known_when_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_known", "_possible", "_begun"):
+        monkeypatch.setattr(compiling, name, set())
+    said: list[str | None] = []
+    compiling.expect("lanes")
+    compiling.expect("remaining", perhaps=True)
+    with compiling.watched(said.append):
+        for kernel in ("lanes", "remaining"):
+            with compiling.compiling(kernel):
+                pass
+    assert said == ["1 of at most 2", None, "2 of 2", None]

@@ -95,8 +95,8 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
                 return ""
             return f"{task.completed / seconds:.3g} {unit}/s"
 
-    def compiled(kernels: tuple[int, int] | None) -> None:
-        text = f"compiling for this processor, once: {kernels[0]} of {kernels[1]}" if kernels else ""
+    def compiled(kernel: str | None) -> None:
+        text = f"compiling for this processor, once: {kernel}" if kernel else ""
         bar.update(task, description=text)
 
     columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn(), TextColumn("{task.description}"))

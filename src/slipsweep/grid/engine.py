@@ -8,7 +8,7 @@ by the scaling law and costs no kernel call.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +19,25 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import check_served, is_ordinary
 from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import step
+from slipsweep.kernels import cycle, sine, step
 from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.grid import CYCLE_KERNEL, RECORD_KERNEL, STEP_KERNELS, WAVE_KERNEL, Grid, Results, parameter_grid
+from slipsweep.kernels.grid import (
+    PARAMETER_KERNEL,
+    RECORD_KERNEL,
+    REMAINING_KERNEL,
+    SINE_KERNEL,
+    STEP_KERNELS,
+    WAVE_KERNEL,
+    Grid,
+    Results,
+    tile_of,
+)
 from slipsweep.model.options import Mendez, Model, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, Validity
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Sine, Waveform
-
-if TYPE_CHECKING:
-    from slipsweep.jit.cache import Kernel
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -280,7 +287,7 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
 
         def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets)
+            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets, tile_of(grid), cycle.room_of())
 
         # some 2 µs against 0.1, and more for a long record
         return call, max(32, recorded.pieces.shape[0] // 64)
@@ -289,20 +296,22 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle, options.rule)
 
         def call_step(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            kernel(grid, first, last, rows, periods, options, steps, targets)
+            kernel(grid, first, last, rows, periods, options, steps, targets, tile_of(grid))
 
         # a step takes about 1/16 of a cell of the cycle solver
         return call_step, 1 + options.steps_per_cycle // 16
 
-    def call_cycle(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-        stretches = np.array([[first, last]])
-        if _is_plain_sine(motion):
-            rest = np.empty(((last - first + 1) // 2, 2), np.int64)
-            stretches = rest[: CYCLE_KERNEL(grid, first, last, rows, periods, options, targets, rest)]
-        if stretches.size:
-            WAVE_KERNEL(grid, stretches, rows, periods, options, wave, targets)
+    def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+        tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
+        count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, sine.room_of(), remaining)
+        if count:
+            stretches = remaining[:count]
+            REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile, cycle.room_of())
 
-    return call_cycle, 1
+    def call_wave(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+        WAVE_KERNEL(grid, first, last, rows, periods, options, wave, targets, tile_of(grid), cycle.room_of())
+
+    return call_sine if _is_plain_sine(motion) else call_wave, 1
 
 
 def amplitudes(asked: Request) -> Arrays:
@@ -388,7 +397,9 @@ def estimates(asked: Request, checked: bool = False) -> Arrays:
         parameters = np.empty((len(FRICTION_PARAMETERS), cells))
         codes = {name: np.empty(cells, RESULT_DTYPES[name]) for name in ("sliding_mode", "validity")}
         rows = tuple(flat(values) for values in inputs)
-        parameter_grid(grid, 0, cells, rows, options, parameters, codes["sliding_mode"], codes["validity"])
+        PARAMETER_KERNEL(
+            grid, 0, cells, rows, options, tile_of(grid), parameters, codes["sliding_mode"], codes["validity"]
+        )
         found: Arrays = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
         shaped = {name: found[name].reshape(own.shape) for name in asked.wanted}
         if checked:
@@ -408,17 +419,21 @@ def estimates(asked: Request, checked: bool = False) -> Arrays:
     return results
 
 
-def kernels_of(solver: Callable[..., Any], problem: Problem) -> "list[Kernel]":
-    """The kernels that one of the functions above takes for any grid (a sine may need the waves' one besides)."""
+def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
+    """Say which kernels one of the functions above will call, whatever the grid, and which perhaps."""
     if solver is friction_parameters:
-        return [parameter_grid]
-    if solver not in (solve, newmark):
-        return []
-    if isinstance(problem.excitation, Record):
-        return [RECORD_KERNEL]
-    if isinstance(problem.solver, Step):
-        return [STEP_KERNELS[RULES[problem.solver.rule]]]
-    return [CYCLE_KERNEL if _is_plain_sine(problem.excitation) else WAVE_KERNEL]
+        PARAMETER_KERNEL.expect()
+    elif solver not in (solve, newmark):
+        return
+    elif isinstance(problem.excitation, Record):
+        RECORD_KERNEL.expect()
+    elif isinstance(problem.solver, Step):
+        STEP_KERNELS[RULES[problem.solver.rule]].expect()
+    elif _is_plain_sine(problem.excitation):
+        SINE_KERNEL.expect()
+        REMAINING_KERNEL.expect(perhaps=True)
+    else:
+        WAVE_KERNEL.expect()
 
 
 def mark_flexible_blocks(validity: NDArray[np.int16], frequency: Array, structure_frequency: Array) -> None:

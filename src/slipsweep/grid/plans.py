@@ -173,8 +173,7 @@ class Plan:
             _ADVICE,
         )
         for task in self.tasks:
-            for kernel in engine.kernels_of(task.solver, task.problem):
-                kernel.expect()
+            engine.expect_kernels(task.solver, task.problem)
         # all tasks cover the same cells: one of them counts
         return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
 

@@ -13,17 +13,17 @@
 
 import contextlib
 import functools
-import gc
 import os
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 
 from slipsweep.jit import compiling, folders, form, plain, sources
+from slipsweep.jit.garbage import no_collections
 
 #: Versions whose kernels are kept.
 _KEPT_FOLDERS = 4
@@ -51,18 +51,6 @@ def cache_folder() -> Path | None:
     return None
 
 
-@contextlib.contextmanager
-def _no_collections() -> Iterator[None]:
-    """Leave reference cycles alone: a compiler's many objects, nearly all alive, cost 1.3 s of looking for some."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
 class Kernel:
     """A jitted function that is compiled, or loaded from disk, when first called.
 
@@ -85,19 +73,19 @@ class Kernel:
                     self._dispatcher = self._ready(args)
         return self._dispatcher(*args)
 
-    def expect(self) -> None:
-        """Say that the kernel is about to be called: if it is not kept, it counts among those to be compiled."""
+    def expect(self, perhaps: bool = False) -> None:
+        """Say that the kernel will be called, or `perhaps`: if it is not kept, it counts among those to be compiled."""
         if self._dispatcher is None and not numba.config.DISABLE_JIT:
             folder = cache_folder()
             if folder is None or not folders.has(folder, self._function):
-                compiling.expect(self)
+                compiling.expect(self, perhaps)
 
     def _ready(self, args: tuple[Any, ...]) -> Callable[..., Any]:
         if numba.config.DISABLE_JIT:
             return self._function
         signature = tuple(numba.typeof(arg) for arg in args)
         folder = cache_folder()
-        with warnings.catch_warnings(), _no_collections():
+        with warnings.catch_warnings(), no_collections():
             # numba's advice is for us, not for those who run a sweep
             warnings.simplefilter("ignore", numba.NumbaWarning)
             try:

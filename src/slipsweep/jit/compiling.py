@@ -4,10 +4,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-#: Called with the number of the kernel being compiled and of all known so far; with None when it is done.
-Watcher = Callable[[tuple[int, int] | None], None]
+#: Called when a kernel begins to be compiled with which it is of how many ("1 of 2", "1 of at most 2"); with None
+#: when it is done.
+Watcher = Callable[[str | None], None]
 
 _known: set[object] = set()
+_possible: set[object] = set()
 _begun: set[object] = set()
 _watchers: list[Watcher] = []
 _seconds = 0.0
@@ -20,9 +22,15 @@ def seconds() -> float:
     return _seconds + (time.perf_counter() - since if since is not None else 0.0)
 
 
-def expect(kernel: object) -> None:
-    """Say that a kernel will have to be compiled."""
-    _known.add(kernel)
+def expect(kernel: object, perhaps: bool = False) -> None:
+    """Say that a kernel will have to be compiled, or `perhaps`."""
+    (_possible if perhaps else _known).add(kernel)
+
+
+def _count() -> str:
+    """Which kernel is being compiled, of how many."""
+    most = len(_known | _possible)
+    return f"{len(_begun)} of {'at most ' if most > len(_known) else ''}{most}"
 
 
 @contextmanager
@@ -34,7 +42,7 @@ def compiling(kernel: object) -> Iterator[None]:
     _since = started = time.perf_counter()
     try:
         for watcher in _watchers:
-            watcher((len(_begun), len(_known)))
+            watcher(_count())
         yield
     finally:
         _since = None

@@ -11,12 +11,13 @@ import ast
 import functools
 import hashlib
 import json
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from slipsweep.jit import folders
+from slipsweep.jit.garbage import no_collections
 
 #: The folder of the package.
 PACKAGE = Path(__file__).parents[1]
@@ -24,6 +25,9 @@ PACKAGE = Path(__file__).parents[1]
 #: How the sources begin that results come from, and those that machine code comes from.
 RESULTS = "files/spec.py"
 MACHINE_CODE = "kernels/"
+
+#: How a string with a blank begins in what `_append_code` writes.
+_TEXT = "text "
 
 #: Versions of the sources whose parts are kept.
 _KEPT = 4
@@ -91,20 +95,24 @@ def known_sources(package: Path) -> dict[str, Source]:
 
 
 def _parsed(texts: Mapping[str, bytes], package: str) -> dict[str, Source]:
-    return {name: parsed(name, text, texts, package) for name, text in texts.items()}
+    with no_collections():
+        return {name: parsed(name, text, texts, package) for name, text in texts.items()}
 
 
 def parsed(name: str, text: bytes, names: Collection[str], package: str) -> Source:
     """A source, of which the text is known, among those of these names."""
     tree = ast.parse(text)
     imports = {_source(module, names) for module in _imports(tree, name, package)}
-    return Source(_digest(_code(tree, True)), _digest(_code(tree, False)), sorted(filter(None, imports)))
+    code: list[str] = []
+    _append_code(tree, code, True)
+    machine_code = (part for part in code if not part.startswith(_TEXT))
+    return Source(_digest(code), _digest(machine_code), sorted(filter(None, imports)))
 
 
 def _imports(tree: ast.AST, name: str, package: str) -> Iterator[list[str]]:
     """Modules of the package that a source imports, or names in them, by their parts after the package's own."""
     lazy = name.endswith("__init__.py")  # a package says under TYPE_CHECKING what it loads when asked for it
-    todo = [tree]
+    todo: list[ast.AST] = [tree]
     while todo:
         node = todo.pop()
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING" and not lazy:
@@ -119,7 +127,7 @@ def _imports(tree: ast.AST, name: str, package: str) -> Iterator[list[str]]:
             where += [node.module] if node.module else []
             full = [".".join([*where, alias.name]) for alias in node.names]
         yield from (parts[1:] for module in full if (parts := module.split("."))[0] == package)
-        todo += ast.iter_child_nodes(node)
+        todo += (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr))
 
 
 def _source(module: list[str], names: Collection[str]) -> str | None:
@@ -131,24 +139,28 @@ def _source(module: list[str], names: Collection[str]) -> str | None:
     return None
 
 
-def _code(node: Any, texts: bool) -> Iterator[str]:
-    """A tree as text, the same for all versions of Python; without `texts` strings with a blank are left out."""
+def _append_code(node: Any, code: list[str], texts: bool) -> None:
+    """Append a tree as text, the same for all versions of Python; messages of errors only if `texts`."""
     if isinstance(node, list):
         for item in node:
             # a string by itself is a docstring
             if not (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant)):
-                yield from _code(item, texts)
+                _append_code(item, code, texts)
     elif isinstance(node, ast.AST):
-        yield f"({type(node).__name__}"
+        code.append(f"({type(node).__name__}")
         texts = texts and not isinstance(node, ast.Raise)
-        for name, value in ast.iter_fields(node):
-            if value is not None and value != []:
-                yield f".{name}"
-                yield from _code(value, texts)
-        yield ")"
-    elif texts or not isinstance(node, str) or " " not in node:
-        yield repr(node)
+        for name in node._fields:
+            value = getattr(node, name, None)
+            # whether a name is read or written is said by where it stands
+            if value is not None and value != [] and name != "ctx":
+                code.append(name)
+                _append_code(value, code, texts)
+        code.append(")")
+    elif not isinstance(node, str) or " " not in node:
+        code.append(repr(node))
+    elif texts:
+        code.append(f"{_TEXT}{node!r}")
 
 
-def _digest(parts: Iterator[str]) -> str:
+def _digest(parts: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]

@@ -12,6 +12,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar, summed
 from slipsweep.jit.elementary import angle_minus_sine, rising_phase, sine_after, versine
+from slipsweep.kernels import cycle
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -50,6 +51,7 @@ from slipsweep.kernels.lanes import (
     X,
 )
 from slipsweep.model import equations as eq
+from slipsweep.motion.pieces import Wave
 
 #: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes are wrong by 4e-14 of that part at most.
 SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
@@ -151,8 +153,8 @@ def continuous_peak(missed: float, drift: float, first: float, positive: float, 
 
 
 @scalar
-def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
-    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.
+def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) -> Motion:
+    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.  Takes what `cycle.continuous` does.
 
     |Üg| and the friction repeat every quarter cycle, mirrored, so that integrals over a
     quarter give a cycle, and the cycles an arithmetic series.
@@ -161,13 +163,16 @@ def continuous(block: Block, cycles: int, wants_peak: bool) -> Motion:
     missed, missed_moment = eq4_integrals(block, -HALF_PI, began, 1.0)
     up = missed + eq4_integrals(block, began, 0.0, 1.0)[0]
     drift = drift_integral(block)
-    displacement = continuous_displacement(up, missed, missed_moment, drift, began, cycles)
+    displacement = continuous_displacement(up, missed, missed_moment, drift, began, options.cycles)
     peak = math.nan
-    if wants_peak:
+    if options.wants_peak:
         first, positive = continuous_peaks(block, 1.0, 2.0 * up, block.yield_acceleration)
         negative = 2.0 * up + continuous_peaks(block, -1.0, drift - 2.0 * up, 0.0)[1]
-        peak = continuous_peak(missed, drift, first, positive, negative, cycles)
-    return Motion(displacement, peak, 0)
+        peak = continuous_peak(missed, drift, first, positive, negative, options.cycles)
+    if options.wants_peak and math.isnan(peak):  # an event was not found
+        return cycle.continuous(block, options, wave, zeros)
+    # no event enters the displacement: it is no number only where sums overflow
+    return Motion(math.inf if math.isnan(displacement) else displacement, peak, 0)
 
 
 @summed

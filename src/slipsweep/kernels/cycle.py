@@ -15,6 +15,7 @@ V itself, so an error δ in an event's phase moves W by δ² or less.
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -82,7 +83,8 @@ MOST_LEGS = 32
 class Room(NamedTuple):
     """Where a block is followed: its state, a record of its legs, and zeros of D on either side of Üg = 0.
 
-    One for all cells: a function that makes an array counts the references to every array it is handed.
+    One for all cells: a function that makes an array counts the references to every array it is handed, and
+    for each kind of array that a kernel makes numba compiles a function of its own.
     """
 
     state: np.ndarray
@@ -90,16 +92,15 @@ class Room(NamedTuple):
     zeros: np.ndarray
 
 
-@scalar
-def room_for(legs: int) -> Room:
-    """Room, with a record of so many legs; for kernels only, which free what they are handed."""
-    return Room(np.zeros(STATE_ROWS), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
-
-
 #: Kinds of legs, and the columns of a record of them, which `history` samples: kind, piece, phase on
 #: it and in the table at the start, phase at the end, b, V and W.
 HOLD, FOLLOW, ATTENUATE = range(3)
 LEG_COLUMNS = 8
+
+
+def room_of(legs: int = 0) -> Room:
+    """Room, with a record of so many legs."""
+    return Room(np.zeros(STATE_ROWS), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
 
 
 @in_lanes
@@ -530,16 +531,26 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
     return Motion(displacement, peak if options.wants_peak else math.nan, 0)
 
 
-@scalar
-def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, room: Room, motion: np.ndarray, codes: np.ndarray
-) -> None:
-    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
-    for j in range(count):
-        block = block_at(cells, j, options)
-        codes[0, j], codes[1, j] = block.sliding_mode, validity_before(block, wave)
-        motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
-        if block.sliding_mode == CONTINUOUS:
-            store_motion(continuous(block, options, wave, room.zeros), j, motion, codes)
-        elif block.sliding_mode == STICK_SLIP:
-            store_motion(train(block, options, wave, room), j, motion, codes)
+def solver_of(
+    continuous: Callable[[Block, Options, Wave, np.ndarray], Motion],
+) -> Callable[[np.ndarray, int, Options, Wave, Room, np.ndarray, np.ndarray], None]:
+    """The jitted solver of a tile's cells, one by one, given how one slides continuously."""
+
+    @scalar
+    def solve_cells(
+        cells: np.ndarray, count: int, options: Options, wave: Wave, room: Room, motion: np.ndarray, codes: np.ndarray
+    ) -> None:
+        """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
+        for j in range(count):
+            block = block_at(cells, j, options)
+            codes[0, j], codes[1, j] = block.sliding_mode, validity_before(block, wave)
+            motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
+            if block.sliding_mode == CONTINUOUS:
+                store_motion(continuous(block, options, wave, room.zeros), j, motion, codes)
+            elif block.sliding_mode == STICK_SLIP:
+                store_motion(train(block, options, wave, room), j, motion, codes)
+
+    return solve_cells
+
+
+solve_cells = solver_of(continuous)

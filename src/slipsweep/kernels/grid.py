@@ -14,7 +14,6 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import cycle, record, sine, step
 from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
-from slipsweep.kernels.lanes import LANES_SIZE
 from slipsweep.motion.pieces import Wave
 
 
@@ -44,13 +43,17 @@ class Results(NamedTuple):
     unsolved: np.ndarray
 
 
-class Runs(NamedTuple):
-    """Cells of a tile that follow each other along the last dimension: `count` runs, of which run r begins with
-    cell `first[r]` (the last ends with cell `first[count] - 1`), at period `period[r]` and result `result[r]`.
+class Tile(NamedTuple):
+    """Room for the cells of a tile: `cells` (7 rows, the fields of `Cell`), and their `motion` and `codes`.
 
-    `at` and `position` are room for those of a cell along the dimensions and in the nine flat arrays.
+    Cells that follow each other along the last dimension of the grid are a run: run r begins with cell `first[r]`
+    of the tile (the last ends with cell `first[count] - 1`), at period `period[r]` and result `result[r]`.
+    `at` and `position` are room for the indices of a cell along the dimensions and in the nine flat arrays.
     """
 
+    cells: np.ndarray
+    motion: np.ndarray
+    codes: np.ndarray
     first: np.ndarray
     period: np.ndarray
     result: np.ndarray
@@ -58,11 +61,17 @@ class Runs(NamedTuple):
     position: np.ndarray
 
 
+def tile_of(grid: Grid) -> Tile:
+    """Room for a tile of a grid; made here, for each function that makes arrays costs a kernel's compilation much."""
+    integers = [np.empty(size, np.int64) for size in (TILE + 1, TILE, TILE, grid.shape.size, 9)]
+    return Tile(np.empty(7 * TILE), np.empty((2, TILE)), np.empty((4, TILE), np.int64), *integers)
+
+
 @scalar
-def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], cells: np.ndarray, runs: Runs) -> int:
-    """Fill `cells` (7 rows of a tile) and `runs` for `count` cells of a grid from `begin` on; the number of runs."""
+def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], tile: Tile) -> int:
+    """Fill a tile with `count` cells of a grid from `begin` on; the number of runs."""
     dimensions = grid.shape.size
-    index, position = runs.at, runs.position
+    index, position = tile.at, tile.position
     rest = begin
     for axis in range(dimensions - 1, -1, -1):
         index[axis] = rest % grid.shape[axis]
@@ -78,7 +87,7 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], c
         for row in range(7):
             values, at, stride = inputs[row], position[row], grid.strides[row, last]
             # by loops: an assignment to a slice brings 30 functions of numba's, 2 s of the first compilation
-            target = cells[row * TILE + done : row * TILE + done + run]
+            target = tile.cells[row * TILE + done : row * TILE + done + run]
             if stride == 0:
                 value = values[at]
                 for j in range(run):
@@ -87,7 +96,7 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], c
                 source = values[at : at + (run - 1) * stride + 1]
                 for j in range(run):
                     target[j] = source[j * stride]
-        runs.first[found], runs.period[found], runs.result[found] = done, position[7], position[8]
+        tile.first[found], tile.period[found], tile.result[found] = done, position[7], position[8]
         found += 1
         done += run
         # carry to the next run along the last dimension
@@ -101,27 +110,12 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], c
             index[axis] = 0
             index[axis - 1] += 1
             axis -= 1
-    runs.first[found] = count
+    tile.first[found] = count
     return found
 
 
 @scalar
-def empty_runs(grid: Grid) -> Runs:
-    """Room for the runs of a tile."""
-    return Runs(
-        np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64), np.empty(TILE, np.int64),
-        np.empty(grid.shape.size, np.int64), np.empty(9, np.int64),
-    )  # fmt: skip
-
-
-@scalar
-def place_of(grid: Grid, runs: Runs, run: int, j: int) -> int:
-    """Where the result of cell j of a tile stands, which lies in a run."""
-    return runs.result[run] + (j - runs.first[run]) * grid.strides[8, -1]
-
-
-@scalar
-def scatter(grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.ndarray, results: Results) -> None:
+def scatter(grid: Grid, tile: Tile, count: int, periods: np.ndarray, results: Results) -> None:
     """Spread the solved cells of `count` runs over their frequencies: u = W/ω², v = V/ω (the scaling law).
 
     Rows of codes are spread one by one (`spread_codes`), as the arrays they go to have types of their own.
@@ -129,17 +123,17 @@ def scatter(grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.
     frequencies, step, stride = grid.frequencies, grid.frequency_stride, grid.result_stride
     period_stride, cell_stride = grid.strides[7, -1], grid.strides[8, -1]
     for run in range(count):
-        begin, end = runs.first[run], runs.first[run + 1]
-        period, result = runs.period[run], runs.result[run]
+        begin, end = tile.first[run], tile.first[run + 1]
+        period, result = tile.period[run], tile.result[run]
         if results.displacement.size and frequencies == 1 and period_stride == 0 and cell_stride == 1:
             # slices, which numba knows to begin at 0: a loop in SIMD
-            moved, target = motion[0, begin:end], results.displacement[result : result + end - begin]
+            moved, target = tile.motion[0, begin:end], results.displacement[result : result + end - begin]
             scale = periods[period] * periods[period]
             for j in range(end - begin):
                 target[j] = moved[j] * scale
         elif results.displacement.size:
             for j in range(end - begin):
-                w, from_, to = motion[0, begin + j], period + j * period_stride, result + j * cell_stride
+                w, from_, to = tile.motion[0, begin + j], period + j * period_stride, result + j * cell_stride
                 if step == 1 and stride == 1:
                     seconds, target = periods[from_ : from_ + frequencies], results.displacement[to : to + frequencies]
                     for k in range(frequencies):
@@ -150,7 +144,7 @@ def scatter(grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.
                         results.displacement[to + k * stride] = w * (second * second)
         if results.velocity.size:
             for j in range(end - begin):
-                v, from_, to = motion[1, begin + j], period + j * period_stride, result + j * cell_stride
+                v, from_, to = tile.motion[1, begin + j], period + j * period_stride, result + j * cell_stride
                 if step == 1 and stride == 1:
                     seconds, target = periods[from_ : from_ + frequencies], results.velocity[to : to + frequencies]
                     for k in range(frequencies):
@@ -161,14 +155,14 @@ def scatter(grid: Grid, runs: Runs, count: int, periods: np.ndarray, motion: np.
 
 
 @scalar
-def spread_codes(grid: Grid, runs: Runs, count: int, codes: np.ndarray, target: np.ndarray) -> None:
+def spread_codes(grid: Grid, tile: Tile, count: int, row: int, target: np.ndarray) -> None:
     """Spread a row of codes of `count` runs over their frequencies."""
     cell_stride = grid.strides[8, -1]
     for run in range(count if target.size else 0):
-        begin, end, result = runs.first[run], runs.first[run + 1], runs.result[run]
+        begin, end, result = tile.first[run], tile.first[run + 1], tile.result[run]
         for j in range(end - begin):
             for k in range(grid.frequencies):
-                target[result + j * cell_stride + k * grid.result_stride] = codes[begin + j]
+                target[result + j * cell_stride + k * grid.result_stride] = tile.codes[row, begin + j]
 
 
 @scalar
@@ -181,96 +175,97 @@ def note_unsolved(begin: int, count: int, validity: np.ndarray, results: Results
 
 def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    results: Results, rest: np.ndarray,
+    results: Results, tile: Tile, room: sine.Room, remaining: np.ndarray,
 ) -> int:  # fmt: skip
-    cells, runs = np.empty(7 * TILE), empty_runs(grid)
-    motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
-    room = sine.Room(
-        np.empty(sine.BLOCKS_SIZE), np.empty(LANES_SIZE), np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64),
-        np.empty(TILE, np.bool_),
-    )  # fmt: skip
     stretches = 0
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        found = gather(grid, begin, count, inputs, cells, runs)
-        others = sine.solve_cells(cells, count, options, room, motion, codes)
-        scatter(grid, runs, found, periods, motion, results)
-        spread_codes(grid, runs, found, codes[0], results.codes[0])
-        spread_codes(grid, runs, found, codes[1], results.codes[1])
-        for j in range(count if others > 0 else 0):
-            if room.left[j] and stretches > 0 and rest[stretches - 1, 1] == begin + j:
-                rest[stretches - 1, 1] += 1
+        runs = gather(grid, begin, count, inputs, tile)
+        left = sine.solve_cells(tile.cells, count, options, room, tile.motion, tile.codes)
+        scatter(grid, tile, runs, periods, results)
+        spread_codes(grid, tile, runs, 0, results.codes[0])
+        spread_codes(grid, tile, runs, 1, results.codes[1])
+        for j in range(count if left > 0 else 0):
+            if room.left[j] and stretches > 0 and remaining[stretches - 1, 1] == begin + j:
+                remaining[stretches - 1, 1] += 1
             elif room.left[j]:
-                rest[stretches, 0], rest[stretches, 1] = begin + j, begin + j + 1
+                remaining[stretches, 0], remaining[stretches, 1] = begin + j, begin + j + 1
                 stretches += 1
     return stretches
 
 
-def _wave_grid(
+@scalar
+def place(grid: Grid, begin: int, count: int, runs: int, periods: np.ndarray, results: Results, tile: Tile) -> None:
+    """Place the results of a tile of cells from `begin` on, which lie in `runs`: W, V, mode and validity."""
+    note_unsolved(begin, count, tile.codes[1], results)
+    scatter(grid, tile, runs, periods, results)
+    spread_codes(grid, tile, runs, 0, results.codes[0])
+    spread_codes(grid, tile, runs, 1, results.codes[1])
+
+
+def _remaining_grid(
     grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results,
+    wave: Wave, results: Results, tile: Tile, room: cycle.Room,
 ) -> None:  # fmt: skip
-    cells, runs = np.empty(7 * TILE), empty_runs(grid)
-    motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
-    room = cycle.room_for(0)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
         for begin in range(stretches[stretch, 0], last, TILE):
             count = min(TILE, last - begin)
-            found = gather(grid, begin, count, inputs, cells, runs)
-            cycle.solve_cells(cells, count, options, wave, room, motion, codes)
-            note_unsolved(begin, count, codes[1], results)
-            scatter(grid, runs, found, periods, motion, results)
-            spread_codes(grid, runs, found, codes[0], results.codes[0])
-            spread_codes(grid, runs, found, codes[1], results.codes[1])
+            runs = gather(grid, begin, count, inputs, tile)
+            sine.solve_remaining(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+            place(grid, begin, count, runs, periods, results, tile)
+
+
+def _wave_grid(
+    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    wave: Wave, results: Results, tile: Tile, room: cycle.Room,
+) -> None:  # fmt: skip
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
+        runs = gather(grid, begin, count, inputs, tile)
+        cycle.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+        place(grid, begin, count, runs, periods, results, tile)
 
 
 def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results,
+    wave: Wave, results: Results, tile: Tile, room: cycle.Room,
 ) -> None:  # fmt: skip
-    cells, runs = np.empty(7 * TILE), empty_runs(grid)
-    motion, codes = np.empty((2, TILE)), np.empty((4, TILE), np.int64)
-    room = cycle.room_for(0)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        found = gather(grid, begin, count, inputs, cells, runs)
-        record.solve_cells(cells, count, options, wave, room, motion, codes)
-        scatter(grid, runs, found, periods, motion, results)
-        spread_codes(grid, runs, found, codes[0], results.codes[0])
-        spread_codes(grid, runs, found, codes[1], results.codes[1])
-        spread_codes(grid, runs, found, codes[2], results.codes[2])
-        spread_codes(grid, runs, found, codes[3], results.codes[3])
-        note_unsolved(begin, count, codes[3], results)
+        runs = gather(grid, begin, count, inputs, tile)
+        record.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+        note_unsolved(begin, count, tile.codes[3], results)
+        scatter(grid, tile, runs, periods, results)
+        spread_codes(grid, tile, runs, 0, results.codes[0])
+        spread_codes(grid, tile, runs, 1, results.codes[1])
+        spread_codes(grid, tile, runs, 2, results.codes[2])
+        spread_codes(grid, tile, runs, 3, results.codes[3])
 
 
 def _step_grid_of(rule: int) -> Kernel:
     # a kernel a rule, so that only the one in use is compiled
     def step_grid(
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-        steps: step.Steps, results: Results,
+        steps: step.Steps, results: Results, tile: Tile,
     ) -> None:  # fmt: skip
-        cells, runs = np.empty(7 * TILE), empty_runs(grid)
-        motion, codes = np.empty((2, TILE)), np.empty((2, TILE), np.int64)
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
-            found = gather(grid, begin, count, inputs, cells, runs)
-            step.solve_cells(cells, count, rule, options, steps, motion, codes)
-            note_unsolved(begin, count, codes[1], results)
-            scatter(grid, runs, found, periods, motion, results)
-            spread_codes(grid, runs, found, codes[0], results.codes[0])
-            spread_codes(grid, runs, found, codes[1], results.codes[1])
+            runs = gather(grid, begin, count, inputs, tile)
+            step.solve_cells(tile.cells, count, rule, options, steps, tile.motion, tile.codes)
+            place(grid, begin, count, runs, periods, results, tile)
 
     return Kernel(step_grid)
 
 
-#: Kernels of the stepping solver by its rule; of the cycle solver for any waveform, for stretches of cells
-#: (rows: the first, and the first after it); and its short way for the sine, which leaves some cells to that: their
-#: number of stretches is returned, and `rest` holds them.  Most sweeps of a sine leave none, and a third of
-#: the first compilation is spared.
+#: Kernels of the stepping solver by its rule; of the cycle solver for any waveform; its short ways for the sine,
+#: which leave some cells: the number of their stretches is returned, and `remaining` holds them (rows: the first
+#: cell, and the first after it); and what solves those.  Most sweeps of a sine leave none, and half the first
+#: compilation is spared.
 STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (step.RECTANGLE, step.TRAPEZOID, step.SIMPSON)}
 WAVE_KERNEL = Kernel(_wave_grid)
-CYCLE_KERNEL = Kernel(_sine_grid)
+SINE_KERNEL = Kernel(_sine_grid)
+REMAINING_KERNEL = Kernel(_remaining_grid)
 
 #: Of records: each pulse with its own peak, and counts of slips and pulses in place of the sliding mode.
 RECORD_KERNEL = Kernel(_record_grid)
@@ -282,27 +277,27 @@ def _parameter_grid(
     last: int,
     inputs: tuple[np.ndarray, ...],
     options: Options,
+    tile: Tile,
     parameters: np.ndarray,
     mode: np.ndarray,
     validity: np.ndarray,
 ) -> None:
-    cells, runs = np.empty(7 * TILE), empty_runs(grid)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        found = gather(grid, begin, count, inputs, cells, runs)
-        for run in range(found):
-            for j in range(runs.first[run], runs.first[run + 1]):
-                block = block_of(cell_of(cells, j), options.rise, options.g)
-                place = place_of(grid, runs, run, j)
-                parameters[0, place] = block.yield_acceleration
-                parameters[1, place] = block.limiting_acceleration
-                parameters[2, place] = block.acceleration_ratio
-                parameters[3, place] = block.minimum_friction
-                parameters[4, place] = block.delta_mu
-                parameters[5, place] = block.decay_rate
-                mode[place] = block.sliding_mode
-                validity[place] = block.validity & ~FRICTION_ESTIMATED  # known only with the motion
+        runs = gather(grid, begin, count, inputs, tile)
+        for run in range(runs):
+            for j in range(tile.first[run], tile.first[run + 1]):
+                block = block_of(cell_of(tile.cells, j), options.rise, options.g)
+                at = tile.result[run] + (j - tile.first[run]) * grid.strides[8, -1]
+                parameters[0, at] = block.yield_acceleration
+                parameters[1, at] = block.limiting_acceleration
+                parameters[2, at] = block.acceleration_ratio
+                parameters[3, at] = block.minimum_friction
+                parameters[4, at] = block.delta_mu
+                parameters[5, at] = block.decay_rate
+                mode[at] = block.sliding_mode
+                validity[at] = block.validity & ~FRICTION_ESTIMATED  # known only with the motion
 
 
 #: Friction parameters of every cell (rows as in `variables.FRICTION_PARAMETERS`).
-parameter_grid = Kernel(_parameter_grid)
+PARAMETER_KERNEL = Kernel(_parameter_grid)

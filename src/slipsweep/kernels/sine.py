@@ -29,17 +29,16 @@ from slipsweep.kernels.block import (
     TILE,
     YIELD,
     Options,
-    block_at,
     cell_of,
     decay_rate_of,
     interface_of,
     lane_response,
     settled_in_cycles,
-    store_motion,
     whole_lanes,
 )
 from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
 from slipsweep.kernels.continuous import SHORT_SINE, continuous, lane_continuous
+from slipsweep.kernels.cycle import solver_of
 from slipsweep.kernels.lanes import (
     CODE,
     CONVERGED,
@@ -78,6 +77,14 @@ class Room(NamedTuple):
     left: np.ndarray
 
 
+def room_of() -> Room:
+    """Room for a tile."""
+    return Room(
+        np.empty(BLOCKS_SIZE), np.empty(LANES_SIZE), np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64),
+        np.empty(TILE, np.bool_),
+    )  # fmt: skip
+
+
 @in_lanes
 def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
     """Which way a cell goes (docs/numerics.md#lanes-of-the-sine)."""
@@ -85,12 +92,13 @@ def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
     decay = blocks[DECAY + j]
     start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
     gentle = decay * end <= LANE_E_FOLDINGS
-    # as D > 0 at the peak, it stays positive once it is: either E is convex, hence D concave; or dD/dx ≥ 0 at
-    # Üg = 0, so that D rises first and turns once at most, and dE/dx > 0, by a bound with the largest friction
-    # and normal acceleration
+    # as D > 0 at the peak, it stays positive once it is: either E is convex from where sliding may begin, hence D
+    # concave; or dD/dx ≥ 0 at Üg = 0, so that D rises first and turns once at most, and dE/dx > 0, by a bound with
+    # the largest friction and normal acceleration
     tan_theta, mu_s = blocks[TAN_THETA + j], blocks[MU_S + j]
     most = mu_s + blocks[DELTA_MU + j]
-    convex = decay * options.g >= 2.0 * tan_theta
+    least = start if mode == STICK_SLIP else 0.0
+    convex = decay * (options.g + least * tan_theta) >= 2.0 * tan_theta
     rises = most * (decay * (options.g + end * tan_theta) - tan_theta) < eq.limit_denominator(mu_s, tan_theta)
     lags = most * (tan_theta - decay * options.g) <= tan_theta * (mu_s - tan_theta)
     smooth = (options.rise == MONOTONE) & (at_end < end) & (convex | (rises & lags))
@@ -293,17 +301,12 @@ def solve_cells(
     number = runs_of(blocks, count, room.runs)
     for way in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
         solve_way(way, number, options, room, motion, codes)
-    others = 0
+    remaining = 0
     for j in range(count):
-        others += 1 if blocks[_WAY + j] == OTHER else 0
-    for j in range(count if others > 0 else 0):
         left[j] = blocks[_WAY + j] == OTHER
-        if left[j]:
-            block = block_at(cells, j, options)
-            if block.sliding_mode == CONTINUOUS:
-                found = continuous(block, options.cycles, options.wants_peak)
-                if not (options.wants_peak and math.isnan(found.peak_velocity)):
-                    store_motion(found, j, motion, codes)
-                    left[j] = False
-                    others -= 1
-    return others
+        remaining += 1 if left[j] else 0
+    return remaining
+
+
+#: Solves the cells that are left: in continuous sliding by quarters of the sine's cycle, else as of any wave.
+solve_remaining = solver_of(continuous)
