@@ -407,7 +407,10 @@ def test_every_axis_has_its_unit_and_the_caption_its_parameters(result: Result) 
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
     assert all(label.get_text().endswith("m") for label in figure.axes[-1].get_yticklabels())
     caption = figure.get_supxlabel()
-    assert caption.startswith("θ = 6°, μs = 0.45\nmodel: mendez, monotone, eq12; 5 cycles of a sine; slipsweep ")
+    assert caption.startswith(
+        "θ = 6°, μs = 0.45\nÜy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated\n"
+        "Mendez et al. 2012, monotone rise, recoupling by Eq. 12; 5 cycles of a sine; slipsweep "
+    )
 
 
 @pytest.mark.parametrize(

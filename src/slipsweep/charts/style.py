@@ -108,13 +108,29 @@ def caption(table: Table, look: Look | None = None) -> str:
     return "\n".join([", ".join(parts), *uncertain, model_text(attributes)]).strip()
 
 
+#: Models and their options in captions.
+_WORDS: dict[Any, str] = {
+    "mendez": "Mendez et al. 2012",
+    "newmark": "Newmark's block",
+    "monotone": "monotone rise",
+    "literal": "literal rise",
+    "eq12": "recoupling by Eq. 12",
+    "integrate": "recoupling by integration",
+}
+
+
 def model_text(attributes: Mapping[str, Any]) -> str:
-    """The model and the shaking of a result: ``model: mendez, monotone, eq12; 10 cycles of a sine``."""
+    """What is estimated in a result, its model and its shaking, on two lines.
+
+    Like ``Üy given; λ by Eq. 6, Δμ by Eqs. 10–11: estimated`` and
+    ``Mendez et al. 2012, monotone rise, recoupling by Eq. 12; 10 cycles of a sine``.
+    """
     model = MODELS.from_attributes(attributes)
-    words = [model.name, *(value for value in model.options.values() if isinstance(value, str))]
+    words = [_WORDS[model.name], *(_WORDS[value] for value in model.options.values() if value in _WORDS)]
     recorded = "record" in attributes
     shaking = f"record {plain(str(attributes['record']))}" if recorded else WAVEFORMS.from_attributes(attributes)
-    return f"model: {', '.join(words)}; {shaking}"
+    inputs = [plain(str(attributes["friction_inputs"]))] if "friction_inputs" in attributes else []
+    return "\n".join([*inputs, f"{', '.join(words)}; {shaking}"])
 
 
 def drawn_text(attributes: Mapping[str, Any]) -> str:

@@ -128,6 +128,7 @@ def _summarize(table: "Table") -> None:
     if found.size:
         for text, value in (("smallest", found.min()), ("median", np.median(found)), ("largest", found.max())):
             typer.echo(f"  {text:<24}{value:.6g} m/s2 ({value / g:.4g} g)")
+    typer.echo(f"inputs: {table.attrs['friction_inputs']}")
     typer.echo("status (limit_status):")
     for one in LimitStatus:
         share = np.count_nonzero(status == one) / status.size

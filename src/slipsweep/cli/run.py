@@ -93,5 +93,6 @@ def run(
             points = math.prod(job.plan.sizes.values())
             typer.echo(f"{points} grid points ({grid}), {checked.sampling.samples} samples each")
             typer.echo(f"{report.tally.cells} samples solved in {took}")
+    typer.echo(f"inputs: {job.plan.empty().attrs['friction_inputs']}")
     echo_tally(report.tally)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")

@@ -126,6 +126,7 @@ def simulate(
     for name in RECORD_COUNTS:
         if name in table:
             typer.echo(f"{name.replace('_', ' '):<24}{table[name].item()}")
+    typer.echo(f"inputs                  {table.attrs['friction_inputs']}")
     for kind in FlagKind:
         for flag in Validity(table["validity"].item()) & flags_of(kind):
             typer.echo(f"{kind:<24}{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")

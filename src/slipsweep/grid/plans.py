@@ -20,6 +20,7 @@ from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
+from slipsweep.model.estimates import friction_inputs
 from slipsweep.model.options import MODELS, SOLVERS, Cycle, Newmark, Step
 from slipsweep.model.parameters import (
     BOUNDS,
@@ -263,7 +264,7 @@ def _plan_record(problem: Problem, coords: dict[str, Variable], variables: Any) 
     wanted = DEFAULT_RECORD_RESULTS if variables is None else check_choices("variables", variables, RECORD_RESULTS)
     sizes = grid_sizes(coords)
     tasks = _motion_tasks(problem, wanted, RECORD_RESULTS, sizes, aligned(coords, sizes))
-    attrs = about("Response of a rigid block to a recorded motion", problem)
+    attrs = about("Response of a rigid block to a recorded motion", problem, coords)
     return Plan(sizes, coords, tasks, wanted, attrs, cost_of(problem) * len(tasks))
 
 
@@ -312,7 +313,7 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
         coords,
         tuple(tasks),
         tuple(name for name in wanted if any(name in task.names for task in tasks)),
-        about("Permanent displacement of a rigid block, swept", problem),
+        about("Permanent displacement of a rigid block, swept", problem, coords),
         cost,
     )
 
@@ -450,11 +451,12 @@ _ADVICE = "ask for fewer variables or cells, or give chunks= for a lazy result"
 _SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 
-def about(title: str, problem: Problem) -> dict[str, Any]:
+def about(title: str, problem: Problem, given: Collection[str]) -> dict[str, Any]:
     """What results say of themselves: the choices read back from it are those of the problem."""
+    inputs = {"friction_inputs": friction_inputs(problem.model.name, given)}
     motion = problem.excitation
     if isinstance(motion, Record):
         shaking = {"record": motion.name, **motion.attrs}
     else:
         shaking = WAVEFORMS.attributes(motion) | SOLVERS.attributes(problem.solver)
-    return {"title": title, **_SOURCE, **MODELS.attributes(problem.model), **shaking}
+    return {"title": title, **_SOURCE, **MODELS.attributes(problem.model), **inputs, **shaking}

@@ -27,6 +27,7 @@ from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes,
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
+from slipsweep.model.estimates import friction_inputs
 from slipsweep.model.options import MODELS, Model, Newmark
 from slipsweep.model.parameters import (
     BOUNDS,
@@ -486,7 +487,9 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
         dropped.add("amplitude")  # A = ω²d of the stand-ins is nobody's amplitude
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     _check_draws(sampling, draws, [name for name in sampling.distributions if name not in stand_ins], coords)
-    attrs = {**plan.attrs, "title": TITLE, **sampling.attributes}
+    kinds = {name: one.kind for name, one in sampling.distributions.items()}
+    inputs = friction_inputs(plan.tasks[0].problem.model.name, coords, kinds)
+    attrs = {**plan.attrs, "title": TITLE, "friction_inputs": inputs, **sampling.attributes}
     return SamplePlan(sampling, draws, plan.tasks[0].problem, coords, attrs)
 
 
