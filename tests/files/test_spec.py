@@ -359,3 +359,22 @@ def test_the_sweeps_that_come_along_are_good(path: Path) -> None:
     sweep = spec.load(path)
     if path.stem == "design_chart":
         assert 2.5e6 < sweep.plan().cells < 3.5e6
+
+
+def test_the_measured_interface_takes_no_estimate_and_holds_the_tests() -> None:
+    """Its two cases, at the amplitude and frequency of their tests, are those of sweeps/paper.toml."""
+    sweeps = Path(__file__).parents[2] / "sweeps"
+    plan = spec.load(sweeps / "interface.toml").plan()
+    table, paper = plan.solve(), spec.load(sweeps / "paper.toml").plan().solve()
+    assert table.attrs["friction_inputs"] == "Üy, λ, Δμ given"
+    flags = np.bitwise_or.reduce(table["validity"].values, axis=None)
+    assert not flags & (variables.Validity.FRICTION_ESTIMATED | variables.VALUELESS)
+    for case in range(2):
+        amplitude, frequency = (float(paper[name].values[case]) for name in ("amplitude", "frequency"))
+        at = [
+            int(np.abs(table[name].values - value).argmin())
+            for name, value in (("amplitude", amplitude), ("frequency", frequency))
+        ]
+        near = table["permanent_displacement"].values[at[0], at[1], case]
+        assert near == pytest.approx(paper["permanent_displacement"].values[case], rel=0.03)
+        assert table["newmark_displacement"].values[at[0], at[1], case] > near
