@@ -3,10 +3,10 @@
 `sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
 inputs are uncertain, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history,
 `flags` takes a result's `validity` apart.  `measured_friction` gives the paper's Eq. 1 on the accelerations
-of a test on a shaking table.  The shaking is a waveform (`Sine`, `Cosine`, `Triangle`,
-`Square`, `Harmonics`) or a `Record` (`read_record`); the model is that of Mendez, Romo and Botero
-(2012), `Mendez`, or `Newmark`; the solver `Cycle` or `Step`.  `Validity` and `SlidingMode` name the
-codes of the results.
+of a test on a shaking table, `calibrate` the parameters of the model from one.  The shaking is a waveform
+(`Sine`, `Cosine`, `Triangle`, `Square`, `Harmonics`) or a `Record` (`read_record`); the model is that of Mendez,
+Romo and Botero (2012), `Mendez`, or `Newmark`; the solver `Cycle` or `Step`.  `Validity` and `SlidingMode` name
+the codes of the results.
 """
 
 import importlib
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
     from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
-    from slipsweep.studies.shaking_tests import measured_friction
+    from slipsweep.studies.shaking_tests import calibrate, measured_friction
 
 __all__ = [
     "Cosine",
@@ -41,6 +41,7 @@ __all__ = [
     "Triangle",
     "Validity",
     "__version__",
+    "calibrate",
     "flags",
     "friction_parameters",
     "limit_amplitude",
@@ -61,7 +62,7 @@ _LAZY = {
         ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
     ),
     "flags": "slipsweep.studies.decoding",
-    "measured_friction": "slipsweep.studies.shaking_tests",
+    **dict.fromkeys(("calibrate", "measured_friction"), "slipsweep.studies.shaking_tests"),
 }
 
 

@@ -19,6 +19,21 @@ CONTINUOUS: dict[str, Any] = {
     "yield_acceleration": 0.9, "decay_rate": 2.3, "delta_mu": 0.11, "excitation": slipsweep.Sine(cycles=8),
 }  # fmt: skip
 
+#: Tests that determine all three parameters well: Üy lies beyond where Eq. 4 meets the table's acceleration, and the
+#: block follows Eq. 4 over a part of each rise that is long enough to tell λ from Δμ.
+CALIBRATED: dict[str, dict[str, Any]] = {
+    "stick_slip": {
+        "theta": 5.0, "mu_s": 0.38, "amplitude": 5.0, "frequency": 2.0,
+        "yield_acceleration": 1.8, "decay_rate": 2.0, "delta_mu": 0.1, "excitation": slipsweep.Sine(cycles=8),
+    },
+    "continuous": {
+        "theta": 6.0, "mu_s": 0.38, "amplitude": 7.0, "frequency": 2.5,
+        "yield_acceleration": 2.0, "decay_rate": 2.3, "delta_mu": 0.05, "excitation": slipsweep.Sine(cycles=8),
+    },
+}  # fmt: skip
+
+SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
+
 
 def exact(case: dict[str, Any], rate: float = 200.0, lead: float = 0.5, tail: float = 0.5) -> xr.Dataset:
     """What the channels of a test would be without sensors: `lead` and `tail` s of rest about the shaking."""

@@ -348,3 +348,30 @@ SLIDES: dict[str, dict[str, Any]] = {
     "peak_block_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the block within a slide"},
     "least_friction": {"units": "1", "long_name": "least friction coefficient by Eq. 1 within a slide"},
 }
+
+#: Results of `calibrate` that have no other name here.
+CALIBRATION: dict[str, dict[str, Any]] = {
+    "correlation": {"units": "1", "long_name": "correlation of two parameters as estimated"},
+    "cycle_start": {"units": "s", "long_name": "time at which a cycle begins"},
+    "cycle_peak_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the table in a cycle"},
+    "cycle_sliding_mode": {
+        "long_name": "sliding mode of a cycle",
+        **{name: RESULTS["sliding_mode"][name] for name in ("flag_values", "flag_meanings")},
+    },
+    "cycle_attenuation_coefficient": {"units": "1", "long_name": "attenuation coefficient Kd of a cycle (Eq. 12)"},
+    **{
+        f"cycle_{name}{suffix}": {
+            "units": PARAMETERS[name]["units"],
+            "long_name": f"{what}{PARAMETERS[name]['long_name']} from a cycle alone",
+        }
+        for name in ("yield_acceleration", "decay_rate", "delta_mu")
+        for suffix, what in (("", ""), ("_error", "standard error of the "))
+    },
+}
+
+#: What was measured, and what is computed with the parameters found, along time.
+CALIBRATION_SERIES: dict[str, dict[str, Any]] = {
+    f"{kind}_{name}": {**about, "long_name": f"{kind} {about['long_name']}"}
+    for kind in ("measured", "computed")
+    for name, about in HISTORY.items()
+}

@@ -8,8 +8,10 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.errors import InputError
+from slipsweep.model.options import Model
 from slipsweep.model.parameters import computed, shown
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
+from slipsweep.studies.calibration import calibration_table
 from slipsweep.studies.datasets import _dataset
 from slipsweep.studies.friction import friction_table
 
@@ -65,6 +67,62 @@ def measured_friction(
         A test that cannot be read, without a block acceleration, or a value that no physics allows.
     """
     table = friction_table(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
+    return _dataset(table, {})
+
+
+def calibrate(
+    test: Test,
+    theta: float,
+    mu_s: float,
+    *,
+    model: Model | str = "mendez",
+    offset: str | Sequence[str] = (),
+    drift: str | Sequence[str] = (),
+    noise: Mapping[str, float] | None = None,
+    cycles: bool = True,
+) -> xr.Dataset:
+    """Üy, λ and Δμ from a test on a shaking table, by least squares with the exact solver.
+
+    The table's recorded motion shakes the model's block, and what it does is fitted to whatever was measured of the
+    real one, each channel weighted by its noise.  The noise of the table's own record enters the intervals.
+
+    Parameters
+    ----------
+    test : path, Dataset, mapping of str to DataArray, or ShakingTest
+        As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²), `relative_velocity`
+        (m/s) and `relative_displacement` (m), downslope positive; NaN or a blank cell where there is no sample.
+    theta, mu_s : float
+        Inclination of the plane, degrees, and static friction coefficient, measured by other means.
+    model : Mendez or str
+        The rules of motion.
+    offset, drift : str or list of str
+        Channels, `ground_acceleration` among them, whose sensor has an offset, or an offset and a drift in a straight
+        line; "all" for all.  These are fitted together with the parameters; what was found stands in the attribute
+        `removed`.
+    noise : mapping of str to float, optional
+        Standard deviation of the noise of channels; by default what is left over.
+    cycles : bool
+        Whether each cycle is fitted by itself, too.
+
+    Returns
+    -------
+    Dataset
+        `yield_acceleration` (m/s²), `decay_rate` and `delta_mu`, each with ``_error`` (standard error; NaN where the
+        test does not determine it) and ``_interval`` (95 %, along `bound`), and their `correlation`.  Along `cycle`:
+        ``cycle_`` and the same names, `cycle_start` (s), `cycle_peak_acceleration` (m/s²), `cycle_sliding_mode` and
+        `cycle_attenuation_coefficient` (Kd, stick-slip).  Along `time`: ``measured_`` (less `removed`) and
+        ``computed_`` accelerations, velocity and displacement, and the computed friction.  ``misfit_`` and a
+        channel is the root mean square of their difference.  Attributes: `findings`, sentences on what the test
+        cannot tell and what would; `model_table` and `uncertainty_table`, to paste into a sweep file.
+
+    Raises
+    ------
+    InputError
+        A test that cannot be read or measured nothing of the block, or a value that no physics allows.
+    """
+    table = calibration_table(
+        test_of(test), theta, mu_s, model=model, offset=offset, drift=drift, noise=noise, cycles=cycles
+    )
     return _dataset(table, {})
 
 
