@@ -76,9 +76,9 @@ VARIABLES = '[output]\nvariables = ["permanent_displacement", "sliding_mode", "v
 BLOCKS = CASES.replace("structure_frequency = 2\n", "")
 
 
-def recorded(text: str) -> spec.SweepSpec:
+def recorded(text: str, record: Record = SHORT) -> spec.SweepSpec:
     """A sweep of the recorded motion."""
-    return spec.parse(RECORD + text, "a.toml", record=SHORT)
+    return spec.parse(RECORD + text, "a.toml", record=record)
 
 
 PLANS: dict[str, Callable[[], Job]] = {
@@ -388,3 +388,54 @@ def test_chunks_of_limits_need_an_output(
         assert message in error
         assert error.count("\n") == 1
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.toml"]
+
+
+# ----------------------------------------------------------------------- beyond double precision
+
+HUGE = "[axes.theta]\nvalues = [0]\n[axes.mu_s]\nvalues = [0.4]\n"
+STRONGER = '[model]\nfriction = "newmark"\n[axes.amplitude]\nvalues = [1, 2, 1e250]\n'
+LONGER = "[axes.frequency]\nvalues = [1e-90, 1]\n"
+FACTOR = "[uncertainty]\nsamples = 4\n[uncertainty.amplitude]\nkind = 'factor'\ndistribution = 'uniform'\nloc = 1\n"
+
+LONG = Record(SHORT.times * 1e80, SHORT.acceleration, "long.csv")
+
+#: Of which only the last cells have results that are no double, and what is then refused.
+BEYOND: dict[str, tuple[Callable[[], Job], str]] = {
+    "sweep": (
+        lambda: sweep_job(spec.parse(HUGE + STRONGER + LONGER, "a.toml")),
+        r"amplitude = 1e\+250, frequency = 1e-90: permanent_displacement is then no finite number",
+    ),
+    "record": (
+        lambda: sweep_job(recorded(HUGE + STRONGER.replace("1e250", "1e200"), LONG)),
+        "permanent_displacement is then no finite number",
+    ),
+    "samples": (
+        lambda: sweep_job(spec.parse(HUGE + STRONGER + LONGER + FACTOR, "a.toml")),
+        "no finite number",
+    ),
+    "limits": (
+        lambda: limit_job(
+            spec.parse(HUGE + STRONGER + LONGER + "[axes.yield_acceleration]\nvalues = [1, 1e200]\n", "a.toml"),
+            1e-5, 1e250,
+        ),
+        "no finite number",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_numbers_that_are_together_too_much_are_refused_before_anything_is_begun(tmp_path: Path, name: str) -> None:
+    make, message = BEYOND[name]
+    with pytest.raises(InputError, match=f"a.toml: .*{message}"):
+        store.run(make(), tmp_path / "a.nc", command="x", chunk_cells=1, solved=unsolved)
+    assert not list(tmp_path.iterdir())
+
+
+def test_extreme_numbers_that_are_served_are_written(tmp_path: Path) -> None:
+    text = HUGE + STRONGER.replace("1e250", "1e150") + LONGER.replace("1e-90", "1e-60")
+    job = sweep_job(spec.parse(text, "a.toml"))
+    assert not job.plan.is_ordinary
+    store.run(job, tmp_path / "a.nc", command="x")
+    assert_part(job.plan, {}, store.stored_table(job.plan, tmp_path / "a.nc", 1000, job.plan.names), job.plan.solve())
+    for ordinary in PLANS.values():
+        assert ordinary().plan.is_ordinary

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import RunError
 from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
-from slipsweep.grid.served import check_served, is_ordinary
+from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import cycle, sine, step
@@ -250,11 +250,7 @@ def _is_plain_sine(motion: Waveform | Record) -> bool:
 def _solve_into(results: Arrays, asked: Request) -> None:
     """Solve a part of a grid that one motion shakes; `results` lie without gaps."""
     problem, shape, arrays = asked.problem, asked.shape, asked.arrays
-    motion = problem.excitation
-    extremes: dict[str, Array] = {}
-    if isinstance(motion, Record):
-        own = {"acceleration of the record": motion.peak, "time of the record": np.abs(motion.times).max()}
-        extremes = {name: np.array(value) for name, value in own.items()}
+    extremes = extremes_of(problem.excitation)
     inputs, periods, codes = kernel_inputs(asked)
     # what is out of the ordinary is looked at, for which flags are wanted in any case
     looked_at = (np.array(problem.model.g), *inputs[1:], periods, *extremes.values())
@@ -267,6 +263,32 @@ def _solve_into(results: Arrays, asked: Request) -> None:
     _refuse_unsolved(unsolved, shape, arrays)
     if "structure_frequency" in arrays and "validity" in results:
         mark_flexible_blocks(results["validity"], arrays["frequency"], arrays["structure_frequency"])
+
+
+def extremes_of(motion: Waveform | Record) -> dict[str, Array]:
+    """The largest numbers of a motion itself, by what they are called in errors."""
+    if isinstance(motion, Waveform):
+        return {}
+    own = {"acceleration of the record": motion.peak, "time of the record": np.abs(motion.times).max()}
+    return {name: np.array(value) for name, value in own.items()}
+
+
+def are_ordinary(problem: Problem, given: Mapping[str, Array]) -> bool:
+    """Whether no result can be too large for double precision, whatever the given values are combined to."""
+    values = {name: values for name, values in given.items() if name not in UNBOUNDED}
+    looked_at = [np.array(problem.model.g), *values.values(), *extremes_of(problem.excitation).values()]
+    if "amplitude" in values and isinstance(problem.excitation, Record) and problem.excitation.peak > 0.0:
+        with np.errstate(over="ignore"):
+            looked_at.append(values["amplitude"] / problem.excitation.peak)
+    if {"displacement_amplitude", "frequency"} <= values.keys():
+        # A = ω²d grows with both: of the extremes of both, it has its own
+        d, f = (
+            np.array([own[own > 0.0].min(initial=1.0), own.max()])
+            for own in (values["displacement_amplitude"], values["frequency"])
+        )
+        with np.errstate(all="ignore"):
+            looked_at.append(peak_acceleration(d[:, None], f))
+    return all(map(is_ordinary, looked_at))
 
 
 def kernel_inputs(asked: Request) -> tuple[list[Array], Array, tuple[str, ...]]:

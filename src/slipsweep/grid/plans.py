@@ -114,7 +114,7 @@ class Plan:
         Results in the order they are returned in.
     attrs : dict
         What the results say of themselves.
-    cost, together, cell_memory
+    cost, together, cell_memory, is_ordinary
         As in `anyplan.AnyPlan`.
     described : mapping of str to dict
         Attributes of the results.
@@ -128,6 +128,7 @@ class Plan:
     cost: float = 1.0
     together: tuple[str, ...] = ()
     cell_memory: int = 0
+    is_ordinary: bool = True
     described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: RESULTS | RECORD_RESULTS)
 
     #: Slabs of friction parameters, say: nothing beside what a program takes.
@@ -265,7 +266,9 @@ def _plan_record(problem: Problem, coords: dict[str, Variable], variables: Any) 
     sizes = grid_sizes(coords)
     tasks = _motion_tasks(problem, wanted, RECORD_RESULTS, sizes, aligned(coords, sizes))
     attrs = about("Response of a rigid block to a recorded motion", problem, coords)
-    return Plan(sizes, coords, tasks, wanted, attrs, cost_of(problem) * len(tasks))
+    return Plan(
+        sizes, coords, tasks, wanted, attrs, cost_of(problem) * len(tasks), is_ordinary=ordinary(problem, coords)
+    )
 
 
 def _motion_tasks(
@@ -315,6 +318,7 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
         tuple(name for name in wanted if any(name in task.names for task in tasks)),
         about("Permanent displacement of a rigid block, swept", problem, coords),
         cost,
+        is_ordinary=ordinary(problem, coords),
     )
 
 
@@ -437,6 +441,11 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
             raise InputError(f"{drive} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
     sizes = grid_sizes(own)
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
+
+
+def ordinary(problem: Problem, coords: Mapping[str, Variable]) -> bool:
+    """Whether no result can be too large for double precision."""
+    return engine.are_ordinary(problem, {name: one.values for name, one in coords.items()})
 
 
 def cost_of(problem: Problem) -> float:

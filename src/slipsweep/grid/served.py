@@ -16,7 +16,7 @@ from slipsweep.model.parameters import number_text
 from slipsweep.model.variables import VALUELESS
 
 #: Inputs that make no result infinite.
-_OTHERS = ("theta", "structure_frequency")
+UNBOUNDED = ("theta", "structure_frequency", "polarity")
 
 #: Largest magnitude of inputs, and inverse of the least but 0, whose results are all finite: u grows as A² N²/(b ω²)
 #: with N cycles and a braking rate b that may be all rounding of A.
@@ -64,7 +64,7 @@ def check_served(
             cell = np.unravel_index(int(wrong.argmax()), wrong.shape)
             inputs = {one: float(np.broadcast_to(given, wrong.shape)[cell]) for one, given in arrays.items()} | {"g": g}
             odd = {
-                one: value for one, value in inputs.items() if one not in _OTHERS and not is_ordinary(np.array(value))
+                one: value for one, value in inputs.items() if one not in UNBOUNDED and not is_ordinary(np.array(value))
             }
             named = ", ".join(f"{one} = {number_text(value)}" for one, value in (odd or inputs).items())
             raise InputError(

@@ -41,7 +41,7 @@ class Bound:
 
 #: The largest acceleration and length, and the largest of all other numbers, whose inverse is the least: more than
 #: physics ever needs, and so much less than the largest double that the solvers can work with each of them.  What is
-#: too much of several together is refused when it is solved (`grid.served`).
+#: too much of several together is refused by `grid.served`, of a run before it is begun (`runs.jobs`).
 LARGEST, LARGEST_FACTOR = 1e300, 1e100
 
 _AMOUNT = Bound(0.0, True, LARGEST, f"a finite number >= 0 and at most {LARGEST:g}")

@@ -15,6 +15,7 @@ from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.model.variables import RESULT_DTYPES
 from slipsweep.runs.parts import checksum
+from slipsweep.runs.solving import try_out
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,12 @@ class Job:
 
     @cached_property
     def plan(self) -> AnyPlan:
-        """What is to be solved."""
-        return self.make()
+        """What is to be solved; what is refused while it is solved is refused here, before anything is begun."""
+        plan = self.make()
+        if not plan.is_ordinary:
+            with self.named():
+                try_out(plan)
+        return plan
 
     @property
     def labels(self) -> tuple[str, ...]:

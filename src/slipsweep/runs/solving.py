@@ -120,6 +120,19 @@ def solve_here(
         yield number, plan.part(chunk).solve(progress, memory.rewound().empty)
 
 
+def try_out(plan: AnyPlan) -> None:
+    """Solve a plan for what it is refused for, and keep nothing.
+
+    Raises
+    ------
+    InputError
+        A result of it is no finite number.
+    """
+    parts = chunks.grid_chunks(plan.sizes, default_cells(plan), plan.together)
+    for _ in solve_here(plan, dict(enumerate(parts))):
+        pass
+
+
 class _Memory:
     """Memory that is used again for each chunk: the system takes 0.2 to 1 µs for every 4 KB that are new."""
 

@@ -113,6 +113,7 @@ def run(
         chunks are kept.
     """
     check_output(job, path, overwrite=overwrite or resume, split=split)
+    plan = job.plan  # what it refuses, it refuses before there is a folder
     identity = parts.identity(job.asked, split)
     with parts.opened(path) as work:
         if not overwrite:
@@ -133,7 +134,7 @@ def run(
                 return _found(job, path, manifest.chunk_cells)
         else:
             work.clear()
-            cells = min(filter(None, (chunk_cells, shared_cells)), default=default_cells(job.plan))
+            cells = min(filter(None, (chunk_cells, shared_cells)), default=default_cells(plan))
             manifest = parts.Manifest(identity, cells, overwrite, history_of(command))
         # once more: a run that was writing it may have ended before this one got hold of the lock
         check_outputs([path], manifest.overwrite, reads=job.files, folder=split)

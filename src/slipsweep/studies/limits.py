@@ -21,7 +21,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Problem, Request
-from slipsweep.grid.plans import Plan, plan_sweep
+from slipsweep.grid.plans import Plan, ordinary, plan_sweep
 from slipsweep.grid.tables import Variable
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_single, check_values, check_whole
@@ -110,6 +110,7 @@ def plan_limits(
         together=tuple(dims[axis] for axis in scaling),
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
+        is_ordinary=ordinary(task.problem, {**coords, "amplitude": Variable((), np.array(highest))}),
         described=RESULTS | RECORD_COUNTS | LIMIT_RESULTS,
     )
 

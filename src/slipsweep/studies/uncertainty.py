@@ -564,6 +564,16 @@ class SamplePlan:
         return math.prod(self.solved.values()) * self.sampling.samples
 
     @property
+    def is_ordinary(self) -> bool:
+        """Whether no statistic can be too large for double precision."""
+        given = {name: one.values for name, one in self.coords.items()}
+        for name, one in self.sampling.distributions.items():
+            base = given.get(name, np.ones(1)).reshape(-1, 1)
+            ends = np.array([[base.min()], [base.max()]])
+            given[name] = one.applied(ends, self.draws[name])
+        return engine.are_ordinary(self.problem, given)
+
+    @property
     def cost(self) -> float:
         """What a grid point takes, in cells of the cycle solver."""
         return max(1.0, cost_of(self.problem) * self.sampling.samples / math.prod(self.scaled.values()))
