@@ -119,6 +119,12 @@ def simulate(
         writers[path.suffix](table, path, overwrite, motion)
     if quiet:
         return
+    _summarize(table)
+    for path in paths:
+        typer.echo(path)
+
+
+def _summarize(table: "Table") -> None:
     typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
@@ -130,8 +136,6 @@ def simulate(
     for kind in FlagKind:
         for flag in Validity(table["validity"].item()) & flags_of(kind):
             typer.echo(f"{kind:<24}{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
-    for path in paths:
-        typer.echo(path)
 
 
 def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":
