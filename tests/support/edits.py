@@ -171,6 +171,8 @@ def edited(seed: int, sources: list[Path], path: Path) -> list[str]:
             data.to_netcdf(path, format=form, engine="netcdf4", encoding=how)
         except (ValueError, TypeError, RuntimeError, OverflowError, AttributeError):  # not for files
             data = data.drop_encoding()
+            for variable in data.variables.values():
+                variable.attrs.pop("_FillValue", None)  # which may be another type than the values by now
             data.to_netcdf(path, engine="netcdf4")
     stored = {"packed" if "scale_factor" in encoded else "encoded" for encoded in how.values()}
     return [source.stem, *names, form, *sorted(stored)]

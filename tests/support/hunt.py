@@ -48,11 +48,11 @@ def _run(sources: Sources, text: str) -> bool:
 
 KINDS: dict[str, Kind] = {
     "arguments of": Kind(
-        6000, odd_arguments.calls(), lambda _, call: odd_arguments.is_served(call), lambda call: f"`{call.function}`"
+        4000, odd_arguments.calls(), lambda _, call: odd_arguments.is_served(call), lambda call: f"`{call.function}`"
     ),
-    "sweep files, damaged: read": Kind(10_000, sweep_files.mutated(), _read),
-    "sweep files, damaged: run": Kind(400, sweep_files.mutated(), _run),
-    "sweep files, tables of any content": Kind(3000, sweep_files.random_tables, _read),
+    "sweep files, damaged: read": Kind(8000, sweep_files.mutated(), _read),
+    "sweep files, damaged: run": Kind(300, sweep_files.mutated(), _run),
+    "sweep files, tables of any content": Kind(2000, sweep_files.random_tables, _read),
     "command line of": Kind(
         1500,
         odd_commands.command_lines(),
@@ -60,13 +60,13 @@ KINDS: dict[str, Kind] = {
         lambda words: f"`{words[0]}`" if words[0] in odd_commands.OPTIONS else "no command",
     ),
     "names of files written": Kind(
-        300, odd_names.names(), lambda made, name: odd_names.written(made.folder, made.paths, name)
+        150, odd_names.names(), lambda made, name: odd_names.written(made.folder, made.paths, name)
     ),
     "names of files read": Kind(
-        200, odd_names.names(), lambda made, name: odd_names.read(made.folder, made.paths, name)
+        100, odd_names.names(), lambda made, name: odd_names.read(made.folder, made.paths, name)
     ),
-    "results edited by other programs": Kind(400, edits.seeds, lambda made, seed: results.edited(made.paths, seed)),
-    "results damaged": Kind(600, edits.seeds, lambda made, seed: results.damaged(made.folder, made.contents, seed)),
+    "results edited by other programs": Kind(200, edits.seeds, lambda made, seed: results.edited(made.paths, seed)),
+    "results damaged": Kind(400, edits.seeds, lambda made, seed: results.damaged(made.folder, made.contents, seed)),
 }
 
 
