@@ -257,16 +257,25 @@ def test_without_jit(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("by_another", [False, True])
 def test_a_signal_while_llvm_calls_back_is_heard_after_it(
-    cache: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+    cache: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, by_another: bool
 ) -> None:
-    """Raised in the callback itself, which LLVM makes for machine code made or loaded, it would be lost."""
+    """Raised in the callback itself, which LLVM makes for machine code made or loaded, it would be lost.
+
+    The first machine code is the kernel's, or that of a function for which numba makes its own.
+    """
     calls: list[str] = []
 
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    compiled.Kernel(lambda x: x + 1.0)(2.0)  # what numba itself makes at its first use, in no time, is done
+    compiled.Kernel(lambda x: x + 1.0)(2.0)  # what numba itself makes at its first use is done
+    other = numba.njit(lambda x: 2.0 * x)
+
+    def doubled(x: float) -> float:
+        return float(other(x))
+
     engine = numba.core.registry.cpu_target.target_context.codegen()._engine._ee
 
     def signalled(name: str) -> Any:
@@ -286,7 +295,7 @@ def test_a_signal_while_llvm_calls_back_is_heard_after_it(
     try:
         for known in (False, True):
             calls.clear()
-            kernel = compiled.Kernel(double)
+            kernel = compiled.Kernel(doubled if by_another else double)
             with pytest.raises(KeyboardInterrupt):
                 kernel(2.0)
             assert calls

@@ -11,7 +11,7 @@ from typing import Any
 
 import llvmlite.binding
 from numba import njit
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, JitEngine
 from numba.core.compiler import Compiler
 
 from slipsweep.jit.inner.need import need
@@ -20,10 +20,11 @@ from slipsweep.jit.interrupts import heard_later
 need(
     JITCodeLibrary,
     _finalize_final_module="self",
-    _finalize_specific="self",
     enable_object_caching="self",
     _final_module=None,
 )
+need(JITCPUCodegen, _engine=None)
+need(JitEngine, finalize_object="self")
 need(Compiler, __init__="self typingctx targetctx library args return_type flags locals")
 
 
@@ -36,10 +37,6 @@ class _Library(JITCodeLibrary):
                 function.linkage = "internal"
         super()._finalize_final_module()
 
-    def _finalize_specific(self) -> None:
-        with heard_later():
-            super()._finalize_specific()
-
 
 class _Compiler(Compiler):
     """numba's compiler, writing into such a library."""
@@ -50,6 +47,24 @@ class _Compiler(Compiler):
         super().__init__(typingctx, targetctx, library, *arguments)
 
 
+def _hear_signals_later(engine: Any) -> None:
+    """Have Ctrl-C and SIGTERM wait while this process's one engine makes machine code, whatever for.
+
+    Beside a kernel numba makes a score of small functions for it, each with machine code of its own.
+    """
+    if "finalize_object" in vars(engine):
+        return
+    make = engine.finalize_object
+
+    def finalize_object() -> None:
+        with heard_later():
+            make()
+
+    engine.finalize_object = finalize_object
+
+
 def sealed(function: Callable[..., Any]) -> Any:
     """A function as a kernel, to be compiled; runs without the GIL."""
-    return njit(nogil=True, error_model="numpy", pipeline_class=_Compiler)(function)
+    jitted = njit(nogil=True, error_model="numpy", pipeline_class=_Compiler)(function)
+    _hear_signals_later(jitted.targetctx.codegen()._engine)
+    return jitted
