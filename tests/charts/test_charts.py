@@ -783,6 +783,7 @@ def test_cases_tell_curves_and_panels_apart(folder: Path) -> None:
         "steep",
     ]
     (line,) = named(figure.axes[0], "steep")
+    assert "steep: θ = 12°, μs = 0.5." in figure.get_supxlabel()
     limit = slipsweep.friction_parameters(12.0, 0.5, 1.0).limiting_acceleration.item()
     assert limit in np.asarray(line.get_xdata())
     assert [axes.get_title() for axes in drawn(path, "contours", panels=["case"]).axes[:2]] == ["gentle", "steep"]
@@ -838,4 +839,4 @@ def test_all_of_a_file_is_a_pdf_with_a_title_page(
     assert "Permanent displacement" in text
     assert f"slipsweep {slipsweep.__version__}" in text
     for flag in maps.HATCHES:
-        assert f"{(flag.name or '').lower()}: " in text
+        assert f"{(flag.name or '').lower()} (" in text

@@ -70,8 +70,14 @@ def solve(table: Table, names: Iterable[str], model: Model | None = None, **chan
     return plan.solve().data_vars
 
 
-def boundaries(table: Table) -> dict[str, Variable]:
+def boundaries(table: Table, always: bool = False) -> dict[str, Variable]:
     """Yield acceleration and, but for Newmark's block, limiting acceleration (Eq. 7) of a slice, m/s².
+
+    Parameters
+    ----------
+    table : Table
+    always : bool
+        Return both for Newmark's block, too.
 
     Returns
     -------
@@ -93,7 +99,9 @@ def boundaries(table: Table) -> dict[str, Variable]:
         ),
         "limiting_acceleration": replace(limit, values=np.where(unstable, np.nan, limit.values)),
     }
-    return lines if table.attrs["model"] != "newmark" else {"yield_acceleration": lines["yield_acceleration"]}
+    if table.attrs["model"] == "newmark" and not always:
+        del lines["limiting_acceleration"]
+    return lines
 
 
 def newmark(table: Table, **changed: Any) -> Variable:

@@ -14,7 +14,7 @@ from slipsweep._version import __version__
 from slipsweep.charts.maps import HATCHES
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import SYMBOLS, drawn_text, model_text, plain, unit
-from slipsweep.model.variables import PARAMETERS, REFERENCE, VALIDITY_TEXT
+from slipsweep.model.variables import FLAG_KINDS, PARAMETERS, REFERENCE, VALIDITY_TEXT
 
 #: Characters in a line, after a heading.
 _WIDTH, _INDENT = 96, 2
@@ -30,10 +30,10 @@ def write(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
     attributes = result.attrs
-    hatched = [f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in HATCHES]
+    hatched = [f"{(flag.name or '').lower()} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}" for flag in HATCHES]
     sections: Mapping[str, list[str]] = {
         "Inputs": [*_inputs(result), *filter(None, [drawn_text(attributes)])],
-        "Model": [model_text(attributes)],
+        "Model and estimates": model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": [
             "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
         ],

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from slipsweep.charts.answers import SIDE, alternatives, newmark, sides_of, solve
+from slipsweep.charts.answers import SIDE, alternatives, boundaries, newmark, sides_of, solve
 from slipsweep.charts.sheet import (
     DRIVES,
     LINES,
@@ -27,7 +27,7 @@ from slipsweep.charts.sheet import (
 from slipsweep.charts.style import BLUE, VERMILION, value_text
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS, Model
-from slipsweep.model.variables import CAUTIONS, RESULTS
+from slipsweep.model.variables import CAUTIONS, RESULTS, Validity
 
 Floats = NDArray[np.float64]
 Curve = tuple[Floats, Floats]
@@ -144,6 +144,8 @@ def spread(sheet: Sheet) -> Figure:
         Of a slice over one axis that holds `permanent_displacement` and `validity`.
     """
     sheet.set_axis("x", sheet.x)
+    for panel in sheet.panels:
+        panel.lines = boundaries(panel.table, always=True)  # the others have a mode limit, whatever this one is
     answers = [_answers(panel) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for _, ys in one.values()])
     check_positive(RESULTS[_DISPLACEMENT]["long_name"], values)
@@ -280,13 +282,15 @@ def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]
 
 def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float) -> None:
     """Put a broad grey line under what a caution is about."""
-    validity = panel.table["validity"]
-    for flag in CAUTIONS:
-        cautious = panel.grid(validity_has(validity, flag)) & (panel.grid(panel.result(name)) > 0)
-        for ys, where in zip(panel.grid(panel.result(name)), cautious, strict=True):
-            if where.any():
-                panel.axes.plot(panel.values(panel.x), np.where(where, ys * factor, np.nan), **_CAUTION)
-                sheet.remarks[f"caution: {(flag.name or '').lower()}"] = Line2D([], [], **_CAUTION)
+    drawn = panel.grid(panel.result(name)) * factor
+    cautious = panel.grid(validity_has(panel.table["validity"], CAUTIONS)) & (drawn > 0)
+    for ys, where in zip(drawn, cautious, strict=True):
+        panel.axes.plot(panel.values(panel.x), np.where(where, ys, np.nan), gid="caution", **_CAUTION)
+    if cautious.any():
+        values = reliable(sheet.table.data_vars, name, sheet.look).values
+        flags = np.bitwise_or.reduce(sheet.table["validity"].values[values > 0].astype(int))
+        names = [(flag.name or "").lower() for flag in CAUTIONS & Validity(int(flags))]
+        sheet.remarks["caution:\n" + "\n".join(names)] = Line2D([], [], **_CAUTION)
 
 
 def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:

@@ -38,7 +38,7 @@ def limit_chart(table: Table, labels: Sequence[str] = ()) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Curves end where no limit exists; open circles mark limits in a jump or behind a gap.
+        Curves end where no limit exists; grey disks mark limits in a jump or behind a gap.
     """
     limits, status = table["limit_amplitude"], table["limit_status"].values
     sizes = limits.sizes
@@ -73,10 +73,7 @@ def limit_chart(table: Table, labels: Sequence[str] = ()) -> Figure:
             plot_curve(panel, x, y, number / len(family), label=label, **look)
             states = np.atleast_1d(status[where])
             abrupt = (states >= LimitStatus.AT_MODE_JUMP) & (states <= LimitStatus.AFTER_GAP)
-            panel.plot(
-                x[abrupt], y[abrupt], linestyle="none", marker="o", markersize=8, markerfacecolor="none",
-                markeredgecolor="0.3",
-            )  # fmt: skip
+            panel.plot(x[abrupt], y[abrupt], linestyle="none", marker="o", markersize=9, color="0.82", zorder=1.5)
         title = ", ".join(_label(table, d, k, labels) for d, k in ((columns, at_column), (rows, at_row)) if d)
         panel.set_title(title, fontsize="medium")
         panel.grid(color="0.9", which="both")
@@ -138,7 +135,7 @@ def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], l
         thinned += [f"1 of {sizes[dim]} {SYMBOLS.get(dim, dim)}" for dim in fixed if sizes[dim] > 1]
     lines = [
         ", ".join(single),
-        f"{model_text(attributes)}; circles: reached in a jump or behind a gap",
+        f"{model_text(attributes)}; on grey: limit set by a discontinuity of the model",
         "" if np.isfinite(table["limit_amplitude"].values).any() else "no limits to draw: limit_status says why",
         f"shown: {', '.join(thinned)}" if thinned else "",
     ]

@@ -159,7 +159,7 @@ def newmark_ratio(sheet: Sheet) -> Figure:
         ours = panel.result(name)
         quotient = Variable(ours.dims, ratios(ours, newmark(panel.table), panel.table))
         areas = _fill(panel, quotient, at_limit, logarithms, colours, norm, texts) or areas
-    _colour_bar(sheet, areas, places, texts, "permanent displacement over that of Newmark's block")
+    _colour_bar(sheet, areas, places, texts, "displacement over that of Newmark's block")
     sheet.note_newmark()
     sheet.note_left_out()
     return _finish(sheet)
@@ -295,7 +295,7 @@ def _colour_bar(sheet: Sheet, areas: Any, places: Floats, texts: dict[float, str
     bar = sheet.figure.colorbar(areas, ax=[panel.axes for panel in sheet.panels], ticks=places, pad=0.02)
     bar.ax.set_yticklabels([texts[place] for place in places])
     bar.ax.minorticks_off()
-    bar.set_label(label)
+    bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
 
 
 def _levels(name: str, values: Floats) -> list[float]:

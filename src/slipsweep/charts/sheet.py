@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from slipsweep.charts.answers import boundaries, newmark
-from slipsweep.charts.style import Look, axis_label, caption, is_acceleration, length_text, plain, value_text
+from slipsweep.charts.style import SYMBOLS, Look, axis_label, caption, is_acceleration, length_text, plain, value_text
 from slipsweep.errors import InputError
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import Validity
@@ -230,7 +230,18 @@ class Sheet:
     def _add_caption(self) -> None:
         case = f"case {plain(self.table.attrs['case'])}: " if "case" in self.table.attrs else ""
         text = f"{case}{caption(self.table, self.look)}; {self.table.attrs.get('source', 'slipsweep')}"
-        self.figure.supxlabel("\n".join([text, *self.notes]), fontsize="small", wrap=True)
+        self.figure.supxlabel("\n".join([text, *self._cases(), *self.notes]), fontsize="small", wrap=True)
+
+    def _cases(self) -> list[str]:
+        """What the cases are that tell curves or panels apart."""
+        if "case" not in self.table.coords:
+            return []
+        own = [name for name in SYMBOLS if name in self.table.coords and self.table[name].dims == ("case",)]
+        texts = []
+        for at in range(self.table["case"].values.size):
+            values = ", ".join(member_text(self.table, name, at, self.look) for name in own)
+            texts.append(f"{member_text(self.table, 'case', at, self.look)}: {values}.")
+        return texts
 
 
 def ratios(ours: Variable, theirs: Variable, table: Table) -> Floats:

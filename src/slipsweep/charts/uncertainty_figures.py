@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -71,7 +72,7 @@ def quantile_bands(sheet: Sheet) -> Figure:
         shown, xs = np.where(np.isnan(values), np.nan, np.maximum(values, floor)), panel.values(panel.x)
         pairs = [(low, quantiles.size - 1 - low) for low in range(quantiles.size // 2)]
         for number, (low, high) in enumerate(pairs):
-            look: dict[str, Any] = {"color": BLUE, "alpha": 0.2 + 0.2 * number / len(pairs), "linewidth": 0}
+            look: dict[str, Any] = {"color": mpl.colormaps["Blues"](0.2 + 0.3 * number / len(pairs)), "linewidth": 0}
             panel.axes.fill_between(xs, shown[low], shown[high], **look)
             sheet.legend[f"{quantiles[low] * 100:g} to {quantiles[high] * 100:g} %"] = Patch(**look)
         if quantiles.size % 2:
