@@ -243,7 +243,7 @@ def limit_amplitude(
     `maximum_amplitude` in `amplitude_steps` equal ratios and has both sides of every change of
     mode seen between two of its points; a peak of u within one sliding mode narrower than a
     step can be missed.  Under a record the amplitude is that peak ground acceleration to which it is scaled, and the
-    scan has both sides of every amplitude at which a pulse begins to count, or changes its mode.
+    scan has both sides of every amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
 
     Parameters
     ----------

@@ -57,6 +57,9 @@ JUMP = 1e-6
 #: How far from its place, in parts of it, a change of mode that is known by a formula may be: rounding.
 _BESIDE = 1e-15
 
+#: Pulses of a record whose changes of mode a scan looks at on both sides: noise has thousands.
+_MOST_PULSES = 128
+
 #: Results that tell in which mode a block slides.
 _MODES = ("sliding_mode", "stick_slip_pulses", "continuous_pulses")
 
@@ -157,7 +160,7 @@ def _solve_motion(maximum_amplitude: float, steps: int, asked: Request) -> Array
     rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in arrays.items()}
     whole = replace(asked, shape=table, arrays=rows, empty=np.empty)
     found = whole.results()
-    for slab in slabs(table, max(1, _SCANNED // steps)):
+    for slab in slabs(table, max(1, _SCANNED // (steps + _most_changes(asked)))):
         part = whole.part(slab)
         solved = _solve_slab(part, maximum_amplitude, steps)
         for name, values in found.items():
@@ -256,13 +259,27 @@ def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_am
     return np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
 
 
+def _most_changes(asked: Request) -> int:
+    """How many amplitudes beside the steps a scan may have."""
+    motion = asked.problem.excitation
+    if not isinstance(motion, Record):
+        return 4
+    # two thresholds of a pulse, and two sides of each
+    return 4 * int(_highest(motion, float(asked.arrays["polarity"].item())).size)
+
+
+def _highest(record: Record, polarity: float) -> Floats:
+    """Heights of the highest pulses of a record, increasing."""
+    return np.unique(wave_of_record(record, polarity).height)[-_MOST_PULSES:]
+
+
 def _pulse_changes(record: Record, polarity: float, thresholds: Floats) -> Floats:
     """Amplitudes just below and just above those at which a pulse of a record begins to count, or changes its mode.
 
     A pulse does where its own peak passes one of the `thresholds` (columns) of a block (rows): Üy, or Üg,lim of
     Eq. 7, neither of which depends on the amplitude.
     """
-    heights = np.unique(wave_of_record(record, polarity).height)
+    heights = _highest(record, polarity)
     with np.errstate(over="ignore", invalid="ignore"):
         places = (thresholds[:, :, None] * (record.peak / heights)).reshape(len(thresholds), -1)
         return np.hstack([places * (1.0 - _BESIDE), places * (1.0 + _BESIDE)])
