@@ -19,7 +19,7 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import cycle, sine, step
+from slipsweep.kernels import sine, step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import (
     PARAMETER_KERNEL,
@@ -309,7 +309,7 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
 
         def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets, tile_of(grid), cycle.room_of())
+            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets, tile_of(grid))
 
         # some 2 µs against 0.1, and more for a long record
         return call, max(32, recorded.pieces.shape[0] // 64)
@@ -328,10 +328,10 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, sine.room_of(), remaining)
         if count:
             stretches = remaining[:count]
-            REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile, cycle.room_of())
+            REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile)
 
     def call_wave(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-        WAVE_KERNEL(grid, first, last, rows, periods, options, wave, targets, tile_of(grid), cycle.room_of())
+        WAVE_KERNEL(grid, first, last, rows, periods, options, wave, targets, tile_of(grid))
 
     return call_sine if _is_plain_sine(motion) else call_wave, 1
 

@@ -83,8 +83,7 @@ MOST_LEGS = 32
 class Room(NamedTuple):
     """Where a block is followed: its state, a record of its legs, and zeros of D on either side of Üg = 0.
 
-    One for all cells: a function that makes an array counts the references to every array it is handed, and
-    for each kind of array that a kernel makes numba compiles a function of its own.
+    One for all cells: a function that makes an array counts the references to every array it is handed.
     """
 
     state: np.ndarray
@@ -98,8 +97,9 @@ HOLD, FOLLOW, ATTENUATE = range(3)
 LEG_COLUMNS = 8
 
 
-def room_of(legs: int = 0) -> Room:
-    """Room, with a record of so many legs."""
+@scalar
+def room_of(legs: int) -> Room:
+    """Room, with a record of so many legs; made in kernels, where the compiler knows that nothing else lies there."""
     return Room(np.zeros(STATE_ROWS), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
 
 

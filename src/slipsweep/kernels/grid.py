@@ -205,8 +205,9 @@ def place(grid: Grid, begin: int, count: int, runs: int, periods: np.ndarray, re
 
 def _remaining_grid(
     grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results, tile: Tile, room: cycle.Room,
+    wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
+    room = cycle.room_of(0)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
         for begin in range(stretches[stretch, 0], last, TILE):
@@ -218,8 +219,9 @@ def _remaining_grid(
 
 def _wave_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results, tile: Tile, room: cycle.Room,
+    wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
+    room = cycle.room_of(0)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
@@ -229,12 +231,13 @@ def _wave_grid(
 
 def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results, tile: Tile, room: cycle.Room,
+    wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
+    room, lines = cycle.room_of(0), record.lines_of(wave, options)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        record.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+        record.solve_cells(tile.cells, count, options, wave, lines, room, tile.motion, tile.codes)
         note_unsolved(begin, count, tile.codes[3], results)
         scatter(grid, tile, runs, periods, results)
         spread_codes(grid, tile, runs, 0, results.codes[0])

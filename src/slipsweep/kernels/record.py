@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
@@ -129,7 +129,7 @@ def continuous_pulse(
     return Pulse(state[VELOCITY], state[DISPLACEMENT], velocity + most, 0.0, 0.0, 0)
 
 
-@scalar
+@in_lanes
 def one_pulse(
     block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float, room: Room
 ) -> Pulse:
@@ -193,54 +193,67 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
 
 
 @scalar
-def newmark(cell: Cell, options: Options, wave: Wave, codes: np.ndarray, j: int) -> tuple[float, float]:
+def lines_of(wave: Wave, options: Options) -> np.ndarray:
+    """The first, the last and the larger value of each piece and its length, side by side, for `newmark` only."""
+    lines = np.empty((wave.pieces.shape[0] if options.rise == NEWMARK else 0, 4))
+    for p in range(lines.shape[0]):
+        lines[p, 0], lines[p, 1] = wave.pieces[p, FIRST], wave.pieces[p, LAST]
+        lines[p, 2] = max(wave.pieces[p, FIRST], wave.pieces[p, LAST])
+        lines[p, 3] = wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]
+    return lines
+
+
+@scalar
+def newmark(
+    cell: Cell, options: Options, wave: Wave, lines: np.ndarray, codes: np.ndarray, j: int
+) -> tuple[float, float]:
     """`respond` for Newmark's block, whose one rule is that b = Üy from every Üg = Üy on to the stop.
 
     `cycle.pulse` gives the same in ten times the time, most of which goes to the rules it has to look
     at; a slide along straight pieces is a sum of three terms a piece.  In units of the scale (`cell.amplitude`).
     """
-    scale, pieces = cell.amplitude, wave.pieces
+    scale, pieces = cell.amplitude, lines.shape[0]
     block = block_of(cell, NEWMARK, options.g)
     codes[3, j] = block.validity & STATICALLY_UNSTABLE
     codes[0, j] = codes[1, j] = codes[2, j] = -1 if codes[3, j] else 0
     if codes[3, j]:
         return math.nan, math.nan
     threshold = block.yield_acceleration / scale
-    velocity, displacement, peak, p = 0.0, 0.0, 0.0, 0
+    velocity, displacement, peak, p, slips, pulses = 0.0, 0.0, 0.0, 0, 0, 0
     for k in range(wave.height.size):
         if wave.height[k] <= threshold:
             continue
-        codes[1, j] += 1
-        p = max(p, wave.stretch[k, 0])
-        while p < wave.stretch[k, 1]:
-            rate, rate_end = pieces[p, FIRST] - threshold, pieces[p, LAST] - threshold
-            if rate <= 0.0 and rate_end <= 0.0:
+        pulses += 1
+        p, end = max(p, wave.stretch[k, 0]), wave.stretch[k, 1]
+        while p < end:
+            if lines[p, 2] <= threshold:
                 p += 1
                 continue
-            codes[0, j] += 1
+            slips += 1
+            rate, rate_end = lines[p, 0] - threshold, lines[p, 1] - threshold
             if rate <= 0.0:
-                rising = (pieces[p, FINISH] - pieces[p, BEGIN]) * (rate_end / (rate_end - rate))
+                rising = lines[p, 3] * (rate_end / (rate_end - rate))
                 velocity, displacement = 0.5 * rate_end * rising, displacement + rate_end * rising * rising / 6.0
                 p += 1
-            slides = True
-            while slides and p < pieces.shape[0]:
-                rate, rate_end = pieces[p, FIRST] - threshold, pieces[p, LAST] - threshold
-                step = pieces[p, FINISH] - pieces[p, BEGIN]
-                if rate < 0.0 or rate_end < 0.0:
+            while p < pieces:
+                rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
+                gained = 0.5 * (rate + rate_end) * step
+                if rate > 0.0 > rate_end:
+                    peak = max(peak, velocity + 0.5 * rate * (rate / (rate - rate_end)) * step)
+                # V falls to zero within the piece only if it would at its end, or if it turns up again
+                if rate < 0.0 <= rate_end or (rate_end < 0.0 and velocity + gained <= 0.0):
                     slope = (rate_end - rate) / step
-                    if rate > 0.0:
-                        peak = max(peak, velocity - 0.5 * rate * (rate / slope))
                     stop = held_stop(velocity, rate, slope)
                     if stop <= step:
-                        slides = False
                         displacement += velocity * stop + held_integrals(rate, slope, stop)[1]
                         velocity = 0.0
                         p += 0 if rate_end > 0.0 else 1  # a rise may begin the next slide on the same piece
-                if slides:
-                    displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
-                    velocity += 0.5 * (rate + rate_end) * step
-                    peak = max(peak, velocity)
-                    p += 1
+                        break
+                displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
+                velocity += gained
+                peak = max(peak, velocity)
+                p += 1
+    codes[0, j], codes[1, j] = slips, pulses
     # the record may have ended before the slide: then the plane is at rest
     displacement += eq.attenuated_displacement(velocity, threshold, math.inf)
     return scale * displacement, scale * max(peak, velocity)
@@ -248,10 +261,11 @@ def newmark(cell: Cell, options: Options, wave: Wave, codes: np.ndarray, j: int)
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, room: Room, motion: np.ndarray, codes: np.ndarray
-) -> None:
+    cells: np.ndarray, count: int, options: Options, wave: Wave, lines: np.ndarray, room: Room, motion: np.ndarray,
+    codes: np.ndarray,
+) -> None:  # fmt: skip
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and the codes of `respond`."""
     for j in range(count if options.rise == NEWMARK else 0):
-        motion[0, j], motion[1, j] = newmark(cell_of(cells, j), options, wave, codes, j)
+        motion[0, j], motion[1, j] = newmark(cell_of(cells, j), options, wave, lines, codes, j)
     for j in range(count if options.rise != NEWMARK else 0):
         motion[0, j], motion[1, j] = respond(cell_of(cells, j), options, wave, room, codes, j)
