@@ -25,6 +25,7 @@ from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.explore import page as explore
 from slipsweep.files import spec
+from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import NOTES
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
@@ -432,6 +433,12 @@ def test_every_axis_has_its_unit_and_the_caption_its_parameters(result: Result) 
         (("--kind", "contours", "--x", "theta", "--y", "theta"), "two different axes"),
         (("--kind", "contours", "--x", "theta", "--at", "theta=3"), "is an axis of this chart"),
         (("-o", "a.png"), "give one --kind"),
+        (("--kind", "modes", "--levels", "1cm,2cm"), "--levels 1cm,2cm: only with --kind contours"),
+        (("--levels", "1cm,2kg"), 'levels = "2kg": must be a number, with a unit that converts to m'),
+        (("--levels", "1cm,-1cm"), "levels: -0.01: must be > 0"),
+        (("--levels", "1cm"), "levels: 1cm: must be two different values or more"),
+        (("--kind", "contours", "--panels", "theta,mu_s,frequency"), "must be one axis or two"),
+        (("--kind", "spread", "--y", "theta"), "--y theta: not with spread"),
         (("--kind", "modes", "-o", "a.gif"), "must end in one of .png, .svg, .pdf"),
     ],
 )
@@ -619,6 +626,18 @@ def test_values_that_are_not_to_be_relied_on_leave_a_gap(lined: Path) -> None:
         assert ("Left out: values flagged not_recoupled or upslope." in figure.get_supxlabel()) != shown
 
 
+def test_the_order_of_dimensions_does_not_matter(lined: Path) -> None:
+    with Result(lined) as opened:
+        keep: dict[str, Any] = {"theta": slice(None), "amplitude": slice(None)}
+        table = opened.select(["permanent_displacement", "validity"], keep, {"mu_s": 0.25})
+    straight = sheet.reliable(table.data_vars, "permanent_displacement", Look())
+    validity = table["validity"]
+    turned = {**table.data_vars, "validity": Variable(validity.dims[::-1], validity.values.T)}
+    again = sheet.reliable(turned, "permanent_displacement", Look())
+    assert np.isnan(straight.values).any()
+    np.testing.assert_array_equal(again.values, straight.values)
+
+
 @pytest.mark.parametrize("kind", ["contours", "newmark"])
 def test_contours_leave_them_out_too(lined: Path, kind: str) -> None:
     figure = drawn(lined, kind, x="frequency", at={"theta": 14, "mu_s": 0.25})
@@ -716,6 +735,20 @@ def test_spread_is_between_the_answers_there_are(lined: Path) -> None:
         for rate in (2.0, 3.0):
             expected[f"λ = {rate:g}, {text}"] = slipsweep.sweep(**given, model=model, decay_rate=rate)
     expected["this result:\nλ by Eq. 6, Eq. 12"] = expected["λ by Eq. 6, Eq. 12"]
+    # in this slice nothing is left out; of the measured interface's stick-slip the answer by Eqs. 6 and 12 is
+    assert "Left out" not in figure.get_supxlabel()
+    interface = slipsweep.sweep(
+        5.0,
+        0.38,
+        np.linspace(3, 6, 9),
+        1.8,
+        yield_acceleration=0.59,
+        decay_rate=2.7,
+        excitation=slipsweep.Sine(cycles=5),
+    )
+    assert not slipsweep.flags(interface).not_recoupled.any()
+    caption = interface.slipsweep.chart("spread").get_supxlabel()
+    assert "Left out: values flagged not_recoupled." in caption
     rows = []
     for label, answer in expected.items():
         (line,) = named(axes, label)

@@ -146,7 +146,8 @@ def spread(sheet: Sheet) -> Figure:
     sheet.set_axis("x", sheet.x)
     for panel in sheet.panels:
         panel.lines = boundaries(panel.table, always=True)  # the others have a mode limit, whatever this one is
-    answers = [_answers(panel) for panel in sheet.panels]
+    flags: list[Variable] = []
+    answers = [_answers(panel, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for _, ys in one.values()])
     check_positive(RESULTS[_DISPLACEMENT]["long_name"], values)
     for panel, curves in zip(sheet.panels, answers, strict=True):
@@ -166,7 +167,7 @@ def spread(sheet: Sheet) -> Figure:
             sheet.legend[text] = plot_curve(panel.axes, *_above_zero(curve), place, label=text, **look)
         _underlay(sheet, panel, _DISPLACEMENT, 1000.0)
         _mark_accelerations(sheet, panel)
-    sheet.note_left_out()
+    sheet.note_left_out(*flags)
     sheet.notes.append("All answers have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
     return sheet.finish("outside right upper")
 
@@ -189,11 +190,13 @@ def dimensionless_curves(
     return {(i, j): (ratio[i, j], scaled[i, j]) for i in range(scaled.shape[0]) for j in range(scaled.shape[1])}
 
 
-def _answers(panel: Panel) -> dict[str, Curve]:
-    """The curves of a spread, mm, all over the same abscissae; the result's own comes last."""
+def _answers(panel: Panel, flags: list[Variable]) -> dict[str, Curve]:
+    """The curves of a spread, mm, all over the same abscissae, the result's own last; their validity to `flags`."""
     found = {}
     for text, (model, changed) in alternatives(panel.table).items():
-        drawn = reliable(solve(panel.table, [_DISPLACEMENT, "validity"], model, **changed), _DISPLACEMENT, panel.look)
+        solved = solve(panel.table, [_DISPLACEMENT, "validity"], model, **changed)
+        flags.append(solved["validity"])
+        drawn = reliable(solved, _DISPLACEMENT, panel.look)
         found[text] = _curves(panel, drawn, _on_limit(panel, _DISPLACEMENT, model, **changed))[0]
     own = _curves(panel, panel.result(_DISPLACEMENT), _on_limit(panel, _DISPLACEMENT))[0]
     found[f"this result:\n{_own_text(panel.table)}"] = own

@@ -75,6 +75,8 @@ def draw(result: Result, kind: str, wish: Wish) -> Figure:
     InputError
         The chart cannot be drawn of it, or what is asked for is not there.
     """
+    if len(wish.panels) > 2:
+        raise InputError(f"--panels {','.join(wish.panels)}: must be one axis or two")
     return KINDS[check_kind(kind)](result, wish)
 
 
@@ -134,8 +136,6 @@ def levels_of(name: str, levels: Sequence[float | str], g: float) -> tuple[float
 
 
 def _check_panels(result: Result, wish: Wish, dims: Sequence[str], others: Sequence[str | None]) -> None:
-    if len(wish.panels) > 2:
-        raise InputError(f"--panels {','.join(wish.panels)}: must be one axis or two")
     for name in wish.panels:
         if result.axis(name) in others or list(wish.panels).count(name) > 1:
             raise InputError(f"--panels {name}: must be an axis that the chart is not drawn over, and be given once")

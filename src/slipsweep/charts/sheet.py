@@ -106,7 +106,9 @@ def reliable(results: Mapping[str, Variable], name: str, look: Look) -> Variable
     values = results[name]
     left_out = values.values < 0
     if "validity" in results and not look.show_cautions:
-        left_out = left_out | validity_has(results["validity"], LEFT_OUT).values
+        # another program, or a result solved anew beside one that was read, may have another order of dimensions
+        flagged = validity_has(results["validity"], LEFT_OUT)
+        left_out = left_out | broadcast(flagged, Table({}, {name: values}, {}), values.dims)
     return replace(values, values=np.where(left_out, np.nan, values.values))
 
 
@@ -187,13 +189,15 @@ class Sheet:
             if is_acceleration(name) and outer:
                 second_scale(panel.axes, side, g, self.look)
 
-    def note_left_out(self) -> None:
-        """Say which values are left out, if any are."""
-        validity = self.table.data_vars.get("validity")
-        if validity is None or self.look.show_cautions:
-            return
-        names = [(flag.name or "").lower() for flag in LEFT_OUT if validity_has(validity, flag).values.any()]
-        if names:
+    def note_left_out(self, *others: Variable) -> None:
+        """Say which values are left out, if any are: by the flags of the slice and by others."""
+        flags = [*others, *(self.table.data_vars[name] for name in ("validity",) if name in self.table.data_vars)]
+        names = [
+            (flag.name or "").lower()
+            for flag in LEFT_OUT
+            if any(validity_has(validity, flag).values.any() for validity in flags)
+        ]
+        if names and not self.look.show_cautions:
             self.notes.append(f"Left out: values flagged {' or '.join(names)}.")
 
     def note_newmark(self) -> None:
