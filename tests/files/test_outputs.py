@@ -38,6 +38,12 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
         "m.csv",
         (".nc", ".csv", ".png"),
     ),
+    "friction": (("friction", "IN", "--theta", "5", "--mu-s", "0.4"), "t.csv", (".nc", ".png", ".svg", ".pdf")),
+    "calibrate": (
+        ("calibrate", "IN", "--theta", "5", "--mu-s", "0.4"),
+        "t.csv",
+        (".nc", ".toml", ".png", ".svg", ".pdf"),
+    ),
     "export": (("export", "IN"), "a.nc", (".csv", ".parquet")),
     "explore": (("explore", "IN"), "a.nc", ("", ".html")),
     "chart": (("chart", "IN", "--kind", "contours"), "a.nc", (".png", ".svg", ".pdf")),
@@ -53,6 +59,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "a.toml").write_text(CELL)
     (folder / "r.toml").write_text(RECORD)
     (folder / "s.toml").write_text(STATISTICS)
+    (folder / "t.csv").write_text("time (s), table acceleration (g), block acceleration (g)\n")
     (folder / "m.csv").write_text("0,0\n0.1,0.5\n0.2,-0.5\n0.3,0\n")
     assert slipsweep(folder, "run", "a.toml", "--quiet").returncode == 0
     return folder

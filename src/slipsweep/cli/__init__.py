@@ -18,7 +18,7 @@ from typing import Any
 
 import typer
 
-from slipsweep.cli import chart, explore, export, info, limit, run, simulate, streams
+from slipsweep.cli import calibrate, chart, explore, export, info, limit, run, simulate, streams
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -32,6 +32,8 @@ app.command(epilog=export.EXAMPLE)(export.export)
 app.command(epilog=limit.EXAMPLE)(limit.limit)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 app.command(epilog=chart.EXAMPLE)(chart.chart)
+app.command(epilog=calibrate.FRICTION_EXAMPLE)(calibrate.friction)
+app.command(epilog=calibrate.EXAMPLE)(calibrate.calibrate)
 app.command(epilog=explore.EXAMPLE)(explore.explore)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments

@@ -154,7 +154,7 @@ def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, .
         given = tuple(known) if given == "all" else (given,)
     names = check_list(key, given, "channels")
     for name in names:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             raise InputError(f"{key} = {shown(name)}: must be 'all', or of the channels measured: {', '.join(known)}")
     return tuple(names)
 

@@ -329,10 +329,10 @@ class Fit:
 
 
 #: Steps to the least squares at each Üy, and the sum of squares above the least at which a profile ends.
-_PROFILE_STEPS, _FAR = 2, 200.0
+_PROFILE_STEPS, _FAR = 2, 50.0
 
 #: Where the profile over Üy is computed, in standard errors of it about the best, and beyond in parts of the size.
-_ABOUT = np.linspace(-3.5, 3.5, 15)
+_ABOUT = np.linspace(-3.0, 3.0, 9)
 
 
 @dataclass(frozen=True, eq=False)

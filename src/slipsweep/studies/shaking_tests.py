@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.model.options import Model
-from slipsweep.model.parameters import computed, shown
+from slipsweep.model.parameters import check_numbers, shown
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
 from slipsweep.studies.calibration import calibration_table
 from slipsweep.studies.datasets import _dataset
@@ -135,6 +134,9 @@ def test_of(given: Any) -> ShakingTest:
     known = [name for name in CHANNELS if name in given]
     if TABLE not in known:
         raise InputError(f"test: {TABLE}: missing: must be given, along time; there are {shown(list(given))}")
+    for name in known:
+        if not isinstance(given[name], (xr.DataArray, xr.Variable)):
+            raise InputError(f"test: {name} = {shown(given[name])}: must be a DataArray along time")
     arrays = {name: xr.as_variable(given[name]) for name in known}
     times: Any = given["time"] if "time" in given else getattr(given[TABLE], "coords", {}).get("time")
     if times is None:
@@ -142,11 +144,11 @@ def test_of(given: Any) -> ShakingTest:
     for name, array in arrays.items():
         if array.dims != ("time",):
             raise InputError(f"test: {name}: dimensions {array.dims}: must be ('time',)")
-    values = {name: np.asarray(computed(array), np.float64) for name, array in arrays.items()}
+    values = {name: check_numbers(f"test: {name}", array) for name, array in arrays.items()}
     factors = {
         name: unit_factor(f"test: {name}: units", name, str(array.attrs["units"]))
         for name, array in {**arrays, "time": xr.as_variable(times)}.items()
         if "units" in array.attrs
     }
     scaled = {name: factors.get(name, 1.0) * one for name, one in values.items()}
-    return ShakingTest(factors.get("time", 1.0) * np.asarray(computed(times), np.float64), scaled)
+    return ShakingTest(factors.get("time", 1.0) * check_numbers("test: time", times), scaled)

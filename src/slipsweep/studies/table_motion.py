@@ -23,8 +23,8 @@ DEGREE = 3
 _SPACINGS = (48, 32, 24, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2)
 
 #: Points at which a spline is handed to the solver, in each interval of its knots: straight lines between them are
-#: wrong by 3e-4 of the peak or less where a cycle has 6 intervals.
-_POINTS = 20
+#: wrong by 5e-4 of the peak or less where a cycle has 12 intervals.
+_POINTS = 8
 
 #: Most ways in which a motion may be wrong; each costs a solution.
 MOST_SHAPES = 150

@@ -1,0 +1,230 @@
+"""`slipsweep friction` and `slipsweep calibrate`: what a test on a shaking table measured."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
+from slipsweep.cli.options import chooses
+from slipsweep.errors import InputError
+from slipsweep.model.options import MODELS, Model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from slipsweep.grid.tables import Table
+
+FRICTION_EXAMPLE = examples(
+    "slipsweep friction test.csv --theta 5 --mu-s 0.38",
+    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --drift block_acceleration --rest 0:0.5 -o friction.png",
+)
+
+EXAMPLE = examples(
+    "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
+    "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
+)
+
+_FIGURES = (".png", ".svg", ".pdf")
+
+Test = Annotated[
+    Path,
+    typer.Argument(
+        metavar="TEST.csv",
+        help="CSV whose header names columns with units: time (s), table acceleration (g), block acceleration (m/s2), "
+        "relative velocity (m/s), relative displacement (mm).",
+    ),
+]
+Theta = Annotated[float, typer.Option(help="Plane inclination, degrees.")]
+MuS = Annotated[float, typer.Option(help="Static friction coefficient.")]
+Offset = Annotated[
+    list[str] | None,
+    typer.Option(metavar="CHANNEL", help="Channel whose sensor has an offset, or all; may be repeated."),
+]
+Drift = Annotated[
+    list[str] | None,
+    typer.Option(metavar="CHANNEL", help="Channel whose sensor drifts in a straight line, or all; may be repeated."),
+]
+
+
+def friction(
+    *,
+    test: Test,
+    theta: Theta,
+    mu_s: MuS,
+    g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
+    offset: Offset = None,
+    drift: Drift = None,
+    rest: Annotated[
+        str | None, typer.Option(metavar="FROM:TO", help="Times of rest, s, to find offsets and drifts by.")
+    ] = None,
+    threshold: Annotated[
+        float | None, typer.Option(help="Relative acceleration of a slide, m/s² (default: 4 times its noise).")
+    ] = None,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .png, .svg or .pdf; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compute the friction that a test on a shaking table measured (Eq. 1), and its slides."""
+    paths = _checked(output, overwrite, test, (".nc", *_FIGURES))
+    from slipsweep.motion.shaking import read_test
+    from slipsweep.studies.friction import friction_table
+
+    table = friction_table(
+        read_test(test),
+        theta,
+        mu_s,
+        g=g,
+        offset=_named(offset),
+        drift=_named(drift),
+        rest=None if rest is None else _times(rest),
+        threshold=threshold,
+    )
+
+    def figure() -> "Figure":
+        from slipsweep.charts import calibration_figures
+
+        return calibration_figures.friction(table)
+
+    _write(paths, table, figure, overwrite)
+    if quiet:
+        return
+    typer.echo(f"threshold  {table.attrs['threshold']:.4g} m/s2: {table.attrs['threshold_from']}")
+    typer.echo(f"removed    {table.attrs['removed']}")
+    slides = [table[name].values for name in ("slide_onset", "slide_peak", "slide_stop", "onset_acceleration")]
+    typer.echo(f"{slides[0].size} slides" + (", s and m/s2:" if slides[0].size else ""))
+    if slides[0].size:
+        typer.echo("    onset     peak     stop  table at onset  block at most  least friction")
+    for row in zip(*slides, table["peak_block_acceleration"].values, table["least_friction"].values, strict=True):
+        onset, peak, stop, began, most, least = row
+        typer.echo(f"{onset:9.4g}{peak:9.4g}{stop:9.4g}{began:16.4g}{most:15.4g}{least:16.4g}")
+    for path in paths:
+        typer.echo(path)
+
+
+@chooses(model=MODELS)
+def calibrate(
+    *,
+    test: Test,
+    theta: Theta,
+    mu_s: MuS,
+    offset: Offset = None,
+    drift: Drift = None,
+    cycles: Annotated[bool, typer.Option("--cycles/--no-cycles", help="Fit each cycle by itself, too.")] = True,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .toml, .png, .svg or .pdf; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    model: Model,
+    quiet: Quiet = False,
+) -> None:
+    """Find yield acceleration, λ and Δμ from a test on a shaking table."""
+    paths = _checked(output, overwrite, test, (".nc", ".toml", *_FIGURES))
+    from slipsweep.motion.shaking import read_test
+    from slipsweep.studies.calibration import calibration_table
+
+    table = calibration_table(
+        read_test(test), theta, mu_s, model=model, offset=_named(offset), drift=_named(drift), cycles=cycles
+    )
+
+    def figure() -> "Figure":
+        from slipsweep.charts import calibration_figures
+
+        return calibration_figures.calibration(table)
+
+    _write(paths, table, figure, overwrite)
+    if quiet:
+        return
+    _summarize(table)
+    for path in paths:
+        typer.echo(path)
+
+
+def _named(given: list[str] | None) -> str | list[str]:
+    return "all" if given == ["all"] else given or []
+
+
+def _times(text: str) -> list[float]:
+    try:
+        first, last = text.split(":")
+        return [float(first), float(last)]
+    except ValueError:
+        raise InputError(f"--rest {text}: must be two times, s, as FROM:TO") from None
+
+
+def _checked(output: list[Path] | None, overwrite: bool, test: Path, allowed: tuple[str, ...]) -> list[Path]:
+    """The outputs, refused before anything is computed."""
+    from slipsweep.files import outputs
+
+    paths = output or []
+    for path in paths:
+        if path.suffix not in allowed:
+            raise InputError(f"{path}: the name must end in one of {', '.join(allowed)}")
+    outputs.check_outputs(paths, overwrite, reads=[test])
+    return paths
+
+
+def _write(paths: list[Path], table: "Table", figure: Callable[[], "Figure"], overwrite: bool) -> None:
+    from slipsweep.files import netcdf, outputs
+
+    for path in paths:
+        if path.suffix == ".nc":
+            netcdf.write_table(
+                netcdf.without_time_axis(table),
+                path,
+                title=table.attrs["title"],
+                command=typed_command(),
+                overwrite=overwrite,
+            )
+            continue
+        with outputs.complete_or_absent(path, overwrite) as temporary:
+            if path.suffix == ".toml":
+                temporary.write_text(table.attrs["model_table"], encoding="utf-8")
+            else:
+                figure().savefig(temporary, format=path.suffix[1:], dpi=150)
+
+
+def _summarize(table: "Table") -> None:
+    import numpy as np
+
+    typer.echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
+    for name in ("yield_acceleration", "decay_rate", "delta_mu"):
+        low, high = table[f"{name}_interval"].values
+        interval = f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "not determined"
+        unit = " m/s2" if name == "yield_acceleration" else ""
+        error = table[f"{name}_error"].item()
+        shown = f"{error:.2g}" if np.isfinite(error) else "-"
+        typer.echo(f"{name:<24}{table[name].item():>10.4g}{shown:>10}   {interval}{unit}")
+    matrix = table["correlation"].values
+    pairs = (
+        ("yield_acceleration, decay_rate", 0, 1),
+        ("yield_acceleration, delta_mu", 0, 2),
+        ("decay_rate, delta_mu", 1, 2),
+    )
+    typer.echo("correlation")
+    for text, i, j in pairs:
+        typer.echo(f"  {text:<32}" + (f"{matrix[i, j]:7.3f}" if np.isfinite(matrix[i, j]) else "      -"))
+    typer.echo("misfit, root mean square, and in parts of the largest value")
+    for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
+        if f"misfit_{name}" in table:
+            unit = table[f"misfit_{name}"].attrs["units"]
+            misfit, share = table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
+            typer.echo(f"  {name:<32}{misfit:7.2g} {unit}  {share:.1%}")
+    typer.echo(f"removed: {table.attrs['removed']}")
+    if "cycle_start" in table:
+        typer.echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
+        columns = [table[f"cycle_{name}"].values for name in ("start", "yield_acceleration", "decay_rate", "delta_mu")]
+        columns.append(table["cycle_attenuation_coefficient"].values)
+        for number, (start, *values) in enumerate(zip(*columns, strict=True), 1):
+            cells = [f"{value:.3g}" if np.isfinite(value) else "-" for value in values]
+            typer.echo(f"{number:5d}{start:11.4g}{cells[0]:>13}{cells[1]:>8}{cells[2]:>8}{cells[3]:>8}")
+    for finding in table.attrs["findings"].splitlines():
+        typer.echo(f"note: {finding}")
+    typer.echo(f"\n{table.attrs['model_table']}")
+    if table.attrs["uncertainty_table"]:
+        typer.echo(table.attrs["uncertainty_table"])

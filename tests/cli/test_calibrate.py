@@ -1,0 +1,72 @@
+"""`slipsweep friction` and `slipsweep calibrate` on the test that comes with the sweeps."""
+
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from slipsweep import cli
+
+ROOT = Path(__file__).parents[2]
+TEST = str(ROOT / "sweeps" / "data" / "shaking_test.csv")
+BLOCK = ("--theta", "5", "--mu-s", "0.38")
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_friction_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["friction", TEST, *BLOCK, "-o", "friction.nc", "-o", "friction.png"]) == 0
+    printed = capsys.readouterr().out
+    assert "8 slides" in printed
+    assert "removed    nothing" in printed
+    assert Path("friction.png").read_bytes().startswith(b"\x89PNG")
+    with xr.open_dataset("friction.nc") as found:
+        assert found.sizes["slide"] == 8
+        assert found.friction_ratio.dims == ("instant",)
+
+
+def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["friction", TEST, *BLOCK, "--offset", "all", "--rest", "0:0.45"]) == 0
+    assert "removed    ground_acceleration: " in capsys.readouterr().out
+
+
+def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> None:
+    outputs = ("calibration.nc", "calibration.svg", "model.toml")
+    assert cli.main(["calibrate", TEST, *BLOCK, *(word for name in outputs for word in ("-o", name))]) == 0
+    printed = capsys.readouterr().out
+    assert "[uncertainty.decay_rate]" in printed
+    with xr.open_dataset("calibration.nc") as found:
+        assert abs(found.yield_acceleration - 1.8) < 3.5 * found.yield_acceleration_error
+        assert found.sizes["cycle"] == 8
+        assert found.attrs["model_table"] == Path("model.toml").read_text()
+        assert found.attrs["model_table"] in printed
+    assert Path("calibration.svg").read_text().count("misfit") == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("friction", TEST, *BLOCK, "--rest", "1"), "--rest 1: must be two times"),
+        (("friction", TEST, *BLOCK, "-o", "friction.toml"), "friction.toml: the name must end in one of .nc"),
+        (("calibrate", TEST, *BLOCK, "--drift", "table"), "drift = 'table': must be 'all', or of the channels"),
+        (("calibrate", TEST, *BLOCK, "--model", "newmark"), "must be 'mendez'"),
+        (("calibrate", "none.csv", *BLOCK), "none.csv: cannot be read"),
+        (("calibrate", TEST, "--theta", "95", "--mu-s", "0.38"), "theta = 95"),
+    ],
+)
+def test_what_cannot_be(arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(list(arguments)) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_example_is_what_its_script_makes() -> None:
+    """Up to rounding, which another machine may do otherwise."""
+    import runpy
+
+    made = runpy.run_path(str(ROOT / "sweeps" / "data" / "shaking_test.py"))["text"]().splitlines()
+    kept = Path(TEST).read_text().splitlines()
+    assert len(made) == len(kept)
+    assert sum(one != other for one, other in zip(made, kept, strict=True)) < 10
