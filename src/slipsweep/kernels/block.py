@@ -88,7 +88,7 @@ class Block(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """The answer: W and V of the module's docstring, and the flags of the motion."""
+    """The response: W and V of the module's docstring, and the flags of the motion."""
 
     displacement: float
     peak_velocity: float

@@ -230,7 +230,7 @@ _settle_turn = settling(X, PSI, _turn_step)
 def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
     """∫ D dψ on the rise of a half cycle, from Üg = 0 up to where D changes sign, in RATE; 0 where it does not.
 
-    D is -side g Δμ at Üg = 0.  On the positive half it is concave (by `way_of`), on the negative one convex
+    D is -side g Δμ at Üg = 0.  On the positive half it is concave (by `kind_of`), on the negative one convex
     (as long as the block does not lift off): it changes sign once at most, and Newton comes there from Üg = 0
     without passing it.
     """

@@ -2,7 +2,7 @@
 
 Between two events the block's acceleration is either held (polynomials of the phase) or follows
 Eq. 4 (closed forms on a straight piece of the wave, Gauss-Legendre quadrature of a smooth function
-on a curved one), so that no step is taken and the answer carries rounding errors only.  The shaking
+on a curved one), so that no step is taken and the result carries rounding errors only.  The shaking
 comes in monotone pieces (`excitation`).  Along one the block moves by `rise` (stick, slide and follow
 Eq. 4; from t1 on) or by `hold` (to the stop, or to Üg = 0, t5); `pulse` goes through them and on by Eq. 12 or
 the hold, and `train` strings pulses together.
@@ -51,9 +51,9 @@ from slipsweep.kernels.pulse import (
     HELD,
     LEAST,
     PEAK,
-    RESTED,
     SLIDES,
     STATE_ROWS,
+    STOPPED_AT,
     VELOCITY,
     Pulse,
     begin_slide,
@@ -81,7 +81,7 @@ MOST_LEGS = 32
 
 
 class Room(NamedTuple):
-    """Where a block is followed: its state, a record of its legs, and zeros of D on either side of Üg = 0.
+    """Where a block is followed: its state, a log of its legs, and zeros of D on either side of Üg = 0.
 
     One for all cells: a function that makes an array counts the references to every array it is handed.
     """
@@ -91,7 +91,7 @@ class Room(NamedTuple):
     zeros: np.ndarray
 
 
-#: Kinds of legs, and the columns of a record of them, which `history` samples: kind, piece, phase on
+#: Kinds of legs, and the columns of a log of them, which `history` samples: kind, piece, phase on
 #: it and in the table at the start, phase at the end, b, V and W.
 HOLD, FOLLOW, ATTENUATE = range(3)
 LEG_COLUMNS = 8
@@ -99,13 +99,13 @@ LEG_COLUMNS = 8
 
 @scalar
 def room_of(legs: int) -> Room:
-    """Room, with a record of so many legs; made in kernels, where the compiler knows that nothing else lies there."""
+    """Room, with a log of so many legs; made in kernels, where the compiler knows that nothing else lies there."""
     return Room(np.zeros(STATE_ROWS), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
 
 
 @in_lanes
-def record(legs: np.ndarray, kind: int, piece: int, tau: float, start: float, end: float, state: np.ndarray) -> None:
-    """Add a leg to a record whose first row counts them; a sweep keeps none and gives an empty one."""
+def log_leg(legs: np.ndarray, kind: int, piece: int, tau: float, start: float, end: float, state: np.ndarray) -> None:
+    """Add a leg to a log whose first row counts them; a sweep keeps none and gives an empty one."""
     if legs.size:
         legs[0, 0] += 1.0
         row = int(legs[0, 0])
@@ -246,9 +246,9 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
     if block.rise != NEWMARK:
         end = next_break(block, x, top)
         inner = x + SLIVER * (end - x)
-        asked, slope = response_and_slope(block, inner)
+        eq4, slope = response_and_slope(block, inner)
         if block.rise != LITERAL:
-            follows = slope > 0.0 and (follows or asked >= b)
+            follows = slope > 0.0 and (follows or eq4 >= b)
         if not follows and slope > 0.0 and response(block, end) > b:
             end = response_root(block, b, inner, end)
             crosses = True
@@ -289,7 +289,7 @@ def advance(
     state[VELOCITY] += gained
     if stops:
         state[VELOCITY] = state[SLIDES] = 0.0
-        state[RESTED] = phase_at(pieces, p, end)
+        state[STOPPED_AT] = phase_at(pieces, p, end)
     state[PEAK] = max(state[PEAK], state[VELOCITY])
     state[LEAST] = min(state[LEAST], state[VELOCITY])
 
@@ -340,7 +340,7 @@ def hold(
                 end = _held_stop((block, pieces, p, held, velocity, start), low, high, 0.5 * (low + high), start)
             width = end - start
             gained, moved = held_integrals(pieces, p, amplitude, held, start, end)
-    record(legs, HOLD, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end), state)
+    log_leg(legs, HOLD, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end), state)
     advance(pieces, p, end, stops, gained, moved, width, state)
     return end
 
@@ -356,7 +356,7 @@ def follow(
         velocity = state[VELOCITY]
         end = _followed_stop((block, pieces, p, velocity, start), start, end, 0.5 * (start + end), start)
         gained, moved = eq4_integrals(block, pieces, p, start, end)
-    record(legs, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end), state)
+    log_leg(legs, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end), state)
     advance(pieces, p, end, stops, gained, moved, end - start, state)
     return end
 
@@ -405,8 +405,8 @@ def rise(block: Block, pieces: np.ndarray, legs: np.ndarray, p: int, tau: float,
 
 @scalar
 def note_attenuation(legs: np.ndarray, start: float, end: float, state: np.ndarray) -> None:
-    """Add a leg of Eq. 12 to the record of legs."""
-    record(legs, ATTENUATE, 0, 0.0, start, end, state)
+    """Add a leg of Eq. 12 to the log of legs."""
+    log_leg(legs, ATTENUATE, 0, 0.0, start, end, state)
 
 
 pulse = pulse_of(rise, hold, note_attenuation)

@@ -73,8 +73,8 @@ def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[flo
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
     if pieces[p, ARC] > 0.0:
         sine_part = angle_minus_sine(start)
-        rest = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
-        return -pieces[p, TOP] * (angle_minus_sine(end) - sine_part), -pieces[p, TOP] * rest
+        remaining = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
+        return -pieces[p, TOP] * (angle_minus_sine(end) - sine_part), -pieces[p, TOP] * remaining
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
         once, twice = pieces[p, ONCE + TERM * k], pieces[p, TWICE + TERM * k]

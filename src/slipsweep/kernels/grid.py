@@ -72,10 +72,10 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], t
     """Fill a tile with `count` cells of a grid from `begin` on; the number of runs."""
     dimensions = grid.shape.size
     index, position = tile.at, tile.position
-    rest = begin
+    remaining = begin
     for axis in range(dimensions - 1, -1, -1):
-        index[axis] = rest % grid.shape[axis]
-        rest //= grid.shape[axis]
+        index[axis] = remaining % grid.shape[axis]
+        remaining //= grid.shape[axis]
     for row in range(9):
         position[row] = 0
         for axis in range(dimensions):
@@ -181,14 +181,14 @@ def _sine_grid(
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        left = sine.solve_cells(tile.cells, count, options, room, tile.motion, tile.codes)
+        count_remaining = sine.solve_cells(tile.cells, count, options, room, tile.motion, tile.codes)
         scatter(grid, tile, runs, periods, results)
         spread_codes(grid, tile, runs, 0, results.codes[0])
         spread_codes(grid, tile, runs, 1, results.codes[1])
-        for j in range(count if left > 0 else 0):
-            if room.left[j] and stretches > 0 and remaining[stretches - 1, 1] == begin + j:
+        for j in range(count if count_remaining > 0 else 0):
+            if room.remaining[j] and stretches > 0 and remaining[stretches - 1, 1] == begin + j:
                 remaining[stretches - 1, 1] += 1
-            elif room.left[j]:
+            elif room.remaining[j]:
                 remaining[stretches, 0], remaining[stretches, 1] = begin + j, begin + j + 1
                 stretches += 1
     return stretches

@@ -60,20 +60,20 @@ def sample_leg(
     since, b, velocity, moved = phi - legs[row, 3], legs[row, 5], legs[row, 6], legs[row, 7]
     if kind == ATTENUATE:
         sample[BLOCK] += b
-        gained, gained_way = -b * since, -0.5 * b * since * since
+        gained, gained_displacement = -b * since, -0.5 * b * since * since
     elif kind == FOLLOW:
         sample[BLOCK] = response(block, sample[GROUND])
-        gained, gained_way = cycle.eq4_integrals(block, wave.pieces, p, tau, tau + since)
+        gained, gained_displacement = cycle.eq4_integrals(block, wave.pieces, p, tau, tau + since)
     else:
         sample[BLOCK] = b
-        gained, gained_way = held_integrals(wave.pieces, p, block.amplitude, b, tau, tau + since)
+        gained, gained_displacement = held_integrals(wave.pieces, p, block.amplitude, b, tau, tau + since)
     sample[VELOCITY] = max(velocity + gained, 0.0)
-    sample[DISPLACEMENT] = displacement + moved + velocity * since + gained_way
+    sample[DISPLACEMENT] = displacement + moved + velocity * since + gained_displacement
 
 
 @scalar
 def history_room(wave: Wave) -> Room:
-    """Room with a record of as many legs as a pulse may have."""
+    """Room with a log of as many legs as a pulse may have."""
     longest = 0
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
@@ -191,8 +191,8 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
             at = sample_following(block, wave, p, tau, until, tau_until, offset, moving, phases, at, history)
         if c == wave.lead:
             first = 0 if wave.cycle[c] == 0 else min(first, wave.cycle[c])
-    for rest in range(at, phases.size):
-        history[rest, VELOCITY], history[rest, DISPLACEMENT] = moving[0], moving[1]
+    for after in range(at, phases.size):
+        history[after, VELOCITY], history[after, DISPLACEMENT] = moving[0], moving[1]
 
 
 @scalar

@@ -1,4 +1,4 @@
-"""Lanes of blocks under a sine, which `pulses` and `continuous` solve together: their rows, and the ways they go."""
+"""Lanes of blocks under a sine, which `pulses` and `continuous` solve together: their rows, and the kinds of motion."""
 
 import math
 
@@ -8,7 +8,7 @@ from slipsweep.kernels.block import LANE_ROWS, TILE
 
 HALF_PI = 0.5 * math.pi
 
-#: The ways a cell can go: not at all, stuck or without a value; held at the yield value to the peak;
+#: Kinds of motion: none, stuck or without a value; held at the yield value to the peak;
 #: held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other,
 #: event by event.
 STAYS, YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON, OTHER = range(6)

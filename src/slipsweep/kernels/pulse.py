@@ -3,7 +3,7 @@
 A solver brings `rise` (along a piece on which the plane's acceleration rises) and `hold` (with the block's
 acceleration b held, along a part of a piece or to the stop); here stands what decides between them:
 
-- where a rise or a plateau begins and where the plane's acceleration jumps up, Eq. 4 is asked anew (`arrive`);
+- where a rise or a plateau begins and where the plane's acceleration jumps up, Eq. 4 gives b anew (`reset_held`);
 - on a rise the block sticks, holds b or follows Eq. 4 (`rise`); elsewhere b is held;
 - from Üg = 0 (t5) on, Eq. 12 takes V down, or b is held on (`recoupling`), up to the next pulse;
 - after the shaking Eq. 12 goes on to the stop.
@@ -39,14 +39,14 @@ from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, JUMPS, LAST, STAR
 #: with which it slid at the end of a rise.
 #: (An array, because the lanes of the step solver have the same rows, cell by cell, and
 #: numba keeps a record's fields in memory just the same.)
-VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS, RESTED, BEGAN_AT, SLIPS, LEAST_HELD = range(11)
+VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS, STOPPED_AT, BEGAN_AT, SLIPS, LEAST_HELD = range(11)
 STATE_ROWS = 11
 
 
 class Pulse(NamedTuple):
     """From one Üg = Üy to the next: V carried on, W gained, the largest and the least V.
 
-    `rested` is the phase at which the block came to rest, infinite where only the end of the shaking
+    `stopped_at` is the phase at which the block came to rest, infinite where only the end of the shaking
     brought it to rest; `validity` says if there is no value: b ≤ 0 at the end of
     any of its rises (NaN, if at the end of the last).
     """
@@ -55,7 +55,7 @@ class Pulse(NamedTuple):
     displacement: float
     peak: float
     least: float
-    rested: float
+    stopped_at: float
     validity: int
 
 
@@ -86,7 +86,7 @@ def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
 
 
 @in_lanes
-def asks_anew(pieces: np.ndarray, p: int) -> bool:
+def rises_anew(pieces: np.ndarray, p: int) -> bool:
     """Whether piece p, of Üg > 0, begins by a jump upwards, is a plateau, or rises after a fall."""
     first, last = pieces[p, FIRST], pieces[p, LAST]
     fell = p > 0 and pieces[p - 1, FIRST] > pieces[p - 1, LAST]
@@ -101,8 +101,8 @@ def begin_slide(b: float, phase: float, state: np.ndarray) -> None:
 
 
 @in_lanes
-def arrive(block: Block, pieces: np.ndarray, p: int, x: float, state: np.ndarray) -> None:
-    """What Üg = x asks at the beginning of piece p: b of a block that slides, or a slide (t1), if not by a rise."""
+def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: np.ndarray) -> None:
+    """Reset b of a block that slides at the beginning of piece p, Üg = x, or begin a slide (t1), if not by a rise."""
     state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
     if state[SLIDES] > 0.0:
         if block.rise == LITERAL:
@@ -145,8 +145,8 @@ def pulse_of(
                 x = max(x, block.yield_acceleration)
             else:
                 tau = wave.pieces[q, BEGIN]
-            if asks_anew(wave.pieces, q):
-                arrive(block, wave.pieces, q, x, state)
+            if rises_anew(wave.pieces, q):
+                reset_held(block, wave.pieces, q, x, state)
             if first < last:
                 rise(block, wave.pieces, table, q, tau, x, state)
             elif state[SLIDES] > 0.0:
@@ -174,9 +174,9 @@ def pulse_of(
         if not last:
             p, tau = beginning(block, wave, following)
         started = wave.pieces[q, START] if q < pieces else wave.pieces[q - 1, END]
-        state[RESTED] = started  # Eq. 12 goes on beyond the shaking just the same
+        state[STOPPED_AT] = started  # Eq. 12 goes on beyond the shaking just the same
         if options.recoupling == INTEGRATE:
-            state[RESTED] = math.inf
+            state[STOPPED_AT] = math.inf
             integrate_on(block, wave, table, q, p, tau, state)
             started = wave.pieces[pieces - 1, END]
         if state[SLIDES] > 0.0 and (last or options.recoupling != INTEGRATE):
@@ -193,7 +193,7 @@ def pulse_of(
         p, tau = beginning(block, wave, k)
         x = max(block.amplitude * wave.pieces[p, FIRST], block.yield_acceleration)
         state[VELOCITY] = state[PEAK] = state[LEAST] = velocity
-        state[DISPLACEMENT] = state[RESTED] = 0.0
+        state[DISPLACEMENT] = state[STOPPED_AT] = 0.0
         state[HELD], state[SLIDES] = starting_acceleration(block, x), 1.0 if velocity > 0.0 else 0.0
         state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
         state[BEGAN_AT], state[LEAST_HELD] = -math.inf, math.inf
@@ -204,6 +204,6 @@ def pulse_of(
             recouple(block, options, wave, table, wave.stretch[k, 1], following, state)
         least = min(state[LEAST], state[VELOCITY])
         validity = KD_NOT_POSITIVE if state[LEAST_HELD] <= 0.0 else 0
-        return Pulse(state[VELOCITY], state[DISPLACEMENT], state[PEAK], least, state[RESTED], validity)
+        return Pulse(state[VELOCITY], state[DISPLACEMENT], state[PEAK], least, state[STOPPED_AT], validity)
 
     return pulse

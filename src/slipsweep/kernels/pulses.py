@@ -1,6 +1,6 @@
 """Stick-slip under a sine in SIMD lanes: the pulse from its onset to the stop, phase by phase, and all cycles.
 
-Nearly all cells go the same way: they slide from Üg = Üy, hold the yield value, perhaps follow Eq. 4 to the
+Nearly all cells are of one of a few kinds: they slide from Üg = Üy, hold the yield value, perhaps follow Eq. 4 to the
 peak, hold again and stop before the next pulse.  Where a block comes to the next pulse in motion it goes on by one
 of a few rules (`lane_attenuation`, `lane_carried`), pulse by pulse where none is like another (`follow_pulses`).
 """
@@ -101,8 +101,8 @@ def _onset_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> t
 @in_lanes
 def _switch_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
     """To E = b, from the right, where a convex E converges."""
-    asked, slope = lane_response_and_slope(lanes, j, x, g)
-    step = (asked - lanes[LEVEL + j]) / slope
+    eq4, slope = lane_response_and_slope(lanes, j, x, g)
+    step = (eq4 - lanes[LEVEL + j]) / slope
     return x - step, step, min(x, lanes[AMPLITUDE + j] - x)
 
 
@@ -140,12 +140,12 @@ _settle_recoupling = settling(PSI, X, _recoupling_step)
 
 
 @scalar
-def lane_onset(way: int, g: float, lanes: np.ndarray) -> None:
+def lane_onset(kind: int, g: float, lanes: np.ndarray) -> None:
     """t1: where each lane begins to slide (ψ in START) and the value it then holds (LEVEL)."""
     for j in range(STRIP):
         lanes[CONVERGED + j] = 1.0
         lanes[LEVEL + j], lanes[START + j] = lanes[YIELD + j], lanes[BEGAN + j]
-    if way != STICKS:
+    if kind != STICKS:
         return
     for j in range(STRIP):
         lanes[CONVERGED + j] = 0.0
@@ -159,10 +159,10 @@ def lane_switch(g: float, lanes: np.ndarray) -> None:
     """x at which each lane ceases to hold its level and follows Eq. 4 (X), and b at the peak (HELD)."""
     for j in range(STRIP):
         amplitude, level = lanes[AMPLITUDE + j], lanes[LEVEL + j]
-        asked, slope = lane_response_and_slope(lanes, j, amplitude, g)
-        follows = asked > level
-        lanes[HELD + j] = asked if follows else level
-        lanes[X + j] = amplitude - (asked - level) / slope if follows else amplitude
+        eq4, slope = lane_response_and_slope(lanes, j, amplitude, g)
+        follows = eq4 > level
+        lanes[HELD + j] = eq4 if follows else level
+        lanes[X + j] = amplitude - (eq4 - level) / slope if follows else amplitude
         lanes[PSI + j] = 0.0 if follows else 1.0
     _settle_switch(lanes, 1.0, g)
     for j in range(STRIP):
@@ -170,9 +170,9 @@ def lane_switch(g: float, lanes: np.ndarray) -> None:
 
 
 @scalar
-def lane_rise(way: int, g: float, lanes: np.ndarray) -> None:
+def lane_rise(kind: int, g: float, lanes: np.ndarray) -> None:
     """From t1 to the peak: b in HELD, V and W gained from rest in V and W."""
-    if way == YIELD_GOVERNS:
+    if kind == YIELD_GOVERNS:
         for j in range(STRIP):
             lanes[X + j], lanes[HELD + j] = lanes[AMPLITUDE + j], lanes[LEVEL + j]
             lanes[V + j], lanes[W + j] = held_motion(lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[START + j], 0.0)
@@ -252,7 +252,7 @@ def lane_series(lanes: np.ndarray, j: int, braked: float, gain: float, later: fl
 
 
 @scalar
-def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
+def lane_attenuation(kind: int, cycles: int, lanes: np.ndarray) -> None:
     """Eq. 12, and all cycles: W in W, the largest V in PEAK.
 
     Where a block still slides at the next Üg = Üy, Eq. 4 and the hold act on it as in the
@@ -273,7 +273,7 @@ def lane_attenuation(way: int, cycles: int, lanes: np.ndarray) -> None:
         still = (carried > 0.0) & (cycles > 1)
         lanes[CODE + j] = NOT_RECOUPLED if still else 0
         # -1: right so far, but not over
-        lanes[CONVERGED + j] *= -1.0 if still & (way == STICKS) else 1.0
+        lanes[CONVERGED + j] *= -1.0 if still & (kind == STICKS) else 1.0
 
 
 @scalar
@@ -358,17 +358,17 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         stops = psi > began
         braked = eq.attenuated_displacement(left, lanes[HELD + j], pause_of(began))
         periods = np.floor(later / (most + 1.0))
-        rest = later - periods * (most + 1.0)
+        remaining = later - periods * (most + 1.0)
         sliding_on = most * (lanes[W + j] + braked + math.pi * gain * (most - 1.0))
         slides = sliding_on if stops else lane_series(lanes, j, braked, gain, most - 1.0)
         period = lanes[MOVED + j] + again + (slides if most > 0.0 else 0.0)
-        tail = lanes[MOVED + j] + lane_series(lanes, j, braked, gain, rest - 1.0)
+        tail = lanes[MOVED + j] + lane_series(lanes, j, braked, gain, remaining - 1.0)
         # the slides through all reach t5, as the first does
         gets_over = (lanes[LEVEL + j] < lanes[AMPLITUDE + j]) & (lanes[CONVERGED + j] * lanes[THROUGH + j] > 0.0)
         alike = gets_over & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
         repeats = ((most == 0.0) | alike) & (lanes[X + j] > 0.0) & ((not stops) | (psi < lanes[ONSET + j]))
-        lanes[W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if rest > 0.0 else lanes[LAST + j])
-        highest = lanes[PEAK + j] + max(gain, 0.0) * max(rest - 1.0, 0.0)
+        lanes[W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if remaining > 0.0 else lanes[LAST + j])
+        highest = lanes[PEAK + j] + max(gain, 0.0) * max(remaining - 1.0, 0.0)
         lanes[PEAK + j] = max(lanes[HIGHEST + j], highest if most > 0.0 else 0.0)
         # -1: each pulse has to be followed
         lanes[CONVERGED + j] = 1.0 if repeats else -1.0
@@ -426,13 +426,13 @@ def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, f
     """b at the peak, and V and W gained there, of a lane that starts to slide at ψ = `start`, beyond t1; or NaN."""
     amplitude = lanes[AMPLITUDE + j]
     x_start = amplitude * (1.0 - versine(start))
-    asked, slope = lane_response_and_slope(lanes, j, x_start, g)
-    level = max(lanes[YIELD + j], asked)
+    eq4, slope = lane_response_and_slope(lanes, j, x_start, g)
+    level = max(lanes[YIELD + j], eq4)
     at_peak, slope_at_peak = lane_response_and_slope(lanes, j, amplitude, g)
     if at_peak <= level:
         return level, *held_motion(amplitude, level, start, 0.0)
     psi = start
-    if slope <= 0.0 or asked < level:  # as in `lane_switch`
+    if slope <= 0.0 or eq4 < level:  # as in `lane_switch`
         x = amplitude - (at_peak - level) / slope_at_peak
         x = _switch_root((lanes, j, level, g), x_start, amplitude, x, amplitude)
         if math.isnan(x):

@@ -1,9 +1,9 @@
-"""The cycle solver's short way for the sine: the common cases in SIMD lanes.
+"""The cycle solver for the sine: the common kinds of motion in SIMD lanes.
 
-The cells of a tile are sorted by the way they go; those that go one way are laid out side by side and
+The cells of a tile are sorted by the kind of their motion; those of one kind are laid out side by side and
 solved together (`pulses`, `continuous`), in loops that LLVM turns into SIMD: Newton with a fixed
-number of iterations, quadrature nodes outside, cells inside.  A cell whose iteration has not converged, or that goes
-another way, is left to `cycle`, which solves any waveform; in continuous sliding it is solved here, by
+number of iterations, quadrature nodes outside, cells inside.  A cell whose iteration has not converged, or that is of
+another kind, is left to `cycle`, which solves any waveform; in continuous sliding it is solved here, by
 symmetry from one quarter of the cycle.
 """
 
@@ -57,8 +57,8 @@ from slipsweep.kernels.pulses import lane_attenuation, lane_carried, lane_fall, 
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
-#: Rows of a tile's blocks beside the lanes': the codes, the way a cell goes, μmin, and E at Üg = Üy and at the peak.
-_MODE, _VALIDITY, _WAY, _LEAST_FRICTION, _AT_START, _AT_END = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
+#: Rows of a tile's blocks beside the lanes': the codes, the kind of its motion, μmin, and E at Üg = Üy and at the peak.
+_MODE, _VALIDITY, _KIND, _LEAST_FRICTION, _AT_START, _AT_END = range(LANE_ROWS * TILE, (LANE_ROWS + 6) * TILE, TILE)
 BLOCKS_SIZE = (LANE_ROWS + 6) * TILE
 
 
@@ -66,15 +66,15 @@ class Room(NamedTuple):
     """Where the cells of a tile are worked on.
 
     One for all tiles: a function that makes no array need not count references to any, a nanosecond a cell.
-    `runs` has the cells at which runs of one way start, `where` the cells of the lanes, and `left` is true
-    for cells that are to go from event to event.
+    `runs` has the cells at which runs of one kind start, `where` the cells of the lanes, and `remaining` is
+    true for cells that are to go from event to event.
     """
 
     blocks: np.ndarray
     lanes: np.ndarray
     runs: np.ndarray
     where: np.ndarray
-    left: np.ndarray
+    remaining: np.ndarray
 
 
 def room_of() -> Room:
@@ -86,8 +86,8 @@ def room_of() -> Room:
 
 
 @in_lanes
-def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
-    """Which way a cell goes (docs/numerics.md#lanes-of-the-sine)."""
+def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
+    """The kind of a cell's motion (docs/numerics.md#lanes-of-the-sine)."""
     at_start, at_end, mode = blocks[_AT_START + j], blocks[_AT_END + j], blocks[_MODE + j]
     decay = blocks[DECAY + j]
     start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
@@ -103,15 +103,15 @@ def way_of(blocks: np.ndarray, j: int, options: Options) -> int:
     lags = most * (tan_theta - decay * options.g) <= tan_theta * (mu_s - tan_theta)
     smooth = (options.rise == MONOTONE) & (at_end < end) & (convex | (rises & lags))
     sticks_or_follows = STICKS if at_start >= start else FOLLOWS_EQ4
-    way = sticks_or_follows if gentle else OTHER
-    way = YIELD_GOVERNS if (at_start < start) & (at_end <= start) else way
-    way = way if smooth else OTHER
-    way = YIELD_GOVERNS if options.rise == NEWMARK else way
-    way = way if mode == STICK_SLIP else OTHER
+    kind = sticks_or_follows if gentle else OTHER
+    kind = YIELD_GOVERNS if (at_start < start) & (at_end <= start) else kind
+    kind = kind if smooth else OTHER
+    kind = YIELD_GOVERNS if options.rise == NEWMARK else kind
+    kind = kind if mode == STICK_SLIP else OTHER
     # where the peak velocity is wanted, D has to be concave (`lane_turn`)
     early = gentle & (start <= SHORT_SINE * end) & (convex | (not options.wants_peak))
-    way = SLIDES_ON if (mode == CONTINUOUS) & early else way
-    return way if mode > STUCK else STAYS
+    kind = SLIDES_ON if (mode == CONTINUOUS) & early else kind
+    return kind if mode > STUCK else STAYS
 
 
 @scalar
@@ -129,23 +129,23 @@ def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
 
 
 @scalar
-def solve_strip(way: int, options: Options, lanes: np.ndarray) -> None:
-    """Lanes that all go one way, from the onset to the end of all cycles."""
-    if way == SLIDES_ON:
+def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
+    """Lanes of one kind, from the onset to the end of all cycles."""
+    if kind == SLIDES_ON:
         lane_continuous(options, lanes)
         return
-    lane_onset(way, options.g, lanes)
-    lane_rise(way, options.g, lanes)
+    lane_onset(kind, options.g, lanes)
+    lane_rise(kind, options.g, lanes)
     lane_fall(options.wants_peak, lanes)
     if options.recoupling == INTEGRATE:
         lane_recoupling(options.cycles, lanes)
     else:
-        lane_attenuation(way, options.cycles, lanes)
+        lane_attenuation(kind, options.cycles, lanes)
 
 
 @scalar
 def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
-    """Blocks of a strip of a tile in lanes, with their codes and the way each goes.
+    """Blocks of a strip of a tile in lanes, with their codes and the kind of each.
 
     Neighbours are mostly alike, and what none of them needs is left out: λ and t1 of those that stay,
     E of those that do not stick and slip (7 against 9 ns a cell of a design chart).
@@ -157,7 +157,7 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
         yield_acceleration, _, _, _, _, mode, validity = interface_of(cell, NEWMARK, g)
         blocks[AMPLITUDE + j], blocks[YIELD + j] = cell.amplitude, yield_acceleration
         blocks[_MODE + j], blocks[_VALIDITY + j] = mode, validity
-        blocks[_WAY + j] = STAYS
+        blocks[_KIND + j] = STAYS
         slides += 1 if mode > STUCK else 0
     for j in range(0 if newmark else STRIP):
         cell = cell_of(cells, j)
@@ -166,7 +166,7 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
         blocks[MU_S + j], blocks[TAN_THETA + j] = cell.mu_s, cell.tan_theta
         blocks[DELTA_MU + j], blocks[_LEAST_FRICTION + j] = delta_mu, minimum_friction
         blocks[_MODE + j], blocks[_VALIDITY + j] = mode, validity
-        blocks[_WAY + j] = STAYS
+        blocks[_KIND + j] = STAYS
         slides += 1 if mode > STUCK else 0
         sticks += 1 if mode == STICK_SLIP else 0
     if slides == 0:
@@ -181,7 +181,7 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
             blocks[_AT_START + j] = lane_response(blocks, j, blocks[YIELD + j], g)
             blocks[_AT_END + j] = lane_response(blocks, j, blocks[AMPLITUDE + j], g)
     for j in range(STRIP):
-        blocks[_WAY + j] = way_of(blocks, j, options)
+        blocks[_KIND + j] = kind_of(blocks, j, options)
 
 
 @scalar
@@ -193,15 +193,15 @@ def sort_cells(cells: np.ndarray, count: int, options: Options, blocks: np.ndarr
 
 @scalar
 def runs_of(blocks: np.ndarray, count: int, runs: np.ndarray) -> int:
-    """Where runs of cells that go the same way start (and the last ends); the number of them.
+    """Where runs of cells of one kind start (and the last ends); the number of them.
 
-    Along an axis of a sweep neighbours mostly go the same way: cells are laid out and collected
+    Along an axis of a sweep neighbours are mostly of one kind: cells are laid out and collected
     run by run.
     """
     runs[0], found = 0, 1
     for first in range(1, count, STRIP):
         size = min(STRIP, count - first)
-        before, after = blocks[_WAY + first - 1 :], blocks[_WAY + first :]
+        before, after = blocks[_KIND + first - 1 :], blocks[_KIND + first :]
         changes = 0
         for j in range(size):
             changes += 1 if after[j] != before[j] else 0
@@ -237,51 +237,51 @@ def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
 
 
 @in_lanes
-def enter(
-    lanes: np.ndarray, lane: int, way: int, options: Options, blocks: np.ndarray, motion: np.ndarray,
+def store_lane(
+    lanes: np.ndarray, lane: int, kind: int, options: Options, blocks: np.ndarray, motion: np.ndarray,
     codes: np.ndarray, j: int,
 ) -> None:  # fmt: skip
-    """Enter the result of a lane that has converged as cell j; else the cell is to go the long way."""
+    """Store the result of a lane that has converged as that of cell j; else the cell remains to be solved."""
     solved = lanes[CONVERGED + lane] > 0.0
-    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if (way == YIELD_GOVERNS) & (options.rise != NEWMARK) else 0)
+    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if (kind == YIELD_GOVERNS) & (options.rise != NEWMARK) else 0)
     motion[0, j] = lanes[W + lane]
     if options.wants_peak:
         motion[1, j] = lanes[PEAK + lane]
     codes[1, j] = settled_in_cycles(codes[1, j] | flags, lanes[W + lane]) if solved else codes[1, j]
-    blocks[_WAY + j] = way if solved else OTHER
+    blocks[_KIND + j] = kind if solved else OTHER
 
 
 @scalar
-def solve_way(way: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Solve the cells of a tile, which has `count` runs, that go one way."""
+def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Solve the cells of a tile, which has `count` runs, that are of one kind."""
     blocks, lanes, runs, where = room.blocks, room.lanes, room.runs, room.where
     used = 0
     for run in range(count):
-        if blocks[_WAY + runs[run]] == way:
+        if blocks[_KIND + runs[run]] == kind:
             used = fill_lanes(blocks, runs[run], runs[run + 1], used, lanes)
     if used == 0:
         return
     fill_up(used, LANE_ROWS, lanes)
     for first in range(0, used, STRIP):
-        solve_strip(way, options, lanes[first:])
+        solve_strip(kind, options, lanes[first:])
     lane = 0
     for run in range(count):
         first, last = runs[run], runs[run + 1]
-        if blocks[_WAY + first] == way:
+        if blocks[_KIND + first] == kind:
             # by slices, which numba knows to begin at 0: then this is a loop in SIMD
             found, cells, moved, coded = lanes[lane:], blocks[first:], motion[:, first:last], codes[:, first:last]
             for j in range(last - first):
-                enter(found, j, way, options, cells, moved, coded, j)
-            if way == STICKS:
+                store_lane(found, j, kind, options, cells, moved, coded, j)
+            if kind == STICKS:
                 for j in range(last - first):
                     where[lane + j] = first + j
             lane += last - first
-    if way == STICKS:
+    if kind == STICKS:
         used = fill_carried(used, lanes, where)
         for first in range(0, used, STRIP):
             lane_carried(min(used - first, STRIP), options, lanes[first:])
         for lane in range(used):
-            enter(lanes, lane, way, options, blocks, motion, codes, where[lane])
+            store_lane(lanes, lane, kind, options, blocks, motion, codes, where[lane])
 
 
 @scalar
@@ -290,21 +290,21 @@ def solve_cells(
 ) -> int:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
 
-    Those that are to go from event to event, as any waveform does, are marked in `room.left`; their number.
+    Those that are to go from event to event, as any waveform does, are marked in `room.remaining`; their number.
     """
-    blocks, left = room.blocks, room.left
+    blocks = room.blocks
     fill_up(count, 7, cells)
     sort_cells(cells, whole_lanes(count), options, blocks)
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[_MODE + j]), int(blocks[_VALIDITY + j])
         motion[0, j] = motion[1, j] = 0.0 if blocks[_MODE + j] == STUCK else math.nan
     number = runs_of(blocks, count, room.runs)
-    for way in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
-        solve_way(way, number, options, room, motion, codes)
+    for kind in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
+        solve_kind(kind, number, options, room, motion, codes)
     remaining = 0
     for j in range(count):
-        left[j] = blocks[_WAY + j] == OTHER
-        remaining += 1 if left[j] else 0
+        room.remaining[j] = blocks[_KIND + j] == OTHER
+        remaining += 1 if room.remaining[j] else 0
     return remaining
 
 

@@ -64,15 +64,15 @@ from slipsweep.kernels.pulse import (
     HELD,
     LEAST,
     PEAK,
-    RESTED,
     SLIDES,
     STATE_ROWS,
+    STOPPED_AT,
     VELOCITY,
     Pulse,
-    arrive,
-    asks_anew,
     begin_slide,
     pulse_of,
+    reset_held,
+    rises_anew,
     validity_before,
 )
 from slipsweep.kernels.train import train_of, yield_governs
@@ -182,7 +182,7 @@ def node(steps: Steps, p: int, i: int) -> float:
 
 
 @scalar
-def kind_of(wave: Wave, p: int) -> int:
+def course_of(wave: Wave, p: int) -> int:
     """Whether Üg > 0 does not fall on piece p, falls, or Üg < 0."""
     if wave.pieces[p, TOP] < 0.0:
         return BELOW
@@ -260,7 +260,7 @@ def take(c0: float, c1: float, c2: float, h: float, stops: bool, state: np.ndarr
 
 
 @scalar
-def rest(block: Block, state: np.ndarray) -> None:
+def reset_state(block: Block, state: np.ndarray) -> None:
     """Fill the state of a block at rest that has not moved yet."""
     state[:] = 0.0
     state[BEGAN_AT], state[REACH], state[TOUCH] = -math.inf, -math.inf, math.inf
@@ -391,7 +391,7 @@ def fall_steps(
     if state[SLIDES] > 0.0 and whole < steps.counts[p] and end > node(steps, p, whole):
         hold_step(block, rule, pieces, p, node(steps, p, whole), end, state)
     if state[SLIDES] == 0.0:
-        state[RESTED] = pieces[p, END]
+        state[STOPPED_AT] = pieces[p, END]
 
 
 @scalar
@@ -435,27 +435,27 @@ def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float,
             if longest < end - tau:
                 cut = tau + longest
                 x_cut = plane(wave.pieces, p, amplitude, cut)
-        asked, asked_cut = 0.0, 0.0
+        eq4, eq4_cut = 0.0, 0.0
         if block.rise != NEWMARK:
-            asked, slope = response_and_slope(block, x)
-            asked_cut = response(block, x_cut)
+            eq4, slope = response_and_slope(block, x)
+            eq4_cut = response(block, x_cut)
             if block.rise == MONOTONE:
                 held = state[HELD]
-                if state[FOLLOWS] == 0.0 and asked_cut > held:
-                    if asked < held or slope <= 0.0:
-                        x_cut, asked_cut, switches = response_root(block, held, x, x_cut), held, True
+                if state[FOLLOWS] == 0.0 and eq4_cut > held:
+                    if eq4 < held or slope <= 0.0:
+                        x_cut, eq4_cut, switches = response_root(block, held, x, x_cut), held, True
                     else:
                         state[FOLLOWS] = 1.0
-                elif state[FOLLOWS] == 1.0 and asked_cut < asked:
+                elif state[FOLLOWS] == 1.0 and eq4_cut < eq4:
                     if slope > 0.0:
                         x_cut, switches = slope_root(block, 0.0, x, x_cut), True
-                        asked_cut = response(block, x_cut)
+                        eq4_cut = response(block, x_cut)
                     else:
                         state[FOLLOWS] = 0.0
         if switches:
             cut = tau_within(steps, p, k, amplitude, x_cut)
         follows, held, h = state[FOLLOWS] == 1.0, state[HELD], cut - tau
-        rate, middle = x - (asked if follows else held), 0.0
+        rate, middle = x - (eq4 if follows else held), 0.0
         if rule == SIMPSON:
             x_middle = amplitude * steps.nodes[at + 1]
             if tau != begin or cut != end:
@@ -465,14 +465,14 @@ def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float,
             rule,
             rate if state[VELOCITY] > 0.0 else max(rate, 0.0),  # rounding may not stop what starts here
             middle,
-            x_cut - (asked_cut if follows else held),
+            x_cut - (eq4_cut if follows else held),
         )
         fraction = take(c0, c1, c2, h, True, state)
         if state[SLIDES] == 0.0:
             cut = tau + fraction * h
             x_cut = plane(wave.pieces, p, amplitude, cut)
         elif follows:
-            state[HELD] = asked_cut
+            state[HELD] = eq4_cut
         if switches:
             state[FOLLOWS] = 1.0 - state[FOLLOWS]
         tau, x = cut, x_cut
@@ -488,37 +488,37 @@ def rise_steps(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: floa
     rule, nodes, at, h = steps.rule, steps.nodes, steps.offset[p], steps.length[p]
     share = (tau - pieces[p, BEGIN]) / (pieces[p, FINISH] - pieces[p, BEGIN])
     first = min(max(int(share * steps.counts[p]), 0), steps.counts[p] - 1)
-    newmark, asked = block.rise == NEWMARK, math.nan
+    newmark, eq4 = block.rise == NEWMARK, math.nan
     for i in range(first, steps.counts[p]):
         x_end = block.amplitude * nodes[at + 2 * i + 2]
         if state[SLIDES] == 0.0 and x_end <= block.yield_acceleration:
-            asked = math.nan
+            eq4 = math.nan
             continue
-        asked_end = -math.inf if newmark else response(block, x_end)
+        eq4_end = -math.inf if newmark else response(block, x_end)
         # the step as it is where nothing happens in it, as in `lockstep_rise`
         if state[SLIDES] > 0.0 and i > first and state[REACH] == -math.inf and state[LAYER] == 0.0:
             x = block.amplitude * nodes[at + 2 * i]
-            if not newmark and math.isnan(asked):
-                asked = response(block, x)
+            if not newmark and math.isnan(eq4):
+                eq4 = response(block, x)
             follows, held, velocity, middle = state[FOLLOWS] > 0.0, state[HELD], state[VELOCITY], 0.0
             if rule == SIMPSON:
                 x_middle = block.amplitude * nodes[at + 2 * i + 1]
                 middle = relative_acceleration(block, x_middle) if follows else x_middle - held
-            c0, c1, c2 = coefficients(rule, x - held, middle, x_end - (asked_end if follows else held))
+            c0, c1, c2 = coefficients(rule, x - held, middle, x_end - (eq4_end if follows else held))
             after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
-            switches = block.rise == MONOTONE and (asked_end < asked if follows else asked_end > held)
+            switches = block.rise == MONOTONE and (eq4_end < eq4 if follows else eq4_end > held)
             if not (switches or after <= 0.0 or (c0 > 0.0 and c0 + c1 + c2 < 0.0)):
                 state[DISPLACEMENT] += velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
                 state[VELOCITY] = after
                 state[PEAK], state[LEAST] = max(state[PEAK], after), min(state[LEAST], after)
                 if follows:
-                    state[HELD] = asked_end
-                asked = asked_end
+                    state[HELD] = eq4_end
+                eq4 = eq4_end
                 continue
         if i > first:
             tau, x = node(steps, p, i), block.amplitude * nodes[at + 2 * i]
         rise_step(block, rule, steps, p, i, tau, x, state)
-        asked = asked_end
+        eq4 = eq4_end
 
 
 @scalar
@@ -533,7 +533,7 @@ pulse_by_steps = pulse_of(rise_steps, fall_steps, note_nothing)
 def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
     """A pulse of a train (see `train`)."""
     state = np.empty((_STATE_SIZE, 1))[:, 0]  # spaced as a column of the lanes' states: functions serve both
-    rest(block, state)
+    reset_state(block, state)
     return pulse_by_steps(block, options, wave, steps, k, following, velocity, state)
 
 
@@ -583,16 +583,16 @@ def sided_relative_acceleration(block: Block, pieces: np.ndarray, p: int, x: flo
 _VELOCITY, _DISPLACEMENT, _HELD, _PEAK, _LEAST, _SLIDES, _FOLLOWS = (
     row * TILE for row in (VELOCITY, DISPLACEMENT, HELD, PEAK, LEAST, SLIDES, FOLLOWS)
 )
-_ASKED, _HAPPENS, _ALONE, _THIN, _BEFORE, _BEFORE_V, _BEFORE_HELD, _BEFORE_PEAK, _GAIN = range(
+_EQ4, _HAPPENS, _WITHOUT_LANES, _THIN, _BEFORE, _BEFORE_V, _BEFORE_HELD, _BEFORE_PEAK, _GAIN = range(
     LANE_ROWS * TILE, (LANE_ROWS + 9) * TILE, TILE
 )
 _LANE_SIZE = (LANE_ROWS + 9) * TILE
 
 
 @scalar
-def set_aside(lanes: np.ndarray, states: np.ndarray, j: int) -> None:
+def leave_lanes(lanes: np.ndarray, states: np.ndarray, j: int) -> None:
     """Leave lane j at rest for good: its cell is not for lanes."""
-    lanes[_ALONE + j], lanes[YIELD + j] = 1.0, math.inf
+    lanes[_WITHOUT_LANES + j], lanes[YIELD + j] = 1.0, math.inf
     states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
 
 
@@ -617,30 +617,30 @@ def lockstep_rise(
         if first == steps.counts[p]:
             return
     for j in range(count):
-        lanes[_ASKED + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * nodes[at + 2 * first], g)
+        lanes[_EQ4 + j] = lane_response(lanes, j, lanes[AMPLITUDE + j] * nodes[at + 2 * first], g)
     for i in range(first, steps.counts[p]):
         w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
         events = 0
         for j in range(count):
             x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
             slides, follows, held = states[_SLIDES + j] > 0.0, states[_FOLLOWS + j] > 0.0, states[_HELD + j]
-            asked = lanes[_ASKED + j]
-            asked_end = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_end, g)
-            lanes[_ASKED + j] = asked_end
-            held_end = asked_end if follows else held
+            eq4 = lanes[_EQ4 + j]
+            eq4_end = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_end, g)
+            lanes[_EQ4 + j] = eq4_end
+            held_end = eq4_end if follows else held
             middle = 0.0
             if rule == SIMPSON:
                 x_middle = lanes[AMPLITUDE + j] * w_middle
-                asked_middle = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_middle, g)
-                middle = x_middle - (asked_middle if follows else held)
+                eq4_middle = -math.inf if rise == NEWMARK else lane_response(lanes, j, x_middle, g)
+                middle = x_middle - (eq4_middle if follows else held)
             c0, c1, c2 = coefficients(rule, x - held, middle, x_end - held_end)
             velocity = states[_VELOCITY + j]
             after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
             moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
-            switches = (rise == MONOTONE) & (follows & (asked_end < asked) | (not follows) & (asked_end > held))
+            switches = (rise == MONOTONE) & (follows & (eq4_end < eq4) | (not follows) & (eq4_end > held))
             turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
             irregular = switches | turns | (after <= 0.0)
-            starts = (x_end > lanes[YIELD + j]) & (x_end > asked_end)
+            starts = (x_end > lanes[YIELD + j]) & (x_end > eq4_end)
             happens = irregular if slides else starts
             goes = slides & (not happens)
             states[_VELOCITY + j] = after if goes else velocity
@@ -655,7 +655,7 @@ def lockstep_rise(
                     block, state = block_at(cells, where[j], options), columns[:, j]
                     rise_step(block, rule, steps, p, i, node(steps, p, i), block.amplitude * w_start, state)
                     if state[REACH] > -math.inf:
-                        set_aside(lanes, states, j)
+                        leave_lanes(lanes, states, j)
 
 
 @scalar
@@ -711,10 +711,10 @@ def until_next(block: Block, wave: Wave, p: int) -> float:
 
 
 @scalar
-def arrive_in_lane(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
+def reset_held_in_lane(block: Block, wave: Wave, p: int, state: np.ndarray) -> None:
     """What the beginning of piece p, after a jump upwards or a fall, asks of a lane; its rise begins a slide itself."""
     if state[SLIDES] > 0.0 or wave.pieces[p, FIRST] > wave.pieces[p, LAST]:
-        arrive(block, wave.pieces, p, block.amplitude * wave.pieces[p, FIRST], state)
+        reset_held(block, wave.pieces, p, block.amplitude * wave.pieces[p, FIRST], state)
         resolve_fall(block, wave.pieces, p, state)
 
 
@@ -729,19 +729,19 @@ def stick_slip_cycle(
     wave = steps.wave
     pieces = wave.pieces.shape[0]
     for p in range(wave.cycle[c], wave.cycle[c + 1]):
-        kind = kind_of(wave, p)
-        before = BELOW if p == 0 else kind_of(wave, p - 1)
+        kind = course_of(wave, p)
+        before = BELOW if p == 0 else course_of(wave, p - 1)
         rises_on = kind == RISES and before == RISES and wave.pieces[p, JUMPS] == 0.0
-        if kind != BELOW and not rises_on and asks_anew(wave.pieces, p):
+        if kind != BELOW and not rises_on and rises_anew(wave.pieces, p):
             for j in range(count):
-                if lanes[_ALONE + j] == 0.0:
-                    arrive_in_lane(block_at(cells, where[j], options), wave, p, columns[:, j])
+                if lanes[_WITHOUT_LANES + j] == 0.0:
+                    reset_held_in_lane(block_at(cells, where[j], options), wave, p, columns[:, j])
                     if columns[REACH, j] > -math.inf:
-                        set_aside(lanes, states, j)
+                        leave_lanes(lanes, states, j)
         if options.rise == LITERAL and kind != RISES and before != kind:
             for j in range(count):
                 if states[_SLIDES + j] > 0.0 and states[_HELD + j] <= 0.0:
-                    set_aside(lanes, states, j)
+                    leave_lanes(lanes, states, j)
         if kind == RISES:
             lockstep_rise(count, rule, options, steps, p, cells, where, lanes, states)
         elif kind == FALLS or options.recoupling == INTEGRATE:
@@ -760,11 +760,11 @@ def stick_slip_cycle(
                     states[_DISPLACEMENT + j] += eq.attenuated_displacement(velocity, held, wait)
                     states[_VELOCITY + j] = states[_SLIDES + j] = 0.0
                     if eq.attenuated_velocity(velocity, held, wait) > 0.0:
-                        set_aside(lanes, states, j)
+                        leave_lanes(lanes, states, j)
         if kind == BELOW and p + 1 < pieces and wave.pieces[p + 1, TOP] > 0.0:
             for j in range(count):
                 if states[_SLIDES + j] > 0.0:
-                    set_aside(lanes, states, j)
+                    leave_lanes(lanes, states, j)
 
 
 @scalar
@@ -778,10 +778,10 @@ def stick_slip_lanes(
     wave, whole = steps.wave, whole_lanes(count)
     for j in range(whole):
         state = columns[:, j]
-        rest(block_at(cells, where[j], options), state)
-        lanes[_ALONE + j] = 0.0
+        reset_state(block_at(cells, where[j], options), state)
+        lanes[_WITHOUT_LANES + j] = 0.0
         if state[LAYER] > 0.0 or state[TOUCH] < math.inf:
-            set_aside(lanes, states, j)
+            leave_lanes(lanes, states, j)
     for c in range(wave.shape.size):
         times = 1.0
         if c == wave.lead and wave.repeats > 0:
@@ -796,7 +796,7 @@ def stick_slip_lanes(
             # one cycle stands for all only if it ends in the state in which it began
             held = states[_HELD + j] if states[_SLIDES + j] > 0.0 else 0.0
             if times > 1.0 and (states[_VELOCITY + j] != lanes[_BEFORE_V + j] or held != lanes[_BEFORE_HELD + j]):
-                set_aside(lanes, states, j)
+                leave_lanes(lanes, states, j)
         if c == wave.lead and wave.alike:
             break
     highest = 0.0
@@ -804,7 +804,7 @@ def stick_slip_lanes(
         highest = max(highest, height)
     for j in range(count):
         block = block_at(cells, where[j], options)
-        if lanes[_ALONE + j] > 0.0:
+        if lanes[_WITHOUT_LANES + j] > 0.0:
             found = train(block, options, wave, steps)
         else:
             moved = states[_DISPLACEMENT + j]
@@ -834,7 +834,7 @@ def continuous_cycle(
             starting = starting | (states[_SLIDES + j] == 0.0)
         at, h = steps.offset[p], steps.length[p]
         for j in range(count):
-            lanes[_ASKED + j] = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * nodes[at], g)
+            lanes[_EQ4 + j] = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * nodes[at], g)
         for i in range(steps.counts[p]):
             w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
             near = min(abs(w_start), abs(w_end))
@@ -842,8 +842,8 @@ def continuous_cycle(
             events = 0
             for j in range(count):
                 x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
-                rate, rate_end = lanes[_ASKED + j], lane_relative_acceleration(lanes, j, x_end, g)
-                lanes[_ASKED + j] = rate_end
+                rate, rate_end = lanes[_EQ4 + j], lane_relative_acceleration(lanes, j, x_end, g)
+                lanes[_EQ4 + j] = rate_end
                 middle = 0.0
                 if rule == SIMPSON:
                     middle = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * w_middle, g)
@@ -907,7 +907,7 @@ def continuous_lanes(
     wave, whole = steps.wave, whole_lanes(count)
     for j in range(whole):
         state = columns[:, j]
-        rest(block_at(cells, where[j], options), state)
+        reset_state(block_at(cells, where[j], options), state)
         lanes[_THIN + j] = state[LAYER] / lanes[AMPLITUDE + j]
     for c in range(wave.shape.size):
         continuous_cycle(whole, rule, options, steps, c, cells, where, lanes, states)

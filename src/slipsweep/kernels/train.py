@@ -55,11 +55,11 @@ def train_of(
         block: Block, options: Options, wave: Wave, table: Any, k: int, until: int, velocity: float
     ) -> tuple[Pulse, int]:
         """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
-        displacement, peak, least, rested, validity = 0.0, velocity, velocity, 0.0, 0
+        displacement, peak, least, stopped_at, validity = 0.0, velocity, velocity, 0.0, 0
         while k < wave.height.size and wave.stretch[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
             now = pulse(block, options, wave, table, k, following, velocity)
-            k, velocity, rested = following, now.velocity, now.rested
+            k, velocity, stopped_at = following, now.velocity, now.stopped_at
             displacement += now.displacement
             peak, least = max(peak, now.peak), min(least, now.least)
             validity |= now.validity
@@ -69,7 +69,7 @@ def train_of(
                 validity |= UNSOLVED
             if validity & NO_VALUE:
                 break
-        return Pulse(velocity, displacement, peak, least, rested, validity), k
+        return Pulse(velocity, displacement, peak, least, stopped_at, validity), k
 
     @scalar
     def train(block: Block, options: Options, wave: Wave, table: Any) -> Motion:
@@ -104,7 +104,7 @@ def train_of(
             if before == 0.0 and velocity == 0.0:
                 displacement += left * now.displacement
                 # what follows is one more of the same, if the end of the shaking comes too late to matter
-                if wave.alike and now.rested <= wave.pieces[wave.cycle[wave.lead + 1] - 1, END]:
+                if wave.alike and now.stopped_at <= wave.pieces[wave.cycle[wave.lead + 1] - 1, END]:
                     return Motion(displacement + now.displacement, peak, validity)
                 break
             if now.least > 0.0:
