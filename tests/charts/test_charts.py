@@ -793,6 +793,8 @@ def test_levels(lined: Path, tmp_path: Path) -> None:
     assert levels == (0.01, 0.05, 0.3)
     figure = drawn(lined, "contours", look=Look(levels=levels))
     assert [text.get_text() for text in figure.axes[-1].get_yticklabels()] == ["10 mm", "50 mm", "300 mm"]
+    nothing = slipsweep.sweep([40.0, 50.0], 0.3, [2.0, 3.0], 1.0).slipsweep.chart("contours", levels=["1cm", "2cm"])
+    assert "No contours: no values." in nothing.get_supxlabel()
     by_default = drawn(lined, "contours")
     assert by_default.axes[-1].get_yticklabels()[-1].get_text() == "1 m"  # nobody designs for ten
 

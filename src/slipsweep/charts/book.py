@@ -14,7 +14,7 @@ from slipsweep._version import __version__
 from slipsweep.charts.maps import HATCHES
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import SYMBOLS, drawn_text, model_text, plain, unit
-from slipsweep.model.variables import FLAG_KINDS, PARAMETERS, REFERENCE, VALIDITY_TEXT
+from slipsweep.model.variables import FLAG_KINDS, PARAMETERS, REFERENCE, RESULTS, STATISTICS, VALIDITY_TEXT
 
 #: Characters in a line, after a heading.
 _WIDTH, _INDENT = 96, 2
@@ -32,6 +32,7 @@ def title_page(result: Result) -> Figure:
     attributes = result.attrs
     hatched = [f"{(flag.name or '').lower()} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}" for flag in HATCHES]
     sections: Mapping[str, list[str]] = {
+        "Results": [f"{name}: {(RESULTS | STATISTICS)[name]['long_name']}" for name in result.variables],
         "Inputs": [*_inputs(result), *filter(None, [drawn_text(attributes)])],
         "Model and estimates": model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": [

@@ -87,7 +87,7 @@ def contours(sheet: Sheet, name: str) -> Figure:
     _set_axes(sheet)
     drawn = reliable(sheet.table.data_vars, name, sheet.look).values
     levels = list(sheet.look.levels) or _levels(name, drawn)
-    if not levels:
+    if not levels or not np.isfinite(drawn).any():
         sheet.notes.append(_without_levels(name, drawn))
         return _finish(sheet)
     places = np.log10(levels)
@@ -254,17 +254,16 @@ def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str], taken: li
     corners = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted()).get_points()
     contours = [to_inches.transform(np.concatenate([*segments, np.empty((0, 2))])) for segments in drawn.allsegs]
     contours = [points[np.isfinite(points).all(axis=1)] for points in contours]
+    contours = [points[:: math.ceil(len(points) / 300)] for points in contours if len(points)]
     positions = []
-    for points in filter(len, contours):
+    for points in contours:
         room = np.minimum(points - corners[0], corners[1] - points).min(axis=1)
         for obstacle in taken:
             room = np.minimum(room, _apart(points, obstacle))
         # another contour may come nearer than the end of a label
         for other in contours:
-            if other is not points and len(other):
-                room = np.minimum(
-                    room, _apart(points, other[:: math.ceil(len(other) / 200)]) * _LABEL_ROOM / _LINE_ROOM
-                )
+            if other is not points:
+                room = np.minimum(room, _apart(points, other) * _LABEL_ROOM / _LINE_ROOM)
         best = int(np.argmax(room))
         if room[best] > _LABEL_ROOM:
             taken.append(points[best : best + 1])
@@ -281,12 +280,8 @@ def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str], taken: li
 def _apart(points: Floats, others: Floats) -> Floats:
     """How far each point is from the nearest of some others."""
     there = others[np.isfinite(others).all(axis=1)]
-    nearest = np.full(len(points), np.inf)
-    for part in np.array_split(there, max(1, len(there) // 200)):
-        if len(part):
-            apart = points[:, None] - part[None]
-            nearest = np.minimum(nearest, np.hypot(apart[..., 0], apart[..., 1]).min(axis=1))
-    return nearest
+    apart = points[:, None] - there[None]
+    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(axis=1, initial=np.inf))
 
 
 def _colour_bar(sheet: Sheet, areas: Any, places: Floats, texts: dict[float, str], label: str) -> None:
