@@ -86,3 +86,15 @@ def test_grids_of_literal_rises(wave: dict[str, Any]) -> None:
         np.testing.assert_array_equal(np.isnan(found.permanent_displacement), missing)
         np.testing.assert_array_equal(np.isnan(found.peak_relative_velocity), missing)
         np.testing.assert_array_equal(found.sliding_mode == -1, missing)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=str)
+def test_a_shaking_that_ends_in_a_rise_leaves_nothing_to_brake_with(solver: dict[str, Any]) -> None:
+    """The ramp keeps the first rise below yield: the last one, up to the end of the shaking, is the only one."""
+    cell = {"theta": 0.0, "mu_s": 0.337, "amplitude": 1.44, "yield_acceleration": 0.81, "decay_rate": 51.7}
+    shaking = {"waveform": "cosine", "cycles": 1, "ramp_in": 0.25}
+    for recoupling in ("eq12", "integrate"):
+        found = slipsweep.sweep(
+            **choices(**cell, **shaking, **solver, frequency=0.1, rise="literal", recoupling=recoupling)
+        )
+        assert_no_value(found, Validity.KD_NOT_POSITIVE)

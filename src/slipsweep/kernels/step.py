@@ -804,7 +804,8 @@ def stick_slip_lanes(
         highest = max(highest, height)
     for j in range(count):
         block = block_at(cells, where[j], options)
-        if lanes[_WITHOUT_LANES + j] > 0.0:
+        # the shaking may end in a rise, which leaves b <= 0 where none is held any more
+        if lanes[_WITHOUT_LANES + j] > 0.0 or (states[_SLIDES + j] > 0.0 and states[_HELD + j] <= 0.0):
             found = train(block, options, wave, steps)
         else:
             moved = states[_DISPLACEMENT + j]
