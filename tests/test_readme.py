@@ -27,6 +27,7 @@ DOCUMENTS = (
     "README.md",
     "docs/README.md",
     "docs/accuracy.md",
+    "docs/calibration.md",
     "docs/charts.md",
     "docs/explore.md",
     "docs/files.md",

@@ -33,6 +33,9 @@ _MOST_CORRELATION = 0.9998
 #: Standard errors by which residuals must drift for it to be told.
 _DRIFTS = 5.0
 
+#: Part of the largest value that a drift or an offset must reach: noise of the table adds up to less.
+_TELLS = 0.05
+
 
 def findings(
     fit: Fit,
@@ -170,14 +173,14 @@ def _drifting(fit: Fit, solution: Solution) -> list[str]:
         error = spread / math.sqrt(use.sum()) / max(float(np.std(since[use])), 1e-12)
         span = float(since[use][-1])
         most = float(np.nanmax(np.abs(fit.test.channels[name])))
-        if abs(slope) > _DRIFTS * error and abs(slope) * span > 0.01 * most:
+        if abs(slope) > _DRIFTS * error and abs(slope) * span > _TELLS * most:
             said.append(
                 f"What is measured less computed of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a second: if "
                 f"its sensor drifts, give drift = {name!r}."
             )
         elif (
             abs(float(np.mean(rest[use]))) > _DRIFTS * spread / math.sqrt(use.sum())
-            and abs(float(np.mean(rest[use]))) > 0.01 * most
+            and abs(float(np.mean(rest[use]))) > _TELLS * most
             and f"offset of {name}" not in lines
         ):
             said.append(
