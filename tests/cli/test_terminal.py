@@ -119,7 +119,8 @@ def test_simulate_takes_a_displacement_and_a_structure(tmp_path: Path) -> None:
     acceleration = str((4 * 3.141592653589793) ** 2 * 0.025)
     by_acceleration = slipsweep(tmp_path, *case, "--amplitude", acceleration)
     assert by_displacement.returncode == 0
-    assert by_displacement.stdout == by_acceleration.stdout
+    results = [done.stdout.partition("taken as")[0] for done in (by_displacement, by_acceleration)]
+    assert results[0] == results[1]
     assert "flexible_block" in by_displacement.stdout
     assert slipsweep(tmp_path, *case, "--amplitude", "3", "--quiet", "-o", "a.csv").stdout == ""
     assert (tmp_path / "a.csv").exists()

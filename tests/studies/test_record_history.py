@@ -9,7 +9,7 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import InputError, Mendez, Record, Triangle, read_record, simulate, sweep
-from slipsweep.model.variables import HISTORY, RECORD_RESULTS
+from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, HISTORY
 from tests.support.processes import slipsweep as command
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
@@ -53,7 +53,7 @@ def test_a_history_ends_where_the_sweep_does(shaking: Record) -> None:
     for seed in range(120):
         given = case_of(seed)
         found, swept = simulate(excitation=shaking, **given), sweep(excitation=shaking, **given)
-        for name in RECORD_RESULTS:
+        for name in DEFAULT_RECORD_RESULTS:
             np.testing.assert_array_equal(found[name], swept[name])
         if np.isnan(swept.permanent_displacement):
             assert np.isnan(found.relative_displacement).all()
@@ -174,7 +174,7 @@ def test_on_the_command_line(tmp_path: Path) -> None:
     record = read_record(SYNTHETIC, baseline="linear")
     expected = simulate(5.0, 0.38, excitation=record, scale=2.0, polarity=-1)
     with xr.open_dataset(tmp_path / "h.nc", mask_and_scale=False) as found:
-        for name in (*HISTORY, *RECORD_RESULTS):
+        for name in (*HISTORY, *DEFAULT_RECORD_RESULTS):
             np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
         np.testing.assert_array_equal(found.record_acceleration, record.acceleration)
         assert found.attrs["record"] == "synthetic.csv"

@@ -14,18 +14,35 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
+from slipsweep._version import __version__
 from slipsweep.cli import calibrate, chart, explore, export, info, limit, run, simulate, streams
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
-    help="Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.",
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
 )
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"slipsweep {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters."""
+
+
 app.command(epilog=run.EXAMPLE)(run.run)
 app.command(epilog=info.EXAMPLE)(info.info)
 app.command(epilog=export.EXAMPLE)(export.export)

@@ -3,7 +3,7 @@
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slipsweep.errors import InputError
-from slipsweep.model.variables import FLAG_KIND_TEXT, VALIDITY_TEXT, FlagKind, Validity, flags_of
+from slipsweep.model.variables import FLAG_KIND_TEXT, PARAMETERS, VALIDITY_TEXT, FlagKind, Validity, flags_of
 
 if TYPE_CHECKING:
     from slipsweep.grid.tally import Tally
@@ -65,6 +65,22 @@ def echo_tally(tally: "Tally") -> None:
 def echo_found(path: Path) -> None:
     """Say that there was nothing to go on with."""
     typer.echo(f"{path}: complete already, and of this very sweep; nothing was computed")
+
+
+def check_ending(path: Path, endings: Sequence[str]) -> None:
+    """Refuse an output whose name ends in what the command cannot write."""
+    if path.suffix not in endings:
+        raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
+
+
+def taken_as(values: Mapping[str, float], g: float) -> str:
+    """Inputs in the units that they were taken in: ``amplitude 3.55 m/s2 (0.3619 g), frequency 1.8 Hz``."""
+    texts = []
+    for name, value in values.items():
+        unit = PARAMETERS[name]["units"].replace("m s-2", "m/s2")
+        in_g = f" ({value / g:.4g} g)" if unit == "m/s2" else ""
+        texts.append(f"{name.replace('_', ' ')} {value:.6g} {unit}{in_g}")
+    return ", ".join(texts)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite
+from slipsweep.cli.common import Overwrite, check_ending
 from slipsweep.errors import InputError
 
 EXAMPLE = "Example: slipsweep explore design_chart.nc -o design_chart.html"
@@ -31,6 +31,7 @@ def explore(
     from slipsweep.grid.resources import size_text
 
     path = output or file.with_suffix(".html")
+    check_ending(path, (".html", ".htm"))
     nbytes = parse_size(size)
     excerpt = pages.write_page(file, path, size=nbytes, overwrite=overwrite)
     if quiet:

@@ -16,6 +16,7 @@ from slipsweep.cli.common import (
     Workers,
     echo_found,
     progress_bar,
+    taken_as,
 )
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
@@ -128,6 +129,9 @@ def _summarize(table: "Table") -> None:
     if found.size:
         for text, value in (("smallest", found.min()), ("median", np.median(found)), ("largest", found.max())):
             typer.echo(f"  {text:<24}{value:.6g} m/s2 ({value / g:.4g} g)")
+    wanted = ", ".join(f"{one:.6g}" for one in np.atleast_1d(table["displacement"].values))
+    highest = taken_as({"amplitude": float(table.attrs["maximum_amplitude"])}, g).removeprefix("amplitude ")
+    typer.echo(f"displacement {wanted} m, searched up to {highest}")
     typer.echo(f"inputs: {table.attrs['friction_inputs']}")
     typer.echo("status (limit_status):")
     for one in LimitStatus:

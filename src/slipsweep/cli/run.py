@@ -29,6 +29,12 @@ EXAMPLE = examples(
     "slipsweep run design_chart.nc -o again.nc --quiet",
 )
 
+#: Endings of what other commands write, and of formats that a table or a chart is often wanted in.
+_OTHER_FORMATS = (
+    ".png", ".svg", ".pdf", ".jpg", ".jpeg", ".gif", ".csv", ".tsv", ".txt", ".parquet", ".xls", ".xlsx", ".json",
+    ".html", ".htm", ".mat", ".npy", ".npz", ".zip",
+)  # fmt: skip
+
 
 def run(
     sweep: Annotated[
@@ -73,6 +79,8 @@ def run(
     path = output or Path(checked.output.path or f"{sweep.stem}.nc")
     if split and output is None:
         path = path.with_suffix("")
+    if path.suffix.lower() in _OTHER_FORMATS:
+        raise InputError(f"{path}: the name must end in .nc, the format that is written")
     from slipsweep.runs.jobs import sweep_job
 
     job = sweep_job(checked)

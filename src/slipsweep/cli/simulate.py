@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, check_ending, examples, taken_as, typed_command
 from slipsweep.cli.options import chooses, option_name, reads_record
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
+from slipsweep.model.units import quantity
 from slipsweep.model.variables import (
     HISTORY,
     RECORD_COUNTS,
     VALIDITY_TEXT,
+    VALUELESS,
     FlagKind,
     SlidingMode,
     Validity,
@@ -41,12 +43,21 @@ def simulate(
     *,
     theta: Annotated[float, typer.Option(help="Plane inclination, degrees.")],
     mu_s: Annotated[float, typer.Option(help="Static friction coefficient.")],
-    frequency: Annotated[float | None, typer.Option(help="Excitation frequency, Hz; not with a record.")] = None,
+    frequency: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Excitation frequency, Hz; not with a record.")
+    ] = None,
     amplitude: Annotated[
-        float | None, typer.Option(help="Peak ground acceleration, m/s²; a record is scaled to it.")
+        str | None,
+        typer.Option(
+            metavar="VALUE", help="Peak ground acceleration, like 0.36g, or in m/s²; a record is scaled to it."
+        ),
     ] = None,
     displacement_amplitude: Annotated[
-        float | None, typer.Option(help="Peak ground displacement, m, instead of the acceleration; not with a record.")
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Peak ground displacement, like 30mm, or in m, instead of the acceleration; not with a record.",
+        ),
     ] = None,
     output: Annotated[
         list[Path] | None,
@@ -65,13 +76,15 @@ def simulate(
         Literal["1", "-1"] | None, typer.Option(help="Sign that a record is taken with (default: 1).")
     ] = None,
     yield_acceleration: Annotated[
-        float | None, typer.Option(help="Yield acceleration, m/s² (default: Coulomb's).")
+        str | None,
+        typer.Option(metavar="VALUE", help="Yield acceleration, like 0.1g, or in m/s² (default: Coulomb's)."),
     ] = None,
     decay_rate: Annotated[float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).")] = None,
     delta_mu: Annotated[float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).")] = None,
     minimum_friction: Annotated[float | None, typer.Option(help="Minimum friction μmin (default: Eq. 9).")] = None,
     structure_frequency: Annotated[
-        float | None, typer.Option(help="Natural frequency of the structure, Hz, for the flexible_block flag.")
+        str | None,
+        typer.Option(metavar="VALUE", help="Natural frequency of the structure, Hz, for the flexible_block flag."),
     ] = None,
     model: Model,
     points: Annotated[
@@ -88,8 +101,15 @@ def simulate(
     }
     paths = output or []
     for path in paths:
-        if path.suffix not in writers:
-            raise InputError(f"{path}: the name must end in one of {', '.join(writers)}")
+        check_ending(path, tuple(writers))
+    typed = {
+        "amplitude": amplitude,
+        "displacement_amplitude": displacement_amplitude,
+        "frequency": frequency,
+        "yield_acceleration": yield_acceleration,
+        "structure_frequency": structure_frequency,
+    }
+    given = {name: quantity(option_name(name), text, name, model.g) for name, text in typed.items() if text is not None}
 
     motion = _motion(record, reading, excitation)
 
@@ -100,26 +120,27 @@ def simulate(
     table = history_table(
         theta=theta,
         mu_s=mu_s,
-        amplitude=amplitude,
-        displacement_amplitude=displacement_amplitude,
-        frequency=frequency,
         excitation=motion,
         scale=scale,
         time_scale=time_scale,
         polarity=None if polarity is None else int(polarity),
-        yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
-        structure_frequency=structure_frequency,
         model=model,
         points_per_cycle=points,
+        **given,
     )
+    flags = Validity(table["validity"].item())
+    if flags & VALUELESS:
+        why = "; ".join(f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in flags & VALUELESS)
+        raise RunError(f"the model gives no value: {why} ({taken_as({'theta': theta, **given}, model.g)})")
     for path in paths:
         writers[path.suffix](table, path, overwrite, motion)
     if quiet:
         return
     _summarize(table)
+    typer.echo(f"{'taken as':<24}{taken_as({'theta': theta, **given}, model.g)}")
     for path in paths:
         typer.echo(path)
 

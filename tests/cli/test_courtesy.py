@@ -1,0 +1,111 @@
+"""Units as people type them, names as commands can write them, and a reason where there is no number."""
+
+from pathlib import Path
+
+import pytest
+
+from slipsweep import cli
+from slipsweep._version import __version__
+
+BLOCK = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2")
+SWEEP = "".join(
+    f"[axes.{name}]\nvalues = [{value}]\n"
+    for name, value in (("theta", 5), ("mu_s", 0.4), ("amplitude", 4), ("frequency", 2))
+)
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> str:
+    assert cli.main(list(arguments)) == status
+    out, error = capsys.readouterr()
+    return error if status else out
+
+
+@pytest.mark.parametrize(
+    ("typed", "same", "echo"),
+    [
+        (("--amplitude", "0.5g"), ("--amplitude", "4.905"), "amplitude 4.905 m/s2 (0.5 g)"),
+        (("--amplitude", "0.5g", "--g", "9.8"), ("--amplitude", "4.9", "--g", "9.8"), "amplitude 4.9 m/s2 (0.5 g)"),
+        (("--amplitude", "490.5 cm/s^2"), ("--amplitude", "4.905"), "amplitude 4.905 m/s2 (0.5 g)"),
+        (
+            ("--amplitude", "4", "--yield-acceleration", "0.1g"),
+            ("--amplitude", "4", "--yield-acceleration", "0.981"),
+            "yield acceleration 0.981 m/s2 (0.1 g)",
+        ),
+        (
+            ("--displacement-amplitude", "30mm"),
+            ("--displacement-amplitude", "0.03"),
+            "displacement amplitude 0.03 m",
+        ),
+    ],
+)
+def test_simulate_takes_units_and_says_what_it_took(
+    capsys: pytest.CaptureFixture[str], typed: tuple[str, ...], same: tuple[str, ...], echo: str
+) -> None:
+    first, other = (told(capsys, *BLOCK, *given) for given in (typed, same))
+    assert first == other
+    assert "taken as                theta 5 degree, " in first
+    assert echo in first
+    assert "frequency 2 Hz" in first
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--amplitude", "high"), '--amplitude = "high": must be a number, with a unit that converts to m s-2'),
+        (("--amplitude", "5mm"), '--amplitude = "5mm": must be a number, with a unit that converts to m s-2'),
+        (("--amplitude", "4", "--yield-acceleration", "g"), '--yield-acceleration = "g": must be a number'),
+        (("--amplitude", "-0.1g"), "amplitude = -0.981"),
+    ],
+)
+def test_a_unit_that_does_not_fit_is_refused(
+    capsys: pytest.CaptureFixture[str], given: tuple[str, ...], message: str
+) -> None:
+    assert message in told(capsys, *BLOCK, *given, status=2)
+
+
+@pytest.mark.parametrize(
+    ("given", "flag"),
+    [
+        (("--amplitude", "4", "--yield-acceleration", "-0.1g"), "statically_unstable: yield acceleration <= 0"),
+        (("--amplitude", "12g"), "uplift: A tan(theta) >= g"),
+        (("--amplitude", "2.9", "--rise", "literal"), "kd_not_positive: literal rise: Kd <= 0"),
+    ],
+)
+def test_simulate_without_a_value_says_why_and_fails(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, given: tuple[str, ...], flag: str
+) -> None:
+    path = tmp_path / "a.csv"
+    for quiet in ((), ("--quiet",)):
+        message = told(capsys, *BLOCK, *given, *quiet, "-o", str(path), status=1)
+        assert f"the model gives no value: {flag}" in message
+        assert message.count("\n") == 1
+        assert not path.exists()
+
+
+def test_run_writes_no_file_that_its_name_belies(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    sweep = tmp_path / "a.toml"
+    sweep.write_text(SWEEP)
+    for ending in ("pdf", "png", "csv", "CSV", "xlsx"):
+        path = tmp_path / f"a.{ending}"
+        assert f"a.{ending}: the name must end in .nc" in told(capsys, "run", str(sweep), "-o", str(path), status=2)
+        assert not path.exists()
+    sweep.write_text(f'{SWEEP}[output]\npath = "b.pdf"\n')
+    assert "b.pdf: the name must end in .nc" in told(capsys, "run", str(sweep), status=2)
+    assert "a.pdf: the name must end in one of .html, .htm" in told(
+        capsys, "explore", str(tmp_path / "a.nc"), "-o", str(tmp_path / "a.pdf"), status=2
+    )
+
+
+def test_limit_says_what_it_took(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    sweep = tmp_path / "a.toml"
+    sweep.write_text(SWEEP)
+    bare = told(capsys, "limit", str(sweep), "-d", "0.05", "--maximum-amplitude", "20")
+    assert "\ndisplacement 0.05 m, searched up to 20 m/s2 (2.039 g)\n" in bare
+    assert bare == told(capsys, "limit", str(sweep), "-d", "50mm", "--maximum-amplitude", "20 m/s2")
+    assert "searched up to 19.62 m/s2 (2 g)\n" in told(
+        capsys, "limit", str(sweep), "-d", "5cm", "--maximum-amplitude", "2g"
+    )
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert told(capsys, "--version") == f"slipsweep {__version__}\n"
