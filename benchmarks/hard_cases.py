@@ -121,7 +121,7 @@ changes the sliding mode or a flag, a solver may give that of either side (colum
 file); a neighbour without a value is left out of the bound.
 
 The step solver is held to first order at least (sixteen times the steps, from 1024 on, a twelfth of the
-error) until it is within 100, everywhere. Three things are done for that in kernels/step.py, because steps of
+error) until it is within 100, everywhere. Three things are done for that in kernels/step/, because steps of
 one length do not converge where the motion has a shorter one of its own. A slide that lasts less than a
 few steps (just above yield, or where Eq. 4 touches Üg between two nodes) is found where D = Üg − Ü has its
 maximum and gets steps of its own, which grow with the time since its onset. A layer of friction thinner than

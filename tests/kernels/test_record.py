@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 import slipsweep
 from slipsweep import InputError, Record, sweep
 from slipsweep.kernels.block import MONOTONE, Cell, block_of
-from slipsweep.kernels.cycle import eq4_integrals
+from slipsweep.kernels.cycle.eq4 import eq4_integrals
 from slipsweep.kernels.linear import held_stop
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.pieces import BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START

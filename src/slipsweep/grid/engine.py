@@ -19,7 +19,6 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import sine, step
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import (
     PARAMETER_KERNEL,
@@ -32,6 +31,9 @@ from slipsweep.kernels.grid import (
     Results,
     tile_of,
 )
+from slipsweep.kernels.sine.cells import room_of
+from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
+from slipsweep.kernels.step.table import steps_of
 from slipsweep.model.options import Mendez, Model, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, Validity
 from slipsweep.motion.amplitude import peak_acceleration
@@ -48,7 +50,7 @@ _AMPLITUDES = 262144
 #: Results in which `mark_flexible_blocks` sets flags together.
 _FLAGS = 65536
 
-RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": step.SIMPSON}
+RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
@@ -315,7 +317,7 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         return call, max(32, recorded.pieces.shape[0] // 64)
     wave = wave_of(motion)
     if isinstance(solver, Step):
-        kernel, steps = STEP_KERNELS[options.rule], step.steps_of(wave, options.steps_per_cycle, options.rule)
+        kernel, steps = STEP_KERNELS[options.rule], steps_of(wave, options.steps_per_cycle, options.rule)
 
         def call_step(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
             kernel(grid, first, last, rows, periods, options, steps, targets, tile_of(grid))
@@ -325,7 +327,7 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
 
     def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
         tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
-        count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, sine.room_of(), remaining)
+        count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
         if count:
             stretches = remaining[:count]
             REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile)

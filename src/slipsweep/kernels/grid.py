@@ -12,8 +12,14 @@ import numpy as np
 
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels import cycle, record, sine, step
+from slipsweep.kernels import record
 from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
+from slipsweep.kernels.cycle import cells as cycle
+from slipsweep.kernels.cycle.legs import room_of
+from slipsweep.kernels.sine import cells as sine
+from slipsweep.kernels.step import cells as step
+from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
+from slipsweep.kernels.step.table import Steps
 from slipsweep.motion.pieces import Wave
 
 
@@ -207,7 +213,7 @@ def _remaining_grid(
     grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room = cycle.room_of(0)
+    room = room_of(0)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
         for begin in range(stretches[stretch, 0], last, TILE):
@@ -221,7 +227,7 @@ def _wave_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room = cycle.room_of(0)
+    room = room_of(0)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
@@ -233,7 +239,7 @@ def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room, lines = cycle.room_of(0), record.lines_of(wave, options)
+    room, lines = room_of(0), record.lines_of(wave, options)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
@@ -250,7 +256,7 @@ def _step_grid_of(rule: int) -> Kernel:
     # a kernel a rule, so that only the one in use is compiled
     def step_grid(
         grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-        steps: step.Steps, results: Results, tile: Tile,
+        steps: Steps, results: Results, tile: Tile,
     ) -> None:  # fmt: skip
         for begin in range(first, last, TILE):
             count = min(TILE, last - begin)
@@ -265,7 +271,7 @@ def _step_grid_of(rule: int) -> Kernel:
 #: which leave some cells: the number of their stretches is returned, and `remaining` holds them (rows: the first
 #: cell, and the first after it); and what solves those.  Most sweeps of a sine leave none, and half the first
 #: compilation is spared.
-STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (step.RECTANGLE, step.TRAPEZOID, step.SIMPSON)}
+STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (RECTANGLE, TRAPEZOID, SIMPSON)}
 WAVE_KERNEL = Kernel(_wave_grid)
 SINE_KERNEL = Kernel(_sine_grid)
 REMAINING_KERNEL = Kernel(_remaining_grid)

@@ -10,9 +10,10 @@ import numpy as np
 
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels import cycle
 from slipsweep.kernels.block import Block, Options, block_at, cell_of, response
-from slipsweep.kernels.cycle import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, Room
+from slipsweep.kernels.cycle.eq4 import eq4_integrals
+from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, Room
+from slipsweep.kernels.cycle.pulse import follow_pulse
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
 from slipsweep.kernels.pulse import STATE_ROWS, beginning, first_pulse
 from slipsweep.kernels.record import block_in_pulse, end_of_following, one_pulse, slides_on
@@ -63,7 +64,7 @@ def sample_leg(
         gained, gained_displacement = -b * since, -0.5 * b * since * since
     elif kind == FOLLOW:
         sample[BLOCK] = response(block, sample[GROUND])
-        gained, gained_displacement = cycle.eq4_integrals(block, wave.pieces, p, tau, tau + since)
+        gained, gained_displacement = eq4_integrals(block, wave.pieces, p, tau, tau + since)
     else:
         sample[BLOCK] = b
         gained, gained_displacement = held_integrals(wave.pieces, p, block.amplitude, b, tau, tau + since)
@@ -127,7 +128,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         offset = 2.0 * math.pi * repeat
         room.legs[0, 0] = 0.0
         start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, again) + offset
-        now = cycle.follow_pulse(block, options, wave, room, k, again, velocity)
+        now = follow_pulse(block, options, wave, room, k, again, velocity)
         at = sample_pulse(
             block, wave, room.legs, start, until, offset, displacement, now.displacement, phases, at, history
         )
@@ -160,12 +161,12 @@ def sample_following(
         start_phase = phase_at(wave.pieces, q, start) + offset
         while at < phases.size and phases[at] < end_phase + offset:
             since = max(phases[at] - start_phase, 0.0)
-            gained, moved = cycle.eq4_integrals(block, wave.pieces, q, start, min(start + since, end))
+            gained, moved = eq4_integrals(block, wave.pieces, q, start, min(start + since, end))
             history[at, BLOCK] = response(block, history[at, GROUND])
             history[at, VELOCITY] = moving[0] + gained
             history[at, DISPLACEMENT] = moving[1] + moving[0] * since + moved
             at += 1
-        gained, moved = cycle.eq4_integrals(block, wave.pieces, q, start, end)
+        gained, moved = eq4_integrals(block, wave.pieces, q, start, end)
         moving[1] += moving[0] * (end - start) + moved
         moving[0] += gained
     return at

@@ -2,7 +2,7 @@
 
 With the block's acceleration b held the relative velocity is a parabola (`held_integrals`, `held_stop`).
 Where it follows Eq. 4 the rate D = x − E(x) holds a constant, a term linear in t, and both times an
-exponential, whose moments are closed forms, too (`exponential_moments`; `cycle.straight_lag` puts them
+exponential, whose moments are closed forms, too (`exponential_moments`; `cycle.eq4.straight_lag` puts them
 together).  No step is taken, no error but rounding.  Derivations: docs/numerics.md#straight-pieces.
 """
 

@@ -35,7 +35,9 @@ from slipsweep.kernels.block import (
     settled,
     stays_below_yield,
 )
-from slipsweep.kernels.cycle import Room, follow_through, pulse
+from slipsweep.kernels.cycle.continuous import follow_through
+from slipsweep.kernels.cycle.legs import Room
+from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import phase_at
 from slipsweep.kernels.linear import held_integrals, held_stop
 from slipsweep.kernels.pulse import (

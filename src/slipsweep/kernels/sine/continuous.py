@@ -12,7 +12,6 @@ import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar, summed
 from slipsweep.jit.elementary import angle_minus_sine, rising_phase, sine_after, versine
-from slipsweep.kernels import cycle
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -31,9 +30,11 @@ from slipsweep.kernels.block import (
     relative_acceleration,
     relative_acceleration_root,
 )
-from slipsweep.kernels.cycle import MOST_LEGS, NODES, PANEL_BOUNDS, SLIVER, WEIGHTS, next_break
+from slipsweep.kernels.cycle.continuous import continuous as continuous_of_any_wave
+from slipsweep.kernels.cycle.eq4 import NODES, PANEL_BOUNDS, WEIGHTS
+from slipsweep.kernels.cycle.legs import MOST_LEGS, SLIVER, next_break
 from slipsweep.kernels.events import STRIP, settling
-from slipsweep.kernels.lanes import (
+from slipsweep.kernels.sine.lanes import (
     CARRIED,
     CODE,
     CONVERGED,
@@ -154,7 +155,7 @@ def continuous_peak(missed: float, drift: float, first: float, positive: float, 
 
 @scalar
 def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) -> Motion:
-    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.  Takes what `cycle.continuous` does.
+    """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.  Takes what `continuous_of_any_wave` does.
 
     |Üg| and the friction repeat every quarter cycle, mirrored, so that integrals over a
     quarter give a cycle, and the cycles an arithmetic series.
@@ -170,7 +171,7 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
         negative = 2.0 * up + continuous_peaks(block, -1.0, drift - 2.0 * up, 0.0)[1]
         peak = continuous_peak(missed, drift, first, positive, negative, options.cycles)
     if options.wants_peak and math.isnan(peak):  # an event was not found
-        return cycle.continuous(block, options, wave, zeros)
+        return continuous_of_any_wave(block, options, wave, zeros)
     # no event enters the displacement: it is no number only where sums overflow
     return Motion(math.inf if math.isnan(displacement) else displacement, peak, 0)
 

@@ -1,0 +1,104 @@
+"""The steps of a wave: how many on each piece, and w at their ends and middles, the same for all cells."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.decorators import scalar
+from slipsweep.kernels.excitation import offset_root
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, LAST, TERM, TOP, Wave
+
+#: Cycles from which on the rounding of V over one (1e-14) is kept from adding up (`mirrored_gain`).
+_MANY = 64
+
+
+class Steps(NamedTuple):
+    """The steps of the pieces of a wave: `counts[p]` of one `length[p]` on each.
+
+    ``nodes[offset[p] + 2 * k]`` is w at the beginning of step k of piece p, followed by w at its middle and
+    at its end (−0.0 where a negative piece is 0); `mirrored` is whether the halves of a cycle repeated
+    often are, but for the sign, the same.
+    """
+
+    wave: Wave
+    nodes: np.ndarray
+    offset: np.ndarray
+    counts: np.ndarray
+    length: np.ndarray
+    mirrored: bool
+    per_cycle: int
+    rule: int
+
+
+def steps_of(wave: Wave, steps_per_cycle: int, rule: int) -> Steps:
+    """Steps of all pieces of a wave, `steps_per_cycle` at least in a cycle, and the rule by which they are taken."""
+    pieces = wave.pieces.shape[0]
+    length = wave.pieces[:, FINISH] - wave.pieces[:, BEGIN]
+    count = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
+    offset = np.empty(pieces, np.int64)
+    parts: list[np.ndarray] = []
+    known: dict[int, int] = {}
+    size = 0
+    for c in range(wave.shape.size):
+        low, high = wave.cycle[c], wave.cycle[c + 1]
+        same = known.setdefault(int(wave.shape[c]), c)
+        if same != c:
+            offset[low:high] = offset[wave.cycle[same] : wave.cycle[same + 1]]
+            continue
+        for p in range(low, high):
+            offset[p] = size
+            parts.append(_nodes(wave, p, int(count[p])))
+            size += parts[-1].size
+    nodes = np.concatenate(parts)
+    mirrored = _mirrored(wave, nodes, offset, count)
+    return Steps(wave, nodes, offset, count, length / count, mirrored, steps_per_cycle, rule)
+
+
+def _nodes(wave: Wave, p: int, count: int) -> np.ndarray:
+    """w at every half step of piece p."""
+    # counted from the anchor, so that mirrored pieces have mirrored nodes
+    tau = np.arange(2 * count + 1) * ((wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]) / (2 * count))
+    tau = -tau[::-1] if wave.pieces[p, FINISH] == 0.0 else tau
+    nodes = np.zeros(tau.size)
+    for k in range(int(wave.pieces[p, DEGREE]) - 1, -1, -1):
+        nodes = (nodes + wave.pieces[p, COEFFICIENTS + TERM * k]) * tau
+    nodes += wave.pieces[p, TOP]
+    nodes[0], nodes[-1] = wave.pieces[p, FIRST], wave.pieces[p, LAST]
+    side = math.copysign(1.0, wave.pieces[p, TOP])
+    return side * np.maximum(side * nodes, 0.0)
+
+
+def _mirrored(wave: Wave, nodes: np.ndarray, offset: np.ndarray, count: np.ndarray) -> bool:
+    """Whether in a cycle repeated often w(φ + π) = −w(φ)."""
+    if wave.repeats < _MANY:
+        return False
+    low, high = wave.cycle[wave.lead], wave.cycle[wave.lead + 1]
+    if (high - low) % 2:
+        return False
+    half = (high - low) // 2
+    for p in range(low, low + half):
+        a, b = (slice(offset[q], offset[q] + 2 * count[q] + 1) for q in (p, p + half))
+        if count[p] != count[p + half] or not np.allclose(nodes[a], -nodes[b], rtol=0.0, atol=1e-14):
+            return False
+    return True
+
+
+@scalar
+def node(steps: Steps, p: int, i: int) -> float:
+    """τ on piece p at which step i begins."""
+    return (i if steps.wave.pieces[p, BEGIN] == 0.0 else i - steps.counts[p]) * steps.length[p]
+
+
+@scalar
+def tau_within(steps: Steps, p: int, k: int, amplitude: float, x: float) -> float:
+    """τ at which Üg = x within step k of piece p: as `offset_at`, but from the ends of the step, which are known."""
+    wave, at = steps.wave, steps.offset[p] + 2 * k
+    low, high, w_low, w_high = node(steps, p, k), node(steps, p, k + 1), steps.nodes[at], steps.nodes[at + 2]
+    if w_low == w_high:
+        return low
+    wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
+    tau = low + (high - low) * min(max((x / amplitude - w_low) / (w_high - w_low), 0.0), 1.0)
+    if w_high > w_low:
+        return offset_root((wave.pieces, p, wanted), low, high, tau, 0.0)
+    return offset_root((wave.pieces, p, wanted), high, low, tau, 0.0)
