@@ -8,6 +8,7 @@ import pytest
 from tests.support.processes import on_a_terminal, slipsweep
 
 COMMANDS = ("run", "info", "export", "simulate")
+SIMULATE = ("simulate", "--theta", "5", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1")
 SWEEP = "".join(
     f"[axes.{name}]\nvalues = [{value}]\n"
     for name, value in (("theta", 5), ("mu_s", 0.4), ("amplitude", 3), ("frequency", 1))
@@ -85,6 +86,7 @@ def test_errors_are_plain(tmp_path: Path) -> None:
         (("run", "a.toml", "--solver", "cycl"), "'cycl' is not one of 'auto', 'step', 'cycle'"),
         (("run", "a.toml"), 'axes.thet: unknown key; did you mean "theta"?'),
         (("simulate", "--theta", "steep"), "Invalid value for '--theta': 'steep' should be a valid number"),
+        ((*SIMULATE, "--ramp-in", "7", "--ramp-out", "8"), "--ramp-in + --ramp-out = 15: must not exceed"),
         (("simulate", "--points", "2"), "Invalid value for '--points': '2' should be greater than or equal to 4"),
     ],
 )

@@ -13,9 +13,13 @@ from slipsweep.motion.reading import Reading
 
 
 def option_name(text: str) -> str:
-    """An option as it is typed: ``--ramp-in`` for ``ramp_in``; what follows the name stays."""
-    name, *rest = text.split(" ", 1)
-    return " ".join(["--" + name.replace("_", "-"), *rest])
+    """An option as it is typed: ``--ramp-in`` for ``ramp_in``, also in a sum of several; what follows stays."""
+    words = text.split(" ")
+    for at in range(0, len(words), 2):
+        words[at] = "--" + words[at].replace("_", "-")
+        if words[at + 1 : at + 2] != ["+"]:
+            break
+    return " ".join(words)
 
 
 def chooses(**families: Family[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
