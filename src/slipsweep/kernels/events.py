@@ -2,8 +2,8 @@
 
 Both are Newton's.  `root_of` keeps it in a bracket, and halves that where Newton's steps would leave it
 or come to no end.  A root that it does not find is NaN, and so is then the displacement: the run ends
-with an error that names the cell (`block.UNSOLVED`).  `settling` takes the lanes of a strip to their roots
-together, each from the side from which Newton's iteration comes there without a bracket, and marks those
+with an error that names the cell (`block.UNSOLVED`).  `sine.roots` takes the lanes of a strip to their
+roots together, each from the side from which Newton's iteration comes there without a bracket, and marks those
 that are not there in the end: they are left to the former.  Why an event's error hardly matters:
 docs/numerics.md#finding-events.
 """
@@ -11,8 +11,6 @@ docs/numerics.md#finding-events.
 import math
 from collections.abc import Callable
 from typing import Any
-
-import numpy as np
 
 from slipsweep.jit.decorators import scalar
 
@@ -31,10 +29,6 @@ _AT_ORIGIN = 1e-30
 #: Lanes are filled up to a multiple, so that no loop over them has a scalar remainder:
 #: its roundings would differ, and a cell's last digits depend on how many stand beside it.
 STRIP = 32
-
-#: Relative size of a lane's last step.  A lane that has taken it stays where it is, whatever its neighbours do.
-_LANE_TOLERANCE = 1e-7
-_MOST_LANE_STEPS = 16
 
 
 def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Callable[..., float]:
@@ -72,28 +66,3 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
         return x if abs(x - origin) <= _AT_ORIGIN * width else math.nan
 
     return root
-
-
-def settling(row: int, settled: int, step_of: Callable[..., tuple[float, float, float]]) -> Callable[..., None]:
-    """A jitted iteration of the lanes of a strip to a root, in row `row`; row `settled` says which are there.
-
-    ``step_of(lanes, j, at, side, g)`` gives the next place, the length of the step to it, and against what that
-    has to be small.  Rows and function are bound here: LLVM has to know the rows.
-    """
-
-    @scalar
-    def settle(lanes: np.ndarray, side: float, g: float) -> None:
-        for _ in range(_MOST_LANE_STEPS):
-            unsettled = 0
-            for j in range(STRIP):
-                at = lanes[row + j]
-                onward, step, scale = step_of(lanes, j, at, side, g)
-                there = lanes[settled + j] > 0.0
-                lanes[row + j] = at if there else onward
-                there |= abs(step) <= _LANE_TOLERANCE * scale
-                lanes[settled + j] = 1.0 if there else 0.0
-                unsettled += 0 if there else 1
-            if unsettled == 0:
-                break
-
-    return settle

@@ -49,12 +49,10 @@ from slipsweep.kernels.sine.lanes import (
     X,
 )
 from slipsweep.kernels.sine.pulse import (
-    held_motion,
     lane_fall,
-    lane_response_and_slope,
     lane_rise,
-    settle_held,
 )
+from slipsweep.kernels.sine.roots import HELD_STOP, held_motion, lane_response_and_slope, settle
 from slipsweep.model import equations as eq
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
@@ -101,7 +99,7 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[V + j] = carried + (most * gain if most > 0.0 else 0.0)
         lanes[PSI + j] = lanes[BEGAN + j]
         lanes[X + j] = 0.0 if stops else 1.0
-    settle_held(lanes, 1.0, options.g)
+    settle(HELD_STOP, PSI, X, 1.0, options.g, lanes)
     for j in range(STRIP):
         began, psi, left, gain, most = (
             lanes[BEGAN + j],

@@ -33,7 +33,7 @@ from slipsweep.kernels.block import (
 from slipsweep.kernels.cycle.continuous import continuous as continuous_of_any_wave
 from slipsweep.kernels.cycle.eq4 import NODES, PANEL_BOUNDS, WEIGHTS
 from slipsweep.kernels.cycle.legs import MOST_LEGS, SLIVER, next_break
-from slipsweep.kernels.events import STRIP, settling
+from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
     CARRIED,
     CODE,
@@ -51,6 +51,7 @@ from slipsweep.kernels.sine.lanes import (
     W,
     X,
 )
+from slipsweep.kernels.sine.roots import TURN, settle
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import Wave
 
@@ -216,17 +217,6 @@ def quarter_integrals(k: float) -> tuple[float, float]:
     return first, second
 
 
-@in_lanes
-def _turn_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
-    """To D = 0, from Üg = 0 on."""
-    rate, slope = lane_rate_and_slope(lanes, j, side * x, g)
-    step = side * (rate / slope)
-    return x - step, step, min(x, lanes[AMPLITUDE + j] - x)
-
-
-_settle_turn = settling(X, PSI, _turn_step)
-
-
 @scalar
 def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
     """∫ D dψ on the rise of a half cycle, from Üg = 0 up to where D changes sign, in RATE; 0 where it does not.
@@ -243,7 +233,7 @@ def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
         lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
         lanes[PSI + j] = 0.0 if turns else 1.0
         lanes[X + j] = 0.0
-    _settle_turn(lanes, side, g)
+    settle(TURN, X, PSI, side, g, lanes)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
         lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], lanes[AMPLITUDE + j])

@@ -33,7 +33,7 @@ from slipsweep.kernels.sine.lanes import (
     W,
     X,
 )
-from slipsweep.kernels.sine.pulse import settle_recoupling
+from slipsweep.kernels.sine.roots import RECOUPLING, settle
 from slipsweep.model import equations as eq
 
 
@@ -102,7 +102,7 @@ def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
         longest = left / b
         lanes[PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
         lanes[X + j] = 0.0
-    settle_recoupling(lanes, 1.0, 0.0)
+    settle(RECOUPLING, PSI, X, 1.0, 0.0, lanes)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
     for j in range(STRIP):

@@ -7,16 +7,15 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import in_lanes, scalar
-from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, rising_phase, versine
+from slipsweep.jit.decorators import scalar
+from slipsweep.jit.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
     YIELD,
-    lane_rate_and_slope,
     lane_relative_acceleration,
 )
-from slipsweep.kernels.events import STRIP, settling
+from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
     CONVERGED,
     HALF_PI,
@@ -26,7 +25,6 @@ from slipsweep.kernels.sine.lanes import (
     LEFT,
     LEVEL,
     MOMENT,
-    ONSET,
     PEAK,
     PSI,
     RATE,
@@ -37,89 +35,7 @@ from slipsweep.kernels.sine.lanes import (
     W,
     X,
 )
-
-
-@in_lanes
-def held_motion(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
-    """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest.
-
-    docs/numerics.md#held-block-acceleration
-    """
-    width = end - start
-    excess = amplitude - held
-    sine_part = angle_minus_sine(start)
-    first = excess * width - amplitude * (angle_minus_sine(end) - sine_part)
-    second = 0.5 * excess * width * width - amplitude * (
-        half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * width
-    )
-    return first, second
-
-
-@in_lanes
-def stopping_step(amplitude: float, held: float, velocity: float, start: float, psi: float) -> float:
-    """What Newton takes off ψ on the way to the stop of a hold that was entered with V = `velocity` at `start`."""
-    left = velocity + held_motion(amplitude, held, start, psi)[0]
-    return left / (amplitude - held - amplitude * versine(psi))
-
-
-@in_lanes
-def lane_response_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
-    """E and dE/dx of a lane (x > 0)."""
-    rate, slope = lane_rate_and_slope(lanes, j, x, g)
-    return x - rate, 1.0 - slope
-
-
-@in_lanes
-def _onset_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
-    """To D = 0, from the left, where a concave D converges, slowly where it starts flat."""
-    rate, slope = lane_rate_and_slope(lanes, j, x, g)
-    step = -rate / slope
-    return x + step, step, min(x, lanes[AMPLITUDE + j] - x)
-
-
-@in_lanes
-def _switch_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> tuple[float, float, float]:
-    """To E = b, from the right, where a convex E converges."""
-    eq4, slope = lane_response_and_slope(lanes, j, x, g)
-    step = (eq4 - lanes[LEVEL + j]) / slope
-    return x - step, step, min(x, lanes[AMPLITUDE + j] - x)
-
-
-@in_lanes
-def _fall_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
-    """To the stop after the peak."""
-    step = stopping_step(lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j], 0.0, psi)
-    return min(max(psi - step, 0.0), HALF_PI), step, psi
-
-
-@in_lanes
-def _held_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
-    """To the stop of a pulse entered in motion, from Üy on, where V falls ever more slowly; no further than t1."""
-    began, onset = lanes[BEGAN + j], lanes[ONSET + j]
-    step = stopping_step(lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[V + j], began, psi)
-    onward = min(max(psi - step, began), onset)
-    return onward, step, math.inf if onward >= onset else onward - began
-
-
-@in_lanes
-def _recoupling_step(lanes: np.ndarray, j: int, chi: float, side: float, g: float) -> tuple[float, float, float]:
-    """To the stop after Üg = 0."""
-    amplitude, b = lanes[AMPLITUDE + j], lanes[HELD + j]
-    half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
-    over = lanes[LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
-    step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
-    return min(max(chi + step, 0.0), math.pi), step, chi
-
-
-_settle_onset = settling(LEVEL, CONVERGED, _onset_step)
-
-_settle_switch = settling(X, PSI, _switch_step)
-
-_settle_fall = settling(PSI, X, _fall_step)
-
-settle_held = settling(PSI, X, _held_step)
-
-settle_recoupling = settling(PSI, X, _recoupling_step)
+from slipsweep.kernels.sine.roots import FALL_STOP, SWITCH, TURN, held_motion, lane_response_and_slope, settle
 
 
 @scalar
@@ -132,7 +48,7 @@ def lane_onset(kind: int, g: float, lanes: np.ndarray) -> None:
         return
     for j in range(STRIP):
         lanes[CONVERGED + j] = 0.0
-    _settle_onset(lanes, 1.0, g)
+    settle(TURN, LEVEL, CONVERGED, 1.0, g, lanes)
     for j in range(STRIP):
         lanes[START + j] = rising_phase(lanes[LEVEL + j], lanes[AMPLITUDE + j])
 
@@ -147,7 +63,7 @@ def lane_switch(g: float, lanes: np.ndarray) -> None:
         lanes[HELD + j] = eq4 if follows else level
         lanes[X + j] = amplitude - (eq4 - level) / slope if follows else amplitude
         lanes[PSI + j] = 0.0 if follows else 1.0
-    _settle_switch(lanes, 1.0, g)
+    settle(SWITCH, X, PSI, 1.0, g, lanes)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
 
@@ -204,7 +120,7 @@ def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
             lanes[PEAK + j] = peak if wants_peak else math.nan
             lanes[X + j] = 1.0 if lanes[LEFT + j] > 0.0 else 0.0
         if unsettled > 0:
-            _settle_fall(lanes, 1.0, 0.0)
+            settle(FALL_STOP, PSI, X, 1.0, 0.0, lanes)
         for j in range(STRIP):
             lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
     for j in range(STRIP):
