@@ -6,7 +6,7 @@ from math import ceil, isnan, log, pi
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
@@ -334,8 +334,7 @@ def test_sharp_decay(cell: strategies.Cell, exponent: float, options: dict[str, 
     expected = reference.solve(**cell)
     result = slipsweep.sweep(**choices(**cell, solver="cycle"))
     assert Validity(int(result.validity)) == Validity(expected.validity), "validity"
-    if expected.validity & VALUELESS:
-        return
+    assume(not expected.validity & VALUELESS)
     scale = cell["amplitude"] * strategies.phase_scale(cell) ** 2
     right = float(expected.permanent_displacement)
     assert abs(float(result.permanent_displacement) - right) <= 1e-11 * abs(right) + 1e-12 * cell["cycles"] ** 2 * scale
@@ -353,8 +352,7 @@ def test_just_above_yield(cell: strategies.Cell, exponent: float) -> None:
     excess = (amplitude - onset) / onset
     cell = {**cell, "yield_acceleration": onset, "amplitude": amplitude}
     expected = reference.solve(**cell)
-    if expected.sliding_mode != 1:
-        return
+    assume(expected.sliding_mode == 1)
     result = slipsweep.sweep(**choices(**cell, solver="cycle"))
     right = float(expected.permanent_displacement)
     conditioning = 2 * np.finfo(float).eps / excess

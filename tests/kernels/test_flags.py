@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import slipsweep
@@ -105,8 +105,7 @@ def test_near_the_mode_limit_begins_and_ends_at_the_number(
     """The bit goes with ξ as it is returned, to the last digit of the amplitude."""
     onset = strategies.coulomb_yield(theta, mu_s) * share
     limit = strategies.limiting_acceleration(theta, mu_s, onset)
-    if not onset > 0 or not limit > 0 or border * limit * math.tan(math.radians(theta)) > 9.0:
-        return
+    assume(onset > 0 and limit > 0 and border * limit * math.tan(math.radians(theta)) <= 9.0)
     amplitudes = [border * limit]
     for _ in range(4):
         amplitudes = [math.nextafter(amplitudes[0], 0.0), *amplitudes, math.nextafter(amplitudes[-1], math.inf)]
@@ -140,8 +139,7 @@ def test_a_record_has_the_flags_of_its_pulses(
     samples: np.ndarray, theta: float, mu_s: float, strength: float, share: float | None, friction: dict[str, float]
 ) -> None:
     onset = strategies.coulomb_yield(theta, mu_s)
-    if onset <= 0.05 or not samples.any():
-        return
+    assume(onset > 0.05 and samples.any())
     limit = strategies.limiting_acceleration(theta, mu_s, onset)
     shaking = np.array((samples * strength * limit).tolist())
     record = slipsweep.Record(np.array([0.05 * k for k in range(samples.size)]), shaking)

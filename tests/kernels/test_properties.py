@@ -79,8 +79,7 @@ def test_scaling_law_to_rounding(solver: str, cell: strategies.Cell, other: floa
 @given(cell=strategies.stick_slip() | strategies.newmark(), options=strategies.model_options)
 def test_stick_slip_never_moves_upslope(solver: str, cell: strategies.Cell, options: dict[str, str]) -> None:
     result = respond(cell, **options, solver=solver, steps_per_cycle=COARSE)
-    if int(result.validity) & Validity.KD_NOT_POSITIVE:
-        return
+    assume(not int(result.validity) & Validity.KD_NOT_POSITIVE)
     assert int(result.sliding_mode) == 1
     assert value(result) >= 0, "displacement"
     assert value(result, "peak_relative_velocity") >= 0, "velocity"
@@ -121,8 +120,7 @@ def test_recoupled_pulses_add_up(solver: str, cell: strategies.Cell, options: di
     """Where each pulse ends at rest, N cycles are N times one, so that displacement grows with the cycles."""
     cell = {**cell, **options, "solver": solver, "steps_per_cycle": COARSE}
     one, some = respond(cell, cycles=1), respond(cell)
-    if int(some.validity) & (Validity.NOT_RECOUPLED | Validity.KD_NOT_POSITIVE):
-        return
+    assume(not int(some.validity) & (Validity.NOT_RECOUPLED | Validity.KD_NOT_POSITIVE))
     assert isclose(value(some), cell["cycles"] * value(one), rel_tol=1e-14), "displacement"
     assert value(some, "peak_relative_velocity") == value(one, "peak_relative_velocity"), "velocity"
 
@@ -133,8 +131,7 @@ def test_recoupled_pulses_add_up(solver: str, cell: strategies.Cell, options: di
 def test_displacement_grows_with_cycles(solver: str, cell: strategies.Cell, options: dict[str, str]) -> None:
     cell = {**cell, **options, "solver": solver, "steps_per_cycle": COARSE}
     fewer, more = respond(cell), respond(cell, cycles=cell["cycles"] + 1)
-    if int(more.validity) & Validity.KD_NOT_POSITIVE:
-        return
+    assume(not int(more.validity) & Validity.KD_NOT_POSITIVE)
     assert value(more) >= value(fewer) * (1 - 1e-14), "displacement"
     assert value(more, "peak_relative_velocity") >= value(fewer, "peak_relative_velocity") * (1 - 1e-14), "velocity"
 
