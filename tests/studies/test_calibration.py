@@ -47,6 +47,13 @@ def test_noise_and_digitisation(clean: dict[str, xr.Dataset], mode: str) -> None
     assert found.attrs["findings"] == ""
 
 
+def test_the_search_is_not_caught_where_the_yield_acceleration_does_not_matter(clean: dict[str, xr.Dataset]) -> None:
+    """With this noise the first search ends at Üy = 1.90, above which λ and Δμ were off by ten standard errors."""
+    found = calibrated(measured(clean["stick_slip"], seed=20))
+    assert np.isfinite(found.yield_acceleration_error)
+    check_intervals(found, "stick_slip")
+
+
 @pytest.mark.parametrize("missing", ["block_acceleration", "relative_velocity", "relative_displacement"])
 def test_a_missing_channel(clean: dict[str, xr.Dataset], missing: str) -> None:
     found = calibrated(measured(clean["stick_slip"], seed=2).drop_vars(missing))

@@ -286,19 +286,17 @@ class Fit:
         again = self.search(best, wrong, effects)
         return again if np.sum(rest(again) ** 2) < np.sum(rest(found) ** 2) else found
 
-    def solve(self, starts: Sequence[Floats], shapes: Sequence[Floats] | None = None) -> "Solution":
+    def solve(self, starts: Sequence[Floats], shapes: Sequence[Floats] | None = None, near: bool = False) -> "Solution":
         """The parameters of the least squares, from the best of the starts.
 
-        `shapes` are the effects of the ways of the table's motion to be wrong, where they are known already.
+        `shapes` are the effects of the ways of the table's motion to be wrong, where they are known already; `near`
+        says that the start is close.
         """
         all_samples = dict(self.use)
         wrong = np.zeros(self.motion.shapes.shape[1])
         parameters = min(starts, key=self.rough)
-        # first so that no sample counts for much, and without the noise of the table, which would mix them
-        noisy = wrong.size - len(self.table_lines)
-        nothing = np.zeros((self.test.times.size, len(COLUMN)))
-        first = [nothing] * noisy + self.shape_effects(parameters, wrong)[noisy:] if self.table_lines else []
-        parameters = self.search(parameters, wrong if first else wrong[:0], self.effects(first), "soft_l1")
+        if not near:
+            parameters = self._robust(parameters, wrong)
         for turn in range(_MOST_ROUNDS if shapes is None else _FEW_ROUNDS):
             before = parameters
             if "block_acceleration" in self.use:
@@ -316,6 +314,13 @@ class Fit:
                 break
             wrong = solution.nuisances[: wrong.size]
         return solution
+
+    def _robust(self, start: Floats, wrong: Floats) -> Floats:
+        """So that no sample counts for much, and without the noise of the table, which would mix them."""
+        noisy = wrong.size - len(self.table_lines)
+        nothing = np.zeros((self.test.times.size, len(COLUMN)))
+        first = [nothing] * noisy + self.shape_effects(start, wrong)[noisy:] if self.table_lines else []
+        return self.search(start, wrong if first else wrong[:0], self.effects(first), "soft_l1")
 
     def _take_noise(self, parameters: Floats, wrong: Floats, shapes: Sequence[Floats]) -> None:
         """What is left over is the noise of a channel, where that was not given."""
@@ -347,6 +352,15 @@ class Profile:
     above: Floats
     others: Floats
     errors: Floats
+
+    def better(self, found: Floats) -> Floats | None:
+        """The best parameters of the profile, if those found are not about as good."""
+        nearest = int(np.argmin(np.abs(self.onsets - found[0])))
+        best = int(np.argmin(self.above))
+        apart = np.abs(self.others[nearest] - found[1:]) > 1.5 * self.errors[nearest]
+        if self.above[nearest] <= _BETTER and not (apart & (self.errors[nearest] > 0.0)).any():
+            return None
+        return np.array([self.onsets[best], *self.others[best]])
 
     def interval(self, at: int, square: float) -> tuple[float, float]:
         """Where the sum of squares of parameter `at` lies no more than `square` above the least, from end to end."""
