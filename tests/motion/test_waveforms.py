@@ -1,5 +1,6 @@
 """Waveforms: what they are, their exact peaks, and the pieces they are cut into."""
 
+import itertools
 from math import pi
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from slipsweep import Cosine, Harmonics, InputError, Sine, Square, Triangle
+from slipsweep import Cosine, Cycle, Harmonics, InputError, Sine, Square, Step, Triangle, sweep
 from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TERM, TOP
 from slipsweep.motion.waveforms import MOST_RAMP, WAVEFORMS, Waveform
@@ -130,6 +131,60 @@ def test_stretches_of_several_maxima() -> None:
     tops = [p for p in range(a, b - 1) if wave.pieces[p, FIRST] < wave.pieces[p, LAST] > wave.pieces[p + 1, LAST]]
     assert len(wave.stretch) == 3 or len(tops) == 3
     assert wave.height.max() == 1.0
+
+
+#: sin 2φ and sin 3φ that nearly cancel about φ = π: three zeros within 0.026 rad, the wave below 1e-5 between them.
+THREE_ZEROS = Harmonics([0.2536777542789753, 0.1692128468453051], [2, 3], cycles=12)
+
+
+@pytest.mark.parametrize("power", range(1, 6))
+def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
+    """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)) in closed form, about π at distances 10⁻¹ to 10⁻⁵."""
+    a, b = 1.0, 2 / 3 * (1 + 10.0 ** (-2 * power))
+    ends = wave_of(Harmonics([a, b], [2, 3], cycles=1)).pieces
+    found = ends[ends[:, FIRST] == 0.0, START]
+    # 4b x² + 2a x − b = 0 in x = cos φ; the root near −1 as a distance from it
+    top = (-2 * a - np.sqrt(4 * a * a + 16 * b * b)) / (8 * b)
+    nearer = 2 * np.arcsin(np.sqrt((1 + top) / 2))
+    for expected in (pi - nearer, pi, pi + nearer):
+        assert np.abs(found - expected).min() < 1e-3 * nearer
+
+
+def test_friction_turns_at_each_zero() -> None:
+    """Continuous sliding over three close zeros, against Gauss's rule between them; all solvers share the pieces."""
+    theta, mu_s, amplitude, frequency, onset, decay = 0.0, 0.33292316, 8.9043785, 1.3944814, 1.8758496, 31.182287
+    g, peak = 9.81, exact_peak(THREE_ZEROS)
+    at_rest = mu_s * amplitude / (onset + g * mu_s)  # Eqs. 7, 8 and 10 on the level plane
+
+    def shaking(phase: np.ndarray) -> np.ndarray:
+        return amplitude / peak * (0.2536777542789753 * np.sin(2 * phase) + 0.1692128468453051 * np.sin(3 * phase))
+
+    def rate(phase: np.ndarray) -> np.ndarray:
+        ground = shaking(phase)
+        return np.sign(ground) * g * (mu_s - at_rest * np.exp(-decay * np.abs(ground) / g))
+
+    low, high = 0.0, 0.1
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if shaking(np.array(middle)) < onset else (low, middle)
+    zeros = [0.0, *(pi + side * distance for side, distance in ((-1, 1.82356298072), (-1, 0.02586596335))), pi]
+    zeros += [2 * pi - zero for zero in zeros[-2::-1]]
+    assert np.abs(shaking(np.array(zeros))).max() < 1e-9
+    points, weights = np.polynomial.legendre.leggauss(40)
+    moved = 0.0
+    for cycle in range(12):
+        for start, end in itertools.pairwise(zeros):
+            edges = np.linspace(max(start, high) if cycle == 0 else start, end, 41)
+            half, centre = np.diff(edges)[:, None] / 2, (edges[1:] + edges[:-1])[:, None] / 2
+            phase = centre + half * points
+            moved += float((half * weights * rate(phase) * (2 * pi * (12 - cycle) - phase)).sum())
+    expected = moved / (2 * pi * frequency) ** 2
+    for solver in (Cycle(), Step(rule="simpson", steps_per_cycle=1024)):
+        found = sweep(
+            theta, mu_s, amplitude, frequency, yield_acceleration=onset, decay_rate=decay, excitation=THREE_ZEROS,
+            solver=solver,
+        )  # fmt: skip
+        assert float(found.permanent_displacement) == pytest.approx(expected, rel=1e-7)
 
 
 def test_one_plain_cycle_stands_for_all() -> None:

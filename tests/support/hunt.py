@@ -86,6 +86,7 @@ FOUND = [
         odd_arguments.called("simulate", points_per_cycle=10**400),
         "`points_per_cycle` of 400 digits: OverflowError",
     ),
+    Found("arguments of", odd_arguments.called("simulate", times=()), "`times` without an entry: IndexError"),
     Found(
         "command line of",
         ["export", "x" * 300, "-o", "new.csv"],

@@ -44,6 +44,10 @@ _ROUNDING = 1e-15
 #: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for.
 _INTERVALS = 12
 
+#: Derivatives beyond the one whose zeros are looked for that part its intervals: four zeros of it in one interval
+#: have one of the last between them.
+_DEPTH = 3
+
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
 _TURN = _Extended("6.283185307179586476925286766559005768")
@@ -126,31 +130,22 @@ def _period(waveform: Waveform) -> _Period:
     return _trigonometric(waveform.plain)
 
 
-def _sign_changes(f: Callable[[Exact], Exact], slope: Callable[[Exact], Exact], edges: Exact) -> list[float]:
-    """Places between the edges where f changes its sign: each bracketed, then bisected to the last digit.
+def _sign_changes(derivative: Callable[[int, Exact], Exact], order: int, edges: Exact, depth: int = _DEPTH) -> Exact:
+    """Places between the edges where a derivative changes its sign, ascending: bracketed, then bisected to the end.
 
-    Two in one interval are found where |f| has a minimum between its ends.
+    Between two places where the next derivative does so it is monotone, and passes 0 once at most: two or three
+    zeros that lie close together are told apart.
     """
-
-    def bisect(f: Callable[[Exact], Exact], low: Exact, high: Exact) -> Exact:
-        below = f(low) < 0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            same = (f(middle) < 0) == below
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        return high
-
-    value, rate = f(edges), slope(edges)
-    sign = np.where(value < 0, -1, 1)
-    crosses = sign[:-1] != sign[1:]
-    low, high = [edges[:-1][crosses]], [edges[1:][crosses]]
-    dips = ~crosses & (sign[:-1] * rate[:-1] < 0) & (sign[1:] * rate[1:] > 0)
-    if dips.any():
-        bottom = bisect(slope, edges[:-1][dips], edges[1:][dips])
-        twice = np.where(f(bottom) < 0, -1, 1) != sign[:-1][dips]
-        low += [edges[:-1][dips][twice], bottom[twice]]
-        high += [bottom[twice], edges[1:][dips][twice]]
-    return sorted(bisect(f, np.concatenate(low), np.concatenate(high)).tolist())
+    if depth:
+        edges = np.sort(np.concatenate([edges, _sign_changes(derivative, order + 1, edges, depth - 1)]))
+    below = derivative(order, edges) < 0
+    crosses = below[:-1] != below[1:]
+    low, high, below = edges[:-1][crosses], edges[1:][crosses], below[:-1][crosses]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        same = (derivative(order, middle) < 0) == below
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return np.asarray(high)
 
 
 def _turning_points(
@@ -161,18 +156,15 @@ def _turning_points(
     edges = np.concatenate([[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]])
     at, rate = envelope
 
-    def wave(order: int) -> Callable[[Exact], Exact]:
-        return lambda u: period.derivative(i, u, order)
+    def wave(order: int, u: Exact) -> Exact:
+        return period.derivative(i, u, order)
 
-    def ramped(order: int) -> Callable[[Exact], Exact]:
-        def f(u: Exact) -> Exact:
-            scale = at + rate * (np.asarray(u, _Extended) - low) * _TURN
-            return scale * period.derivative(i, u, order) + order * rate * period.derivative(i, u, order - 1)
+    def ramped(order: int, u: Exact) -> Exact:
+        scale = at + rate * (np.asarray(u, _Extended) - low) * _TURN
+        return np.asarray(scale * wave(order, u) + order * rate * wave(order - 1, u))
 
-        return f
-
-    zeros = _sign_changes(wave(0), wave(1), edges) if period.fastest else []
-    turns = _sign_changes(ramped(1), ramped(2), edges) if period.fastest or rate != 0 else []
+    zeros = _sign_changes(wave, 0, edges).tolist() if period.fastest else []
+    turns = _sign_changes(ramped, 1, edges).tolist() if period.fastest or rate != 0 else []
     return zeros, turns
 
 

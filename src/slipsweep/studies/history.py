@@ -74,7 +74,7 @@ def history_table(
 def _checked(times: Any, least: float) -> Floats:
     """Times that a caller gives."""
     grid = np.atleast_1d(check_numbers("times", times))
-    increasing = grid.ndim == 1 and np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()
+    increasing = grid.ndim == 1 and grid.size and np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()
     if not increasing or (grid < least).any():
         bound = " >= 0" if least == 0.0 else ""
         raise InputError(f"times: must be one row of finite, increasing numbers{bound}")
