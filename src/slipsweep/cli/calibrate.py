@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, examples, typed_command
+from slipsweep.cli.common import Overwrite, Quiet, check_ending, examples, typed_command
 from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
@@ -163,8 +163,7 @@ def _checked(output: list[Path] | None, overwrite: bool, test: Path, allowed: tu
 
     paths = output or []
     for path in paths:
-        if path.suffix not in allowed:
-            raise InputError(f"{path}: the name must end in one of {', '.join(allowed)}")
+        check_ending(path, allowed)
     outputs.check_outputs(paths, overwrite, reads=[test])
     return paths
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite
+from slipsweep.cli.common import Overwrite, check_ending
 from slipsweep.errors import InputError
 
 EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
@@ -69,8 +69,7 @@ def chart(
     """
     given = output or []
     for path in given:
-        if path.suffix not in _SUFFIXES:
-            raise InputError(f"{path}: the name must end in one of {', '.join(_SUFFIXES)}")
+        check_ending(path, _SUFFIXES)
 
     from slipsweep.charts import book, kinds
     from slipsweep.charts.slices import Result

@@ -14,6 +14,7 @@ from slipsweep.cli.common import (
     Scheduler,
     Split,
     Workers,
+    check_ending,
     echo_found,
     progress_bar,
     taken_as,
@@ -63,12 +64,9 @@ def limit(
     results: list[Path] = []
     figures: list[Path] = []
     for path in output or []:
-        if path.suffix in _FIGURES:
-            figures.append(path)
-        elif path.suffix == ".nc" or (split and not path.suffix):
-            results.append(path)
-        else:
-            raise InputError(f"{path}: the name must end in one of {', '.join(('.nc', *_FIGURES))}")
+        if not (split and not path.suffix):  # the folder of a split result needs no ending
+            check_ending(path, (".nc", *_FIGURES))
+        (figures if path.suffix in _FIGURES else results).append(path)
     for option in chunks.given() if not results else []:
         raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
 

@@ -124,6 +124,21 @@ class Record:
         return replace(self, acceleration=shape, attrs=self.attrs | {"baseline": baseline})
 
 
+def read_lines(path: Path, what: str) -> tuple[bytes, list[str]]:
+    """The content of a file that is to hold a record or a test, and its lines."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except ValueError as error:  # a name that no system has
+        raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a {what} must have that many at most")
+    # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
+    return content, content.decode("utf-8-sig", errors="replace").splitlines()
+
+
 def read_record(
     path: str | Path,
     *,
@@ -161,17 +176,7 @@ def read_record(
     except TypeError:
         raise InputError(f"path = {shown(path)}: must be a path") from None
     channel = Reading(units, baseline, format, channel).channel  # type: ignore[arg-type]
-    try:
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except ValueError as error:  # a name that no system has
-        raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
-    if len(content) > MOST_BYTES:
-        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a record must have that many at most")
-    # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
-    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    content, lines = read_lines(path, "record")
     kind = _format_of(lines) if format == "auto" else format
     if kind == "cosmos":
         times, values, own = _read_cosmos(path, lines, channel)

@@ -19,7 +19,7 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.records import MOST_BYTES, STANDARD_GRAVITY, UNITS
+from slipsweep.motion.records import STANDARD_GRAVITY, UNITS, read_lines
 
 Floats = NDArray[np.float64]
 
@@ -190,16 +190,9 @@ def read_test(path: str | Path) -> ShakingTest:
     """
     try:
         path = Path(path)
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
     except TypeError:
         raise InputError(f"test = {shown(path)}: must be the path of a file, a Dataset or a ShakingTest") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else None
-        raise InputError(f"{path}: cannot be read: {reason or error}") from None
-    if len(content) > MOST_BYTES:
-        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a test must have that many at most")
-    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    content, lines = read_lines(path, "test")
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if not rows:
         raise InputError(f"{path}: has no line of names and no samples")
