@@ -1,4 +1,4 @@
-"""Coefficients of the polynomials of `slipsweep.jit.elementary`, by mpmath.
+"""Coefficients of the polynomials of `slipsweep.jit.elementary` and `slipsweep.kernels.sine.newmark`, by mpmath.
 
     python -m benchmarks.coefficients
 
@@ -51,18 +51,42 @@ def _after(power: int, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return lambda z: function(mpmath.sqrt(z)) / mpmath.sqrt(z) ** power
 
 
+def newmark_displacement(ratio: Any) -> Any:
+    """W/A of a cycle of Newmark's block with Üy/A = `ratio` under a sine."""
+    if ratio == 0:
+        return 2 * mpmath.pi
+    onset = mpmath.asin(ratio)
+
+    def velocity(phi: Any) -> Any:
+        return mpmath.cos(onset) - mpmath.cos(phi) - ratio * (phi - onset)
+
+    # from the second Üg = Üy on V falls; counted from the peak of Üg that comes at −1, and the stop at 2 to 3
+    half = mpmath.acos(ratio)
+    bracket = (mpmath.pi / 2 + half, mpmath.pi / 2 + 3 * half)
+    stop = mpmath.findroot(velocity, bracket, solver="anderson", maxsteps=200, verify=False)
+    slid = stop - onset
+    return mpmath.cos(onset) * slid - (mpmath.sin(stop) - ratio) - ratio * slid**2 / 2
+
+
+def _newmark_slide(z: Any) -> Any:
+    """What is left of W/A beside ε², ε = 1 − Üy/A, over z = 2√(Üy/A) − 1."""
+    ratio = ((z + 1) / 2) ** 2
+    return newmark_displacement(ratio) / (1 - ratio) ** 2
+
+
 with mpmath.workdps(DIGITS):
     #: A rounded quotient may leave a little more than ln 2 / 2.
     _HALF_LN2 = mpmath.log(2) / 2 * mpmath.mpf("1.0001")
     _QUARTER = (mpmath.pi / 2) ** 2
 
-#: By the name of the function in `slipsweep.jit.elementary`.
+#: By the name of the function in the source.
 APPROXIMATIONS = {
     "exp": Approximation("r", lambda r: (mpmath.exp(r) - 1 - r) / r**2, -_HALF_LN2, _HALF_LN2, 10),
     "versine": Approximation("z", _after(2, lambda x: 1 - mpmath.cos(x)), 0, _QUARTER, 9),
     "angle_minus_sine": Approximation("z", _after(3, lambda x: x - mpmath.sin(x)), 0, _QUARTER, 9),
     "half_square_minus_versine": Approximation("z", _after(4, lambda x: x**2 / 2 - 1 + mpmath.cos(x)), 0, _QUARTER, 9),
     "inverse_versine": Approximation("z", _after(1, mpmath.asin), 0, 0.5, 20),
+    "newmark_slide": Approximation("z", _newmark_slide, -1, 1, 26),
 }
 
 

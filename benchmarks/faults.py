@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.machine import arguments, measured_on, table
-from tests.support.fault_rounds import FAULTS, can_be_done, damaged, rounds, run, values
+from tests.support.fault_rounds import FAULTS, can_be_done, damaged, damaged_store, rounds, run, values
 
 #: Rounds of each kind; those in this process are cheap.
 ROUNDS, CHEAP_ROUNDS = 10, 200
@@ -20,7 +20,7 @@ def main() -> None:
     given = arguments(__doc__)
     seed = 1 if given.tiny else random.randrange(2**31)
     print(f"seed {seed}", flush=True)
-    names = [name for name in FAULTS if FAULTS[name] is damaged or not given.tiny]
+    names = [name for name in FAULTS if FAULTS[name] in (damaged, damaged_store) or not given.tiny]
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -29,7 +29,7 @@ def main() -> None:
         expected = values(place / "undisturbed.nc")
         for name in names:
             reason = can_be_done(name)
-            count = (3 if given.tiny else CHEAP_ROUNDS) if FAULTS[name] is damaged else ROUNDS
+            count = (3 if given.tiny else CHEAP_ROUNDS) if FAULTS[name] in (damaged, damaged_store) else ROUNDS
             done = 0 if reason else rounds([name], place, seed, count, expected)[name]
             rows.append([name, str(done), str(done), reason or "–"])
             print(*rows[-1][:2], flush=True)

@@ -53,11 +53,13 @@ def alternate(
     repeats: int,
     typical: Callable[[Sequence[float]], float] = statistics.median,
     calls: int = 1,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, float]:
     """Median (or other `typical`) seconds of each function, called in turn `repeats` times after an unmeasured call.
 
-    Taking turns puts a slow spell of a shared machine on all of them alike.  The best of `calls` at a turn
-    counts: the first of them may have to get memory from the host of a virtual machine, at up to 2.5 µs for 4 KB.
+    Seconds are those of `clock`.  Taking turns puts a slow spell of a shared machine on all of them alike.  The best of
+    `calls` at a turn counts: the first of them may have to get memory from the host of a virtual machine, at up to
+    2.5 µs for 4 KB.
     """
     for function in functions.values():
         function()
@@ -67,9 +69,9 @@ def alternate(
             gc.collect()
             best = math.inf
             for _ in range(calls):
-                start = time.perf_counter()
+                start = clock()
                 result = function()
-                best = min(best, time.perf_counter() - start)
+                best = min(best, clock() - start)
                 del result  # outside the clock, before the next allocation
             taken[name].append(best)
     return {name: typical(times) for name, times in taken.items()}

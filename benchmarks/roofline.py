@@ -27,6 +27,8 @@ NODES = 12
 EARLY_NODES, SERIES = 8, 2 * 31
 #: Eqs. 7-11 and λ; half of it where nothing beyond the Coulomb yield value is wanted.
 SETUP = 25 + LOG
+#: Newmark's displacement: a polynomial of a root of a quotient.
+NEWMARK = 26 + 6
 #: Two integrals of the hold, in closed form, and one Newton step towards the stop.
 HELD, NEWTON = 50, 30
 
@@ -36,7 +38,7 @@ CYCLE_OPERATIONS = {
     "stick_slip, yield governs": SETUP + 2 * (EXP + NODE) + ARCSINE + 2 * HELD + 3 * NEWTON,
     "stick_slip, Eq. 4 governs": SETUP + 2 * (EXP + NODE) + 2 * ARCSINE + NODES * (VERSINE + EXP + NODE) + 3 * HELD,
     "continuous": SETUP + ARCSINE + SERIES + EARLY_NODES * (VERSINE + EXP + NODE),
-    "newmark": SETUP // 2 + ARCSINE + 2 * HELD + 3 * NEWTON,
+    "newmark": SETUP // 2 + NEWMARK,
 }
 #: Operations of a step of the rectangle rule: Eq. 4 (but on the hold) and the two sums.
 STEP_OPERATIONS = {"stick_slip": EXP // 2 + NODE + 4, "continuous": EXP + NODE + 4, "newmark": 6}

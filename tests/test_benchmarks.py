@@ -19,6 +19,8 @@ WRITES = {
     "hunt": ["hunt.md"],
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
     "waveforms": ["waveforms.md"],
+    "variables": ["variables.md"],
+    "stores": ["stores.md"],
     "calibration": ["calibration.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],

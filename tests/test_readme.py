@@ -21,6 +21,7 @@ from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.model.variables import FLAG_KINDS, Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
+from tests.support.commands import command
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (
@@ -115,16 +116,34 @@ def output_of(arguments: list[str], folder: Path) -> str:
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
     """The blocks of a document, in order, in one folder that holds what a clone holds."""
+    run_blocks(document, blocks(document), tmp_path)
+
+
+def test_blocks_about_statistics_of_suites_do_what_they_say(tmp_path: Path) -> None:
+    """The other blocks of the page are of files that only a reader has."""
+    begin, end = (
+        read("docs/suites.md").split(f"\n## {name}\n")[0].count("\n")
+        for name in ("Statistics", "What else takes a suite")
+    )
+    found = [block for block in blocks("docs/suites.md") if begin < block.line < end]
+    assert [block.language for block in found] == ["python", "text", "csv", "console"]
+    run_blocks("docs/suites.md", found, tmp_path)
+
+
+def run_blocks(document: str, found: list[Block], tmp_path: Path) -> None:
     shutil.copytree(ROOT / "sweeps", tmp_path / "sweeps")
-    found = blocks(document)
     for block, after in zip_longest(found, found[1:]):
         where = f"{document}, line {block.line}"
         if block.language == "console":
             for (program, *arguments), expected in commands(block.text):
-                run = [sys.executable, "-m", "slipsweep"] if program == "slipsweep" else [shutil.which(program) or ""]
-                if run == [""]:
+                if program == "slipsweep":
+                    done = command(tmp_path, *arguments)
+                    assert (done.returncode, done.stderr) == (0, ""), where
+                    printed = done.stdout
+                elif path := shutil.which(program):
+                    printed = output_of([path, *arguments], tmp_path)
+                else:
                     continue  # a program of others, not on this machine
-                printed = output_of([*run, *arguments], tmp_path)
                 assert re.fullmatch(pattern(expected), printed, re.DOTALL), f"{where} printed:\n{printed}"
         elif block.language == "python":
             printed = output_of([sys.executable, "-c", block.text], tmp_path)
@@ -156,8 +175,8 @@ def test_the_two_commands_of_the_readme() -> None:
     text = read("README.md")
     marked = dict(re.findall(r"^<!-- ci: (\w+) -->\n```sh\n(.*)\n```$", text, re.MULTILINE))
     assert list(marked) == ["run", "test"]
-    for command in marked.values():
-        assert command.startswith("python3 -m venv .venv && .venv/bin/pip install ")
+    for line in marked.values():
+        assert line.startswith("python3 -m venv .venv && .venv/bin/pip install ")
     assert marked["run"].endswith(" && .venv/bin/slipsweep run sweeps/design_chart.toml")
     assert marked["test"].endswith(" && .venv/bin/pytest")
 

@@ -3,8 +3,10 @@
 `sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
 inputs are uncertain, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history,
 `flags` takes a result's `validity` apart.  `measured_friction` gives the paper's Eq. 1 on the accelerations
-of a test on a shaking table, `calibrate` the parameters of the model from one.  The shaking is a waveform
-(`Sine`, `Cosine`, `Triangle`, `Square`, `Harmonics`) or a `Record` (`read_record`); the model is that of Mendez,
+of a test on a shaking table, `calibrate` the parameters of the model from one.  `suite_statistics` takes the
+displacements under a suite together, `displacement_hazard` gives the annual rates of exceeding them.  `open_result`
+opens what the command `slipsweep run` has written.  The shaking is a waveform (`Sine`, `Cosine`, `Triangle`,
+`Square`, `Harmonics`), a `Record` (`read_record`) or a `Suite` of records (`read_suite`); the model is that of Mendez,
 Romo and Botero (2012), `Mendez`, or `Newmark`; the solver `Cycle` or `Step`.  `Validity` and `SlidingMode` name
 the codes of the results.
 """
@@ -20,35 +22,46 @@ from slipsweep.model.variables import SlidingMode, Validity
 if TYPE_CHECKING:
     from slipsweep.model.options import Cycle, Mendez, Newmark, Step
     from slipsweep.motion.records import Record, read_record
+    from slipsweep.motion.suites import Pair, Suite, read_suite
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
+    from slipsweep.runs.opening import open_result
     from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
+    from slipsweep.studies.hazard import HazardCurve
     from slipsweep.studies.shaking_tests import calibrate, measured_friction
+    from slipsweep.studies.suite_datasets import displacement_hazard, suite_statistics
 
 __all__ = [
     "Cosine",
     "Cycle",
     "Harmonics",
+    "HazardCurve",
     "InputError",
     "Mendez",
     "Newmark",
+    "Pair",
     "Record",
     "RunError",
     "Sine",
     "SlidingMode",
     "Square",
     "Step",
+    "Suite",
     "Triangle",
     "Validity",
     "__version__",
     "calibrate",
+    "displacement_hazard",
     "flags",
     "friction_parameters",
     "limit_amplitude",
     "measured_friction",
+    "open_result",
     "read_record",
+    "read_suite",
     "sample",
     "simulate",
+    "suite_statistics",
     "sweep",
 ]
 
@@ -58,10 +71,14 @@ _LAZY = {
     **dict.fromkeys(("Mendez", "Newmark", "Cycle", "Step"), "slipsweep.model.options"),
     **dict.fromkeys(("Sine", "Cosine", "Triangle", "Square", "Harmonics"), "slipsweep.motion.waveforms"),
     **dict.fromkeys(("Record", "read_record"), "slipsweep.motion.records"),
+    **dict.fromkeys(("Pair", "Suite", "read_suite"), "slipsweep.motion.suites"),
     **dict.fromkeys(
         ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
     ),
     "flags": "slipsweep.studies.decoding",
+    "open_result": "slipsweep.runs.opening",
+    "HazardCurve": "slipsweep.studies.hazard",
+    **dict.fromkeys(("displacement_hazard", "suite_statistics"), "slipsweep.studies.suite_datasets"),
     **dict.fromkeys(("calibrate", "measured_friction"), "slipsweep.studies.shaking_tests"),
 }
 

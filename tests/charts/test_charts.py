@@ -1,5 +1,6 @@
 """Charts: what they show is the model's, and nothing is read that they do not show."""
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import NOTES
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
-from tests.support.processes import slipsweep as command
+from tests.support.commands import command
 
 SWEEP = """
 [axes.theta]
@@ -256,7 +257,24 @@ def test_frequencies_collapse_in_the_dimensionless_chart(result: Result) -> None
             np.testing.assert_array_equal(scaled[member, number][0], xs)
             np.testing.assert_allclose(scaled[member, number][1], ys, rtol=1e-13)
     figure = curves.dimensionless(drawn)
-    assert figure.axes[0].get_xlabel() == "A / Üy"
+    assert figure.axes[0].get_xlabel().endswith("A / Üy")
+
+
+def test_the_dimensionless_chart_marks_cautions(lined: Path) -> None:
+    """As curves over the amplitude do: jumps at the mode limit lie in it."""
+    figure = drawn(lined, "dimensionless", y="mu_s", at={"theta": 11, "mu_s": (0.25, 0.45)})
+    amplitudes = xr.open_dataset(lined).amplitude.values
+    marks = [line for line in figure.axes[0].lines if line.get_gid() == "caution"]
+    for line, mu_s in zip(marks, (0.25, 0.45), strict=True):
+        direct = slipsweep.sweep(11.0, mu_s, amplitudes, 1.0, excitation=slipsweep.Sine(cycles=15))
+        flags = slipsweep.flags(direct)
+        expected = flags.near_mode_limit.values & ~flags.not_recoupled.values
+        assert expected.any()
+        onset = slipsweep.friction_parameters(11.0, mu_s, 1.0).yield_acceleration.item()
+        xs, ys = (np.asarray(one, float) for one in line.get_data())
+        np.testing.assert_allclose(xs, amplitudes / onset, rtol=1e-14)
+        np.testing.assert_array_equal(np.isfinite(ys), expected)
+    assert "caution:\nnear_mode_limit" in legend(figure)
 
 
 def test_ratio_to_newmark_is_that_of_a_direct_sweep(result: Result) -> None:
@@ -320,7 +338,7 @@ def test_only_what_is_shown_is_read(grid: Path, monkeypatch: pytest.MonkeyPatch,
     expected = {
         "contours": {"permanent_displacement": amplitudes * frequencies, "validity": amplitudes * frequencies},
         "modes": {"sliding_mode": thetas * amplitudes, "validity": thetas * amplitudes},
-        "families": {"permanent_displacement": 6 * amplitudes, "validity": 6 * amplitudes},
+        "families": {"permanent_displacement": 5 * amplitudes, "validity": 5 * amplitudes},  # every sixth
         "dimensionless": {"permanent_displacement": 12 * amplitudes, "validity": 12 * amplitudes},
         "newmark": {"permanent_displacement": thetas * amplitudes, "validity": thetas * amplitudes},
         "spread": {"permanent_displacement": amplitudes, "validity": amplitudes},
@@ -623,7 +641,24 @@ def test_values_that_are_not_to_be_relied_on_leave_a_gap(lined: Path) -> None:
         seen = [bool(np.isfinite(ys[xs == amplitude]).any()) for amplitude in direct.amplitude.values]
         expected = ~flags.upslope.values if shown else ~left_out  # a logarithmic axis has no place for upslope
         np.testing.assert_array_equal(seen, expected & (direct.permanent_displacement.values > 0))
-        assert ("Left out: values flagged not_recoupled or upslope." in figure.get_supxlabel()) != shown
+        assert left_out_of(figure) == (["upslope"] if shown else ["not_recoupled", "upslope"])
+        assert ("Drawn as asked: values flagged not_recoupled" in figure.get_supxlabel()) == shown
+
+
+def left_out_of(figure: Figure) -> list[str]:
+    """The flags whose values a caption says are left out."""
+    (sentence,) = (line for line in figure.get_supxlabel().splitlines() if line.startswith("Left out"))
+    return re.findall(r"(\w+) \(", sentence)
+
+
+def test_velocities_upslope_are_drawn_if_asked_for(lined: Path) -> None:
+    """The largest downslope velocity of a block that ends upslope is above zero: a scale has a place for it."""
+    at: dict[str, Any] = {"theta": 14, "mu_s": (0.25, 0.35)}
+    figure = drawn(lined, "families", at=at, variable="peak_relative_velocity", look=Look(show_cautions=True))
+    (line,) = named(figure.axes[0], "μs = 0.25")
+    assert np.isfinite(np.asarray(line.get_ydata(), float)[-1])
+    assert "Left out" not in figure.get_supxlabel()
+    assert "upslope (ends above where it began)" in figure.get_supxlabel()
 
 
 def test_the_order_of_dimensions_does_not_matter(lined: Path) -> None:
@@ -647,7 +682,7 @@ def test_contours_leave_them_out_too(lined: Path, kind: str) -> None:
         for segments in lines.allsegs:
             for segment in segments:
                 assert not inside(patch, segment).any()
-    assert "Left out: values flagged not_recoupled or upslope." in figure.get_supxlabel()
+    assert left_out_of(figure) == ["not_recoupled", "upslope"]
 
 
 def test_fills_and_contours_end_on_the_mode_limit(lined: Path) -> None:
@@ -719,7 +754,20 @@ def test_the_ratio_in_the_caption_is_that_of_the_cells_shown(lined: Path) -> Non
     ratio = ours.permanent_displacement.values / theirs.permanent_displacement.values.clip(1e-300)
     ratio = ratio[there & (theirs.permanent_displacement.values > 0) & (ratio > 0)]
     low, middle, high = np.quantile(ratio, (0.05, 0.5, 0.95))
-    assert f"median {middle:.3g}, 5 to 95 % of the cells {low:.3g} to {high:.3g}." in figure.get_supxlabel()
+    assert f"median {middle:.3g}, in 90 % of the cells {low:.3g} to {high:.3g}." in figure.get_supxlabel()
+
+
+def test_a_spread_in_panels_names_the_result_once() -> None:
+    """The heavy line is one entry of the legend, whatever differs from panel to panel."""
+    result = slipsweep.sweep(
+        xr.DataArray([5.0, 6.0], dims="case"),
+        0.38,
+        np.linspace(3, 6, 5),
+        1.8,
+        decay_rate=xr.DataArray([2.7, 2.3], dims="case"),
+    )
+    entries = [text for text in legend(result.slipsweep.chart("spread", panels=["case"])) if "this result" in text]
+    assert entries == ["this result:\nλ as given, stop by Eq. 12"]
 
 
 def test_spread_is_between_the_answers_there_are(lined: Path) -> None:
@@ -729,12 +777,12 @@ def test_spread_is_between_the_answers_there_are(lined: Path) -> None:
     given: dict[str, Any] = {"theta": 11.0, "mu_s": 0.35, "amplitude": amplitudes, "frequency": 1.0}
     given["excitation"] = slipsweep.Sine(cycles=15)
     expected = {"Newmark": slipsweep.sweep(**given, model="newmark")}
-    for recoupling, text in (("eq12", "Eq. 12"), ("integrate", "integration")):
+    for recoupling, text in (("eq12", "stop by Eq. 12"), ("integrate", "stop by integration")):
         model = slipsweep.Mendez(recoupling=recoupling)  # type: ignore[arg-type]
         expected[f"λ by Eq. 6, {text}"] = slipsweep.sweep(**given, model=model)
         for rate in (2.0, 3.0):
             expected[f"λ = {rate:g}, {text}"] = slipsweep.sweep(**given, model=model, decay_rate=rate)
-    expected["this result:\nλ by Eq. 6, Eq. 12"] = expected["λ by Eq. 6, Eq. 12"]
+    expected["this result:\nλ by Eq. 6, stop by Eq. 12"] = expected["λ by Eq. 6, stop by Eq. 12"]
     # in this slice nothing is left out; of the measured interface's stick-slip the answer by Eqs. 6 and 12 is
     assert "Left out" not in figure.get_supxlabel()
     interface = slipsweep.sweep(
@@ -748,7 +796,8 @@ def test_spread_is_between_the_answers_there_are(lined: Path) -> None:
     )
     assert not slipsweep.flags(interface).not_recoupled.any()
     caption = interface.slipsweep.chart("spread").get_supxlabel()
-    assert "Left out: values flagged not_recoupled." in caption
+    assert "Left out: values flagged not_recoupled (" in caption
+    assert "upslope" not in caption
     rows = []
     for label, answer in expected.items():
         (line,) = named(axes, label)
@@ -869,7 +918,10 @@ def test_all_of_a_file_is_a_pdf_with_a_title_page(
     pages = (tmp_path / "all.pdf").read_bytes().count(b"/Type /Page ")
     assert pages == 1 + len(kinds.SWEEP_KINDS)
     with Result(lined) as opened:
-        text = "\n".join(one.get_text() for one in book.title_page(opened).texts)
+        title = book.title_page(opened)
+    for one in title.texts:
+        assert one.get_window_extent().x1 < 0.95 * title.bbox.width, one.get_text()
+    text = "\n".join(one.get_text() for one in title.texts)
     assert "plane inclination θ: 8 to 14°, 3 values" in text
     assert "Permanent displacement" in text
     assert f"slipsweep {slipsweep.__version__}" in text

@@ -1,4 +1,4 @@
-"""The command line, run as a process: exit status, messages, files."""
+"""The command line: exit status, messages, files; as a process of its own where that is what counts."""
 
 import csv
 import os
@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from tests.support.commands import command
 from tests.support.processes import SLIPSWEEP, on_a_terminal, slipsweep
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -93,7 +94,7 @@ def test_run_paper(tmp_path: Path) -> None:
 
 
 def test_run_repeats_a_result(small: Path) -> None:
-    assert slipsweep(small, "run", "small.toml", "-o", "a.nc", "--solver", "step").returncode == 0
+    assert command(small, "run", "small.toml", "-o", "a.nc", "--solver", "step").returncode == 0
     assert slipsweep(small, "run", "a.nc", "-o", "b.nc", "--quiet").stdout == ""
     with netCDF4.Dataset(small / "a.nc") as one, netCDF4.Dataset(small / "b.nc") as other:
         assert other.sweep == SMALL
@@ -114,23 +115,21 @@ def test_run_repeats_a_result(small: Path) -> None:
 )
 def test_the_name_of_the_output(tmp_path: Path, text: str, arguments: tuple[str, ...], name: str) -> None:
     (tmp_path / "small.toml").write_text(text)
-    assert slipsweep(tmp_path, "run", "small.toml", *arguments).returncode == 0
+    assert command(tmp_path, "run", "small.toml", *arguments).returncode == 0
     assert names(tmp_path) == {"small.toml", name}
 
 
 def test_an_existing_output_is_replaced_only_when_told(small: Path) -> None:
     (small / "small.nc").write_text("mine")
-    assert_fails(slipsweep(small, "run", "small.toml"), 2, "small.nc: exists already; give --overwrite")
+    assert_fails(command(small, "run", "small.toml"), 2, "small.nc: exists already; give --overwrite")
     assert (small / "small.nc").read_text() == "mine"
-    assert slipsweep(small, "run", "small.toml", "--overwrite").returncode == 0
-    assert slipsweep(small, "info", "small.nc").returncode == 0
+    assert command(small, "run", "small.toml", "--overwrite").returncode == 0
+    assert command(small, "info", "small.nc").returncode == 0
     assert names(small) == {"small.toml", "small.nc"}
 
 
 def test_the_sweep_file_is_never_overwritten(small: Path) -> None:
-    assert_fails(
-        slipsweep(small, "run", "small.toml", "-o", "small.toml", "--overwrite"), 2, "which this command reads"
-    )
+    assert_fails(command(small, "run", "small.toml", "-o", "small.toml", "--overwrite"), 2, "which this command reads")
     assert (small / "small.toml").read_text() == SMALL
 
 
@@ -169,7 +168,7 @@ def test_bad_commands_fail_in_one_line(small: Path, arguments: tuple[str, ...], 
     )
     (small / "huge.toml").write_text(grid + '[output]\nvariables = ["sliding_mode"]')
     before = names(small)
-    assert_fails(slipsweep(small, *arguments), 2, message)
+    assert_fails(command(small, *arguments), 2, message)
     assert names(small) == before
 
 
@@ -225,7 +224,7 @@ def test_a_terminal_sees_progress(small: Path) -> None:
 
 def test_info(small: Path) -> None:
     slipsweep(small, "run", "small.toml")
-    done = slipsweep(small, "info", "small.nc")
+    done = command(small, "info", "small.nc")
     assert done.returncode == 0
     lines = done.stdout.splitlines()
     assert lines[0].startswith("small.nc  ")
@@ -237,7 +236,7 @@ def test_info(small: Path) -> None:
 
 
 def test_a_reader_that_goes_away_is_no_error(small: Path) -> None:
-    slipsweep(small, "run", "small.toml")
+    command(small, "run", "small.toml")
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(
@@ -250,7 +249,7 @@ def test_a_reader_that_goes_away_is_no_error(small: Path) -> None:
 def test_simulate_writes_every_kind(tmp_path: Path) -> None:
     outputs = [f"a{suffix}" for suffix in (".nc", ".csv", ".png", ".svg", ".pdf")]
     options = [part for output in outputs for part in ("-o", output)]
-    done = slipsweep(tmp_path, *SIMULATE, "--cycles", "2", "--points", "64", *options)
+    done = command(tmp_path, *SIMULATE, "--cycles", "2", "--points", "64", *options)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("permanent displacement  ")
     assert "sliding mode            stick_slip\n" in done.stdout
@@ -294,7 +293,7 @@ def test_run_imports_no_more_than_it_needs(small: Path, sweep: Path | str) -> No
 
 
 def test_info_imports_no_more_than_it_needs(small: Path) -> None:
-    slipsweep(small, "run", "small.toml", "-q")
+    command(small, "run", "small.toml", "-q")
     heavy = {"numba", "xarray", "pandas", "dask", "pint", "matplotlib", "scipy"}
     assert not heavy & imported("from slipsweep.cli import main; main(['info', 'small.nc'])", small)
 

@@ -25,6 +25,11 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
     [
         (("--amplitude", "0.5g"), ("--amplitude", "4.905"), "amplitude 4.905 m/s2 (0.5 g)"),
         (("--amplitude", "0.5g", "--g", "9.8"), ("--amplitude", "4.9", "--g", "9.8"), "amplitude 4.9 m/s2 (0.5 g)"),
+        (
+            ("--amplitude", "4", "--theta", "300 arcmin", "--frequency", "120 rpm"),
+            ("--amplitude", "4"),
+            "theta 5 degree, amplitude 4 m/s2",
+        ),
         (("--amplitude", "490.5 cm/s^2"), ("--amplitude", "4.905"), "amplitude 4.905 m/s2 (0.5 g)"),
         (
             ("--amplitude", "4", "--yield-acceleration", "0.1g"),
@@ -52,6 +57,10 @@ def test_simulate_takes_units_and_says_what_it_took(
     ("given", "message"),
     [
         (("--amplitude", "high"), '--amplitude = "high": must be a number, with a unit that converts to m s-2'),
+        (
+            ("--amplitude", "4", "--theta", "5%"),
+            '--theta = "5%": must be a number, with a unit that converts to degree',
+        ),
         (("--amplitude", "5mm"), '--amplitude = "5mm": must be a number, with a unit that converts to m s-2'),
         (("--amplitude", "4", "--yield-acceleration", "g"), '--yield-acceleration = "g": must be a number'),
         (("--amplitude", "-0.1g"), "amplitude = -0.981"),
@@ -80,6 +89,20 @@ def test_simulate_without_a_value_says_why_and_fails(
         assert f"the model gives no value: {flag}" in message
         assert message.count("\n") == 1
         assert not path.exists()
+
+
+@pytest.mark.parametrize("command", ["friction", "calibrate"])
+def test_commands_of_tests_take_units_too(capsys: pytest.CaptureFixture[str], tmp_path: Path, command: str) -> None:
+    test = tmp_path / "t.csv"
+    test.write_text("nothing")
+    given = (command, str(test), "--mu-s", "0.38")
+    assert '--theta = "5mm": must be a number, with a unit that converts to degree' in told(
+        capsys, *given, "--theta", "5mm", status=2
+    )
+    if command == "friction":
+        assert '--threshold = "5mm": must be a number, with a unit that converts to m s-2' in told(
+            capsys, *given, "--theta", "5deg", "--threshold", "5mm", status=2
+        )
 
 
 def test_run_writes_no_file_that_its_name_belies(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from slipsweep.charts import style
 from slipsweep.files import results
 from slipsweep.grid.plans import plan_sweep
 from slipsweep.model.estimates import friction_inputs
-from tests.support.processes import slipsweep as command
+from tests.support.commands import command
 
 RECORD = slipsweep.Record(np.arange(3.0), np.array([0.0, 5.0, 0.0]))
 BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency": 2.0}

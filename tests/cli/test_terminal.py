@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.commands import command as run
 from tests.support.processes import on_a_terminal, slipsweep
 
 COMMANDS = ("run", "info", "export", "simulate")
@@ -39,7 +40,7 @@ def test_help_on_a_terminal(tmp_path: Path) -> None:
 def test_the_examples_are_good_commands(tmp_path: Path) -> None:
     """Every option of the examples is one that the command has."""
     for command in COMMANDS:
-        text = slipsweep(tmp_path, command, "--help").stdout
+        text = run(tmp_path, command, "--help").stdout
         options, _, examples = text.partition("Examples:")
         for option in re.findall(r" (--?[a-z][\w-]*)", examples):
             assert re.search(rf"(^|\s|,){option}\b", options), f"{command}: {option}"
@@ -85,14 +86,14 @@ def test_errors_are_plain(tmp_path: Path) -> None:
         (("exprot", "a.nc"), "No such command 'exprot'. Did you mean 'export', 'explore'?"),
         (("run", "a.toml", "--solver", "cycl"), "'cycl' is not one of 'auto', 'step', 'cycle'"),
         (("run", "a.toml"), 'axes.thet: unknown key; did you mean "theta"?'),
-        (("simulate", "--theta", "steep"), "Invalid value for '--theta': 'steep' should be a valid number"),
+        (("simulate", "--mu-s", "rough"), "Invalid value for '--mu-s': 'rough' should be a valid number"),
         ((*SIMULATE, "--ramp-in", "7", "--ramp-out", "8"), "--ramp-in + --ramp-out = 15: must not exceed"),
         (("simulate", "--points", "2"), "Invalid value for '--points': '2' should be greater than or equal to 4"),
     ],
 )
 def test_what_is_nearest_is_suggested(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
     (tmp_path / "a.toml").write_text(SWEEP.replace("theta", "thet"))
-    done = slipsweep(tmp_path, *arguments)
+    done = run(tmp_path, *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
@@ -117,16 +118,16 @@ def test_completion(tmp_path: Path, shell: str) -> None:
 
 def test_simulate_takes_a_displacement_and_a_structure(tmp_path: Path) -> None:
     case = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2", "--structure-frequency", "2")
-    by_displacement = slipsweep(tmp_path, *case, "--displacement-amplitude", "0.025")
+    by_displacement = run(tmp_path, *case, "--displacement-amplitude", "0.025")
     acceleration = str((4 * 3.141592653589793) ** 2 * 0.025)
-    by_acceleration = slipsweep(tmp_path, *case, "--amplitude", acceleration)
+    by_acceleration = run(tmp_path, *case, "--amplitude", acceleration)
     assert by_displacement.returncode == 0
     results = [done.stdout.partition("taken as")[0] for done in (by_displacement, by_acceleration)]
     assert results[0] == results[1]
     assert "flexible_block" in by_displacement.stdout
-    assert slipsweep(tmp_path, *case, "--amplitude", "3", "--quiet", "-o", "a.csv").stdout == ""
+    assert run(tmp_path, *case, "--amplitude", "3", "--quiet", "-o", "a.csv").stdout == ""
     assert (tmp_path / "a.csv").exists()
-    both = slipsweep(tmp_path, *case, "--amplitude", "3", "--displacement-amplitude", "0.1")
+    both = run(tmp_path, *case, "--amplitude", "3", "--displacement-amplitude", "0.1")
     assert (both.returncode, both.stderr.strip()) == (
         2, "slipsweep: error: amplitude, displacement_amplitude: exactly one of them must be given",
     )  # fmt: skip

@@ -21,7 +21,7 @@ from slipsweep import InputError, Sine, SlidingMode, Validity, simulate, sweep
 from slipsweep.cli.explore import parse_size
 from slipsweep.explore.page import evenly, thinned_lengths, write_page
 from slipsweep.model.variables import FlagKind, flags_of
-from tests.support.processes import slipsweep
+from tests.support.commands import command
 
 pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
 
@@ -52,7 +52,7 @@ CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 def make(folder: Path, text: str) -> Path:
     """Run a sweep in `folder`."""
     (folder / "sweep.toml").write_text(text)
-    done = slipsweep(folder, "run", "sweep.toml", "-o", "small.nc", "--quiet")
+    done = command(folder, "run", "sweep.toml", "-o", "small.nc", "--quiet")
     assert done.returncode == 0, done.stderr
     return folder / "small.nc"
 
@@ -273,7 +273,7 @@ def test_result_without_a_map_is_refused(tmp_path: Path, text: str, message: str
 
 
 def test_command(result: Path, tmp_path: Path) -> None:
-    done = slipsweep(tmp_path, "explore", str(result), "-o", "page.html")
+    done = command(tmp_path, "explore", str(result), "-o", "page.html")
     assert done.returncode == 0, done.stderr
     assert "23 values" in done.stdout
     page = (tmp_path / "page.html").read_bytes()
@@ -284,7 +284,7 @@ def test_command(result: Path, tmp_path: Path) -> None:
         (("page.html", "-o", "other.html"), "not a netCDF file"),
         (("absent.nc", "-o", "other.html"), "no such file"),
     ):
-        done = slipsweep(tmp_path, "explore", *arguments)
+        done = command(tmp_path, "explore", *arguments)
         assert done.returncode == 2
         assert done.stderr.startswith("slipsweep: error: ")
         assert message in done.stderr

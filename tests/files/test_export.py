@@ -14,7 +14,7 @@ from slipsweep.files import export, spec
 from slipsweep.model.variables import FLAG_KINDS, VALIDITY_TEXT, Validity
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
-from tests.support.processes import slipsweep as command
+from tests.support.commands import command
 
 GRID = """
 [axes.theta]

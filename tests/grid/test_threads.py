@@ -1,5 +1,6 @@
 """Threads and processes: the policy of `slipsweep.grid.threads`, under everything that may call a sweep."""
 
+import functools
 import multiprocessing
 import os
 import signal
@@ -33,6 +34,7 @@ def expected() -> np.ndarray:
     return displacement()
 
 
+@functools.cache
 def count_in_process(**environment: str) -> int:
     """Threads that a fresh process would use."""
     clean = {name: value for name, value in os.environ.items() if name not in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}

@@ -222,6 +222,31 @@ def test_kernels_of_a_factory_are_told_apart(cache: Path) -> None:
     assert len(files(cache)) == 2
 
 
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_numba_is_left_as_it_was(cache: Path) -> None:
+    """Also by a kernel that cannot be compiled."""
+    from numba.core.cpu import CPUContext
+    from numba.core.types.functions import Function
+    from numba.core.typing.context import Context
+
+    def methods() -> list[object]:
+        return [
+            Function.get_call_type,
+            Context.load_additional_registries,
+            CPUContext.load_additional_registries,
+        ]
+
+    before = methods()
+
+    def sum_of_unlike(value: float) -> float:
+        return value * 2.0 + "2"  # type: ignore[operator]
+
+    assert compiled.Kernel(double)(2.0) == 4.0
+    with pytest.raises(numba.TypingError):
+        compiled.Kernel(sum_of_unlike)(2.0)
+    assert methods() == before
+
+
 def test_other_types_are_refused(cache: Path) -> None:
     kernel = compiled.Kernel(double)
     assert kernel(2.0) == 4.0

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from math import asin, atan, exp, inf, pi, radians, sin, tan
 
+import mpmath
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import slipsweep
+from benchmarks.coefficients import newmark_displacement
 from tests.support.cases import Case, choices, read_cases
 
 G = 9.81
@@ -46,6 +48,37 @@ def test_newmark_against_pyslammer(theta: float, mu_s: float, amplitude: float, 
     )
     assert analysis.max_sliding_disp == pytest.approx(float(result.permanent_displacement), rel=5e-7), "displacement"
     assert analysis.sliding_vel.max() == pytest.approx(float(result.peak_relative_velocity), rel=5e-7), "peak velocity"
+
+
+def test_newmark_to_the_last_digits() -> None:
+    """Every share of yield in the peak, down to what a double can hold and up to one unit below the peak."""
+    random, amplitude, cycles = np.random.default_rng(11), 3.7, 7
+    near = 10.0 ** random.uniform(-15.0, 0.0, 150)
+    ratio = np.concatenate([random.uniform(0.0, 1.0, 150), near, 1.0 - near, [1e-300, 1e-17, np.nextafter(1.0, 0.0)]])
+    onset = amplitude * ratio
+    onset = onset[(onset > 0.0) & (onset < amplitude)]
+    result = slipsweep.sweep(
+        5.0,
+        0.38,
+        amplitude,
+        1.0,
+        yield_acceleration=onset,
+        model="newmark",
+        excitation=slipsweep.Sine(cycles=cycles),
+    )
+    with mpmath.workdps(80):
+        omega = 2 * mpmath.pi
+        for value, displacement, velocity in zip(
+            onset.tolist(),
+            result.permanent_displacement.values.tolist(),
+            result.peak_relative_velocity.values.tolist(),
+            strict=True,
+        ):
+            share = mpmath.mpf(value) / mpmath.mpf(amplitude)
+            slid = cycles * amplitude * newmark_displacement(share) / omega**2
+            fastest = 2 * amplitude * (mpmath.sqrt(1 - share**2) - share * mpmath.acos(share)) / omega
+            assert abs(displacement / slid - 1) < 1.5e-15, f"displacement at {float(share)}"
+            assert abs(velocity / fastest - 1) < 1.5e-15, f"peak velocity at {float(share)}"
 
 
 class Integrated:

@@ -270,6 +270,28 @@ def test_mendez_against_scipy_on_recorded_motions(
 LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)
 
 
+def test_legs_that_begin_at_a_turn_of_eq4_come_to_an_end() -> None:
+    """A pulse of an earthquake in which the leg from a turn of Eq. 4 on ended, by rounding, at that turn."""
+    values = [
+        -0.97,
+        0.0313594111705,
+        0.90939222913,
+        1.38378696155,
+        1.5104986862,
+        1.55004890565,
+        1.51117534505,
+        1.0644,
+        0.0,
+    ]
+    record = Record.sampled(values, 0.005)
+    given: dict[str, Any] = {"yield_acceleration": 0.7238795543933454}
+    scale = 0.5414165300481509
+    expected = Block(0.0, 0.3, G, **given).respond(record, scale)
+    assert displacement(record, theta=0.0, mu_s=0.3, scale=scale, **given) == pytest.approx(
+        expected.permanent_displacement, rel=1e-9
+    )
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_mendez_against_scipy_on_made_up_records(seed: int) -> None:
     """Plateaus, zeros touched, records that begin and end anywhere, under all options."""
@@ -564,7 +586,10 @@ def test_the_block_slides_once_the_peak_passes_the_yield_acceleration(shaking: R
     [
         ({"amplitude": 1.0, "scale": 1.0}, "amplitude, scale: must not both be given"),
         ({"amplitude": -1.0}, "amplitude = -1: must be a finite number >= 0"),
-        ({"frequency": 1.0}, "frequency: not allowed with a Record, which takes amplitude, scale, time_scale"),
+        (
+            {"frequency": 1.0},
+            "frequency: not allowed with a Record, which takes amplitude, scale, pgv, arias_intensity",
+        ),
         ({"displacement_amplitude": 1.0}, "displacement_amplitude: not allowed with a Record"),
         ({"structure_frequency": 1.0}, "structure_frequency: not allowed with a Record"),
         ({"solver": "step"}, "solver = Step(rule='trapezoid', steps_per_cycle=1024): not allowed with a Record"),

@@ -18,8 +18,10 @@ import xarray as xr
 from slipsweep import Step
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs, spec
-from slipsweep.runs import parts, solving, store
+from slipsweep.files.checksums import checksum
+from slipsweep.runs import parts, store
 from slipsweep.runs.jobs import sweep_job
+from slipsweep.runs.targets import onefile, splitfiles
 from tests.support import fault_rounds
 from tests.support.fault_rounds import SWEEP, run, stopped, values
 
@@ -33,14 +35,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 
 def solved_on_resume(path: Path, **options: Any) -> list[int]:
     """Go on with a run; return the numbers of the chunks that had to be solved."""
-    numbers = []
-
-    def solved(*arguments: object) -> object:
-        for item in solving.solve_here(*arguments):  # type: ignore[arg-type]
-            numbers.append(item[0])
-            yield item
-
-    run(path, resume=True, solved=solved, **options)
+    numbers: list[int] = []
+    run(path, resume=True, solved=fault_rounds.counting(numbers), **options)
     assert not path.with_name(f"{path.name}.parts").exists()
     return numbers
 
@@ -128,10 +124,9 @@ def files(path: Path) -> list[Path]:
 def test_a_journal_that_ends_anywhere_promises_its_whole_lines_only(tmp_path: Path) -> None:
     folder = parts.Folder(tmp_path / "a.nc")
     folder.path.mkdir()
-    manifest = parts.Manifest(parts.identity({"sweep file": SWEEP}, False), 4000, False, "now")
+    manifest = parts.Manifest(parts.identity({"sweep file": SWEEP}, {}), 4000, False, "now", {}, {})
     sums = {
-        number: parts.checksum({"a": np.arange(9.0) * number, "b": np.full((3, 2), number, np.int8)})
-        for number in (0, 7, 12)
+        number: checksum({"a": np.arange(9.0) * number, "b": np.full((3, 2), number, np.int8)}) for number in (0, 7, 12)
     }
     with parts.opened(tmp_path / "a.nc") as work:
         work.clear()
@@ -149,14 +144,14 @@ def test_a_journal_that_ends_anywhere_promises_its_whole_lines_only(tmp_path: Pa
 
 def test_every_changed_bit_changes_the_checksum() -> None:
     arrays: dict[str, np.ndarray] = {"a": np.linspace(0, 1, 40), "b": np.arange(40, dtype=np.int16)}
-    expected = parts.checksum(arrays)
+    expected = checksum(arrays)
     for name, array in arrays.items():
         for at in range(8 * array.nbytes):
             content = bytearray(array.tobytes())
             content[at // 8] ^= 1 << at % 8
-            assert parts.checksum(arrays | {name: np.frombuffer(content, array.dtype)}) != expected
-    assert parts.checksum({"b": arrays["b"], "a": arrays["a"]}) != expected
-    assert parts.checksum({"a": arrays["a"].view(np.int64), "b": arrays["b"]}) != expected
+            assert checksum(arrays | {name: np.frombuffer(content, array.dtype)}) != expected
+    assert checksum({"b": arrays["b"], "a": arrays["a"]}) != expected
+    assert checksum({"a": arrays["a"].view(np.int64), "b": arrays["b"]}) != expected
 
 
 def test_chunks_of_a_version_with_other_checksums_are_refused(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
@@ -189,13 +184,14 @@ def test_chunks_are_brought_to_the_disk_before_the_next(
         synced.append(path.name)
         sync(path)
 
-    for module in (store, parts):
+    for module in (onefile, splitfiles, parts):
         monkeypatch.setattr(module, "sync", noted)
     run(tmp_path / "b.nc", split=split)
     # each chunk, and after it the journal that tells of it
-    names = [name for name in synced if name == "journal" or name.endswith(".nc")]
+    names = [name for name in synced if name == "journal" or name.endswith((".nc", ".tmp"))]
+    names = [name for name in names if name != "manifest.json.tmp" and name != "journal.tmp"]
     if split:
-        assert [name for name in names if name != "journal"] == [f"chunk-{number:06}.nc" for number in range(60)]
+        assert [name for name in names if name != "journal"] == [f"chunk-{number:06}.tmp" for number in range(60)]
         assert names.count("journal") >= 60
     else:
         assert names[:121] == ["data.nc", *60 * ["data.nc", "journal"]]
@@ -294,6 +290,7 @@ OFTEN = (
     fault_rounds.full_file_system,
     fault_rounds.revoked_rights,
     fault_rounds.damaged,
+    fault_rounds.damaged_store,
     fault_rounds.competitor,
 )
 STANDS_IN: dict[fault_rounds.Fault, fault_rounds.Fault] = {
@@ -312,7 +309,8 @@ def test_a_fault_is_survived(folder: Path, undisturbed: dict[str, bytes], fault:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", fault_rounds.FAULTS)
 def test_many_faults_are_survived(folder: Path, undisturbed: dict[str, bytes], name: str) -> None:
-    count = 100 if fault_rounds.FAULTS[name] is fault_rounds.damaged else 10
+    cheap = (fault_rounds.damaged, fault_rounds.damaged_store)
+    count = 100 if fault_rounds.FAULTS[name] in cheap else 10
     print(f"{one_round(name, folder, undisturbed, count)} times {name}: all survived")
 
 
@@ -321,15 +319,15 @@ def test_a_disk_that_fills_up_keeps_the_finished_chunks(
 ) -> None:
     import errno
 
-    write = store._OneFile.write
+    write = onefile.OneFile.write
 
-    def full(self: store._OneFile, number: int, *arguments: object) -> object:
+    def full(self: onefile.OneFile, number: int, *arguments: Any) -> str:
         if number == 20:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return write(self, number, *arguments)  # type: ignore[arg-type]
+        return write(self, number, *arguments)
 
     with monkeypatch.context() as patched:
-        patched.setattr(store._OneFile, "write", full)
+        patched.setattr(onefile.OneFile, "write", full)
         with pytest.raises(RunError, match=r"No space left on device; is the disk full\?") as caught:
             run(tmp_path / "a.nc")
     assert caught.value.__notes__ == ["20 of 60 chunks are kept; go on with --resume"]

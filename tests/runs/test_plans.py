@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import Record, Step
+from slipsweep import Pair, Record, Step, Suite
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
@@ -23,8 +23,9 @@ from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import chunk_lengths, grid_chunks, places
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import Job, limit_job, sweep_job
-from tests.support.processes import TIMEOUT
-from tests.support.processes import slipsweep as command
+from slipsweep.runs.stored import stored_table
+from tests.support.commands import command as run
+from tests.support.processes import TIMEOUT, slipsweep
 
 AXES = """
 [axes.amplitude]
@@ -46,8 +47,8 @@ STRONG = "[axes.amplitude]\nvalues = [1, 2, 4, 7, 11]\n"
 
 #: Rows after the frequency: what a chunk of some of them gives lies in many places of the file.
 CASES = "".join(
-    f'[[cases]]\nlabel = "no. {i}"\ntheta = {2 * i}\nmu_s = {0.3 + 0.05 * i}\nstructure_frequency = 2\n'
-    for i in range(7)
+    f'[[cases]]\nlabel = "no. {i}"\ntheta = {3 * i}\nmu_s = {0.3 + 0.075 * i:.3f}\nstructure_frequency = 2\n'
+    for i in range(5)
 )
 
 DRAWN = """
@@ -64,6 +65,10 @@ distribution = "lognorm"
 s = 0.1
 """
 
+#: Two inputs are one, as they are correlated; few enough samples that some rows have no variance.
+SENSITIVE = DRAWN.replace("samples = 32", "samples = 16\nsensitivity = true")
+SENSITIVE += '[uncertainty.mu_s]\nkind = "factor"\ndistribution = "lognorm"\ns = 0.05\n'
+
 #: The frequency decides on the amplitude, and on the samples with it.
 BY_DISPLACEMENT = AXES.replace("[1, 2, 4", "[0.1, 1, 4") + CASES + DRAWN
 BY_DISPLACEMENT = BY_DISPLACEMENT.replace("amplitude", "displacement_amplitude")
@@ -75,10 +80,21 @@ VARIABLES = '[output]\nvariables = ["permanent_displacement", "sliding_mode", "v
 
 BLOCKS = CASES.replace("structure_frequency = 2\n", "")
 
+#: Of each block there is a case for each motion and strength.
+FEW_BLOCKS = BLOCKS.partition('[[cases]]\nlabel = "no. 2"')[0]
 
-def recorded(text: str, record: Record = SHORT) -> spec.SweepSpec:
-    """A sweep of the recorded motion."""
-    return spec.parse(RECORD + text, "a.toml", record=record)
+
+#: Motions of different lengths, and pairs of components.
+SUITE = Suite((SHORT, Record.sampled(SHORT.acceleration[:25] * 1.5, 0.03, "other.csv")))
+PAIRS = Suite((Pair(SHORT, Record.sampled(SHORT.acceleration[::-1], 0.05)), Pair(SHORT, SHORT)), ("a", "b"))
+AZIMUTHS = "[axes.azimuth]\nvalues = [0, 20, 90]\n"
+STRENGTHS = "[axes.pgv]\nvalues = [0.1, 0.2, 0.4, 0.7, 1.1]\n"
+
+
+def recorded(text: str, record: Record | Suite = SHORT) -> spec.SweepSpec:
+    """A sweep of the recorded motion, or of a suite."""
+    key = "records" if isinstance(record, Suite) else "record"
+    return spec.parse(RECORD.replace("record", key) + text, "a.toml", recorded=record)
 
 
 PLANS: dict[str, Callable[[], Job]] = {
@@ -88,11 +104,30 @@ PLANS: dict[str, Callable[[], Job]] = {
         spec.parse(BY_DISPLACEMENT.replace("structure_frequency = 2\n", ""), "a.toml")
     ),
     "single samples": lambda: sweep_job(spec.parse(SINGLE, "a.toml")),
+    "sensitivity": lambda: sweep_job(spec.parse(AXES + BLOCKS + SENSITIVE, "a.toml")),
+    "sensitivity by displacement": lambda: sweep_job(
+        spec.parse(
+            (AXES.replace("[1, 2, 4", "[0.1, 1, 4") + BLOCKS + SENSITIVE).replace(
+                "amplitude", "displacement_amplitude"
+            ),
+            "a.toml",
+        )
+    ),
+    "sensitivity of a record": lambda: sweep_job(recorded(STRONG + BLOCKS + SENSITIVE)),
     "limits": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), [0.001, 0.01, 0.1, 1.0]),
     "one limit": lambda: limit_job(spec.parse(AXES + CASES, "a.toml"), 0.02, 8.0),
     "record": lambda: sweep_job(recorded(STRONG + BLOCKS)),
     "samples of a record": lambda: sweep_job(recorded(STRONG + BLOCKS + DRAWN)),
     "limits of a record": lambda: limit_job(recorded(BLOCKS), [0.001, 0.1]),
+    "suite": lambda: sweep_job(recorded(STRENGTHS + FEW_BLOCKS, SUITE)),
+    "pairs": lambda: sweep_job(recorded(STRONG + AZIMUTHS + FEW_BLOCKS, PAIRS)),
+    "samples of a suite": lambda: sweep_job(
+        recorded(STRENGTHS + FEW_BLOCKS + DRAWN.replace("amplitude", "pgv"), SUITE)
+    ),
+    "sensitivity of a suite": lambda: sweep_job(
+        recorded(STRENGTHS + FEW_BLOCKS + SENSITIVE.replace("amplitude", "pgv"), SUITE)
+    ),
+    "limits of a suite": lambda: limit_job(recorded(FEW_BLOCKS, SUITE), [0.001, 0.1]),
 }
 
 
@@ -157,7 +192,7 @@ def test_chunks_and_folders_give_what_one_piece_gives(tmp_path: Path, name: str,
     assert split.tally == one.tally
     whole = job.plan.solve()
     for path in (tmp_path / "chunks.nc", tmp_path / "split"):
-        table = store.stored_table(job.plan, path, cells, job.plan.names)
+        table = stored_table(job.plan, path, cells, job.plan.names)
         assert_part(job.plan, {}, table, whole)
 
 
@@ -205,7 +240,7 @@ def test_what_is_complete_stays_as_it_is(tmp_path: Path, name: str, split: bool)
     assert (again.found, again.tally, first.found) == (True, first.tally, False)
     assert [(file.read_bytes(), file.stat().st_mtime_ns) for file in files] == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
-    table = store.stored_table(job.plan, path, again.chunk_cells, job.plan.names)
+    table = stored_table(job.plan, path, again.chunk_cells, job.plan.names)
     assert_part(job.plan, {}, table, job.plan.solve())
 
 
@@ -236,7 +271,7 @@ def test_what_is_complete_but_of_another_sweep_is_refused(tmp_path: Path) -> Non
     ):
         with pytest.raises(InputError, match=f"{name}: exists already, and is not the complete result.*{message}"):
             store.run(job, tmp_path / name, command="x", resume=True, solved=unsolved)
-    with pytest.raises(InputError, match="it has 29 files of 30"):
+    with pytest.raises(InputError, match="it has 14 files of 15"):
         store.run(sweep_job(sweep), tmp_path / "split", command="x", resume=True, split=True, solved=unsolved)
     assert {path: path.read_bytes() for path in tmp_path.glob("*.nc")} == before
     # without --resume nothing is looked at
@@ -308,16 +343,39 @@ num = 10
 values = [0.5, 1, 2]
 """
 
+MOTIONS = f"""
+[excitation]
+records = "{(Path(__file__).parents[2] / "sweeps" / "data" / "suite").as_posix()}"
+polarity = "both"
+[axes.theta]
+values = [0, 4, 8, 12, 16, 20]
+[axes.mu_s]
+start = 0.3
+stop = 0.9
+num = 10
+[axes.pgv]
+start = 0.1
+stop = 2.0
+num = 8
+"""
+
 COMMANDS = {
-    "samples": (LARGE + DRAWN, ("run", "a.toml"), 400),
+    "suite": (MOTIONS, ("run", "a.toml"), 30_000),
+    "samples": (LARGE + DRAWN, ("run", "a.toml"), 4_000),
     "limits": (LARGE, ("limit", "a.toml", "-d", "1cm", "-d", "10cm"), 20_000),
 }
 
-#: A command with chunks of so many cells of the cycle solver.
+#: A command with chunks of so many cells of the cycle solver, and time between them to be killed in.
 SMALL = """
-import sys
+import sys, time
 from slipsweep.grid import chunks
+from slipsweep.runs.parts import Folder
 chunks.CHUNK_CELLS = int(sys.argv[1])
+add = Folder.add
+def add_slowly(*arguments):
+    add(*arguments)
+    time.sleep(0.05)
+Folder.add = add_slowly
 from slipsweep.cli import main
 sys.exit(main(sys.argv[2:]))
 """
@@ -328,7 +386,7 @@ sys.exit(main(sys.argv[2:]))
 def test_a_killed_command_goes_on_to_the_same_bits(tmp_path: Path, name: str) -> None:
     text, arguments, cells = COMMANDS[name]
     (tmp_path / "a.toml").write_text(text)
-    expected = command(tmp_path, *arguments, "-o", "whole.nc")
+    expected = run(tmp_path, *arguments, "-o", "whole.nc")
     assert (expected.returncode, expected.stderr) == (0, "")
     journal = tmp_path / "a.nc.parts" / "journal"
     small = [sys.executable, "-c", SMALL, str(cells), *arguments, "-o", "a.nc"]
@@ -339,10 +397,10 @@ def test_a_killed_command_goes_on_to_the_same_bits(tmp_path: Path, name: str) ->
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
-    refused = command(tmp_path, *arguments, "-o", "a.nc")
+    refused = run(tmp_path, *arguments, "-o", "a.nc")
     assert (refused.returncode, "go on with --resume" in refused.stderr) == (2, True)
     # what is left is done by others
-    done = command(tmp_path, *arguments, "-o", "a.nc", "--resume", "--workers", "2")
+    done = slipsweep(tmp_path, *arguments, "-o", "a.nc", "--resume", "--workers", "2")
     assert (done.returncode, done.stderr) == (0, "")
     assert stored(tmp_path / "a.nc") == stored(tmp_path / "whole.nc")
     assert not journal.parent.exists()
@@ -436,6 +494,6 @@ def test_extreme_numbers_that_are_served_are_written(tmp_path: Path) -> None:
     job = sweep_job(spec.parse(text, "a.toml"))
     assert not job.plan.is_ordinary
     store.run(job, tmp_path / "a.nc", command="x")
-    assert_part(job.plan, {}, store.stored_table(job.plan, tmp_path / "a.nc", 1000, job.plan.names), job.plan.solve())
+    assert_part(job.plan, {}, stored_table(job.plan, tmp_path / "a.nc", 1000, job.plan.names), job.plan.solve())
     for ordinary in PLANS.values():
         assert ordinary().plan.is_ordinary

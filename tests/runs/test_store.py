@@ -25,6 +25,7 @@ from slipsweep.grid.tables import Table, Variable
 from slipsweep.model import variables
 from slipsweep.runs import placed, solving, store
 from slipsweep.runs.jobs import sweep_job
+from slipsweep.runs.targets import onefile
 
 GRID = """
 # θ in degrees
@@ -450,14 +451,14 @@ def test_a_failed_run_leaves_nothing_but_finished_chunks(
     path = tmp_path / "a.nc"
     if existing:
         path.write_text("an earlier result")
-    write = store._OneFile.write
+    write = onefile.OneFile.write
 
-    def failing(self: store._OneFile, number: int, *arguments: Any) -> Any:
+    def failing(self: onefile.OneFile, number: int, *arguments: Any) -> Any:
         if number == last:
             raise type(raised)(*raised.args)
         return write(self, number, *arguments)
 
-    monkeypatch.setattr(store._OneFile, "write", failing)
+    monkeypatch.setattr(onefile.OneFile, "write", failing)
     for last, left in ((0, set()), (2, {"a.nc.parts"})):
         with pytest.raises(seen, match=message) as caught:
             run(GRID, path, chunk_cells=300, overwrite=True)

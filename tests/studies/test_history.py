@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 from slipsweep import Cosine, Harmonics, Sine
 from slipsweep.errors import InputError
-from tests.support.processes import slipsweep as command
+from tests.support.commands import command
 
 #: Shaking that leaves Newmark's block with a velocity.
 SHAKEN: dict[str, Any] = {

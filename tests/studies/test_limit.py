@@ -17,7 +17,7 @@ from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 from slipsweep.studies.limits import plan_limits
 from tests.support.cases import choices
-from tests.support.processes import slipsweep as command
+from tests.support.commands import command
 
 OPTIONS: list[dict[str, Any]] = [
     {},

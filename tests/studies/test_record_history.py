@@ -10,7 +10,7 @@ import xarray as xr
 import slipsweep
 from slipsweep import InputError, Mendez, Record, Triangle, read_record, simulate, sweep
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, HISTORY
-from tests.support.processes import slipsweep as command
+from tests.support.commands import command
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 

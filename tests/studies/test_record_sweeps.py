@@ -2,9 +2,6 @@
 
 import hashlib
 import importlib.util
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +18,7 @@ from slipsweep.grid.tables import Table
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import sweep_job
+from tests.support.commands import command
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 
@@ -67,12 +65,6 @@ def assert_same_data(one: Path, other: Path) -> None:
     assert list(first) == list(second)
     for name, values in first.items():
         np.testing.assert_array_equal(values, second[name], err_msg=name)
-
-
-def command(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "slipsweep", *map(str, arguments)], capture_output=True, text=True, env=os.environ
-    )
 
 
 # ---------------------------------------------------------------------------- what is written
@@ -291,10 +283,10 @@ def test_a_grid_too_large_for_memory_is_refused() -> None:
 
 def test_other_commands_on_the_result(folder: Path) -> None:
     """`info`, `export` and `limit` know it; charts and pages say that they are of harmonic motions."""
-    done = command("run", folder / "a.toml", "-o", folder / "a.nc")
+    done = command(folder, "run", folder / "a.toml", "-o", folder / "a.nc")
     assert done.returncode == 0, done.stderr
     assert "96 cells (3 theta x 2 mu_s x 4 scale x 2 time_scale x 2 polarity)" in done.stdout
-    told = command("info", folder / "a.nc").stdout
+    told = command(folder, "info", folder / "a.nc").stdout
     assert "number of slips that begin at rest (int32)" in told
     assert "recorded acceleration of the plane" in told
     assert "statically_unstable" in told
@@ -304,10 +296,11 @@ def test_other_commands_on_the_result(folder: Path) -> None:
     assert first.startswith("0.0,0.3,0.5,1.0,1,")
     assert export.export(folder / "a.nc", folder / "samples.csv", variables=["record_acceleration"]) == 500
     for arguments, message in (
-        (("chart", folder / "a.nc"), "is the response to a recorded motion"),
+        (("chart", folder / "a.nc"), "is the response to recorded motions; charts and pages"),
+        (("explore", folder / "a.nc"), "is the response to recorded motions; charts and pages"),
         (("run", folder / "a.toml", "-o", folder / "b.nc", "--solver", "step"), "--solver step: not allowed"),
     ):
-        done = command(*arguments)
+        done = command(folder, *arguments)
         assert (done.returncode, done.stdout) == (2, "")
         assert message in done.stderr
         assert done.stderr.count("\n") == 1

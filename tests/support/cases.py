@@ -132,7 +132,7 @@ def groups(cases: Iterable[Case]) -> list[list[Case]]:
 
 def solve(cases: Sequence[Case], **options: Any) -> dict[int, tuple[float, float, int, int]]:
     """Displacement, peak velocity, mode and validity of each case, by its number; few calls of `sweep`."""
-    found = {}
+    found: dict[int, tuple[float, float, int, int]] = {}
     for group in groups(cases):
         columns: dict[str, Any] = {
             name: xr.DataArray([getattr(case, name) for case in group], dims="case") for name in PARAMETERS
@@ -152,12 +152,7 @@ def solve(cases: Sequence[Case], **options: Any) -> dict[int, tuple[float, float
                 **options,
             ),
         )
-        for i, case in enumerate(group):
-            cell = result.isel(case=i)
-            found[case.case] = (
-                float(cell.permanent_displacement),
-                float(cell.peak_relative_velocity),
-                int(cell.sliding_mode),
-                int(cell.validity),
-            )
+        names = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
+        rows = zip(*(result[name].values.tolist() for name in names), strict=True)
+        found |= {case.case: row for case, row in zip(group, rows, strict=True)}
     return found

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,14 +20,21 @@ class Ended(NamedTuple):
     errors: str
 
 
-def run_command(*arguments: object) -> Ended:
-    """Run a command to its end."""
+def run_command(*arguments: object, encoding: str = "utf-8") -> Ended:
+    """Run a command to its end; `encoding` is that of what it prints."""
     written = [io.BytesIO(), io.BytesIO()]
-    streams = [io.TextIOWrapper(one, "utf-8", errors="surrogateescape", write_through=True) for one in written]
+    streams = [io.TextIOWrapper(one, encoding, errors="surrogateescape", write_through=True) for one in written]
     with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
         status = main([str(argument) for argument in arguments])
     output, errors = (one.getvalue().decode(errors="surrogateescape") for one in written)
     return Ended(status, output, errors)
+
+
+def command(folder: Path, *arguments: object, encoding: str = "utf-8") -> "subprocess.CompletedProcess[str]":
+    """Run a command to its end in `folder`: what `processes.slipsweep` does, without a second of start-up."""
+    with working_folder(folder):
+        ended = run_command(*arguments, encoding=encoding)
+    return subprocess.CompletedProcess([*map(str, arguments)], ended.status, ended.output, ended.errors)
 
 
 def one_line(message: str, most: int = 700) -> str:

@@ -26,6 +26,7 @@ import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.files import spec
+from slipsweep.files.contents import RUN
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import sweep_job
 
@@ -66,11 +67,22 @@ class Asked:
     """A command, the sweep file that it reads, and the work of its chunks, in cells of the cycle solver."""
 
     text: str = SWEEP
-    command: tuple[str, ...] = ("run", "a.toml", "-q")
+    command: tuple[str, ...] = ("run", "a.toml", "-q", "-o", "a.nc")
     work: int | None = None
+
+    @property
+    def output(self) -> str:
+        """The result's name."""
+        return self.command[-1]
+
+    @property
+    def journal(self) -> str:
+        """Where its finished chunks are on record."""
+        return f"{self.output}.parts/journal"
 
 
 SWEEPING = Asked()
+STORING = Asked(command=("run", "a.toml", "-q", "-o", "a.zarr"))
 SAMPLES = Asked(DRAWN, work=2000)
 LIMITS = Asked(command=("limit", "a.toml", "-q", "-d", "1cm", "-d", "10cm", "-o", "a.nc"), work=40_000)
 
@@ -107,7 +119,9 @@ def run(path: Path, text: str = SWEEP, **options: Any) -> store.Report:
 
 
 def values(path: Path) -> Values:
-    """All variables of a file, bit for bit, and all attributes but its history."""
+    """All variables of a file or a store, bit for bit, and all attributes but its history."""
+    if path.is_dir():
+        return store_values(path)
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
         found = {name: np.asarray(variable[...]).tobytes() for name, variable in file.variables.items()}
@@ -115,11 +129,25 @@ def values(path: Path) -> Values:
         for owner, described in owners:
             found |= {f"{owner}@{name}": repr(described.getncattr(name)).encode() for name in described.ncattrs()}
         assert found.pop("@history").endswith(b"'"), "a history that cannot be read"
+        del found[f"@{RUN}"]  # tells how the run was cut into chunks
         return found
 
 
-def stopped(path: Path, after: int = 30, **options: Any) -> Path:
-    """Stop a run in this process after some chunks; return its work folder."""
+def store_values(path: Path) -> Values:
+    """The same of a store, as another program reads it."""
+    import zarr
+
+    group = zarr.open_group(path, mode="r")
+    found = {name: np.asarray(array[...]).tobytes() for name, array in group.arrays()}
+    owners: list[tuple[str, Any]] = [("", group), *group.arrays()]
+    for owner, described in owners:
+        found |= {f"{owner}@{name}": repr(value).encode() for name, value in described.attrs.asdict().items()}
+    del found["@history"], found[f"@{RUN}"]
+    return found
+
+
+def stopping(after: int) -> solving.Solved:
+    """What solves some chunks and then stops the run."""
 
     def solved(*arguments: Any) -> Iterator[Any]:
         for count, item in enumerate(solving.solve_here(*arguments)):
@@ -127,8 +155,24 @@ def stopped(path: Path, after: int = 30, **options: Any) -> Path:
                 raise Stop
             yield item
 
+    return solved
+
+
+def counting(numbers: list[int]) -> solving.Solved:
+    """What solves chunks and notes their numbers."""
+
+    def solved(*arguments: Any) -> Iterator[Any]:
+        for item in solving.solve_here(*arguments):
+            numbers.append(item[0])
+            yield item
+
+    return solved
+
+
+def stopped(path: Path, after: int = 30, **options: Any) -> Path:
+    """Stop a run in this process after some chunks; return its work folder."""
     try:
-        run(path, solved=solved, **options)
+        run(path, solved=stopping(after), **options)
     except Stop as caught:
         notes = caught.__notes__
     else:
@@ -163,9 +207,9 @@ def wait_for(process: "subprocess.Popen[str]", happened: Callable[[], bool]) -> 
         time.sleep(0.002)
 
 
-def wait_for_chunk(process: "subprocess.Popen[str]", folder: Path, chunks: int = 1) -> None:
+def wait_for_chunk(process: "subprocess.Popen[str]", folder: Path, chunks: int = 1, asked: Asked = SWEEPING) -> None:
     """Wait until a run that is not resumed has some chunks on record."""
-    journal = folder / "a.nc.parts" / "journal"
+    journal = folder / asked.journal
     wait_for(process, lambda: journal.exists() and journal.read_text().count("\n") >= chunks)
 
 
@@ -184,8 +228,8 @@ def go_on(folder: Path, expected: Values, *options: str, asked: Asked = SWEEPING
     status, errors = ended(start(folder, "--resume", *options, asked=asked))
     # also where the run before was killed when all was done
     assert status == 0, errors
-    assert values(folder / "a.nc") == expected
-    assert {entry.name for entry in folder.iterdir()} == {"a.toml", "a.nc"}
+    assert values(folder / asked.output) == expected
+    assert {entry.name for entry in folder.iterdir()} == {"a.toml", asked.output}
 
 
 # ------------------------------------------------------------------------------------- killed
@@ -195,7 +239,7 @@ def signalled(
     folder: Path, rng: random.Random, expected: Values, number: signal.Signals, *options: str, asked: Asked = SWEEPING
 ) -> int:
     """End runs at random moments, three times in a row."""
-    journal = folder / "a.nc.parts" / "journal"
+    journal = folder / asked.journal
     faults = 0
     for _ in range(3):
         before = journal.stat().st_mtime_ns if journal.exists() else None
@@ -214,7 +258,7 @@ def signalled(
         assert status in (0, 2, -number, 128 + number), errors
         if status == 0:
             break
-        if errors == "" and (folder / "a.nc").exists() and not journal.parent.exists():
+        if errors == "" and (folder / asked.output).exists() and not journal.parent.exists():
             break  # it came when all was done, and Python was ending
         faults += 1
         if number != signal.SIGKILL:
@@ -238,7 +282,7 @@ def whole(asked: Asked) -> Values:
     """What a command gives that nothing happens to."""
     with tempfile.TemporaryDirectory() as folder:
         assert ended(start(Path(folder), asked=replace(asked, work=10**9))) == (0, "")
-        return values(Path(folder) / "a.nc")
+        return values(Path(folder) / asked.output)
 
 
 def samples_killed(folder: Path, rng: random.Random, expected: Values) -> int:
@@ -249,6 +293,16 @@ def samples_killed(folder: Path, rng: random.Random, expected: Values) -> int:
 def limits_killed(folder: Path, rng: random.Random, expected: Values) -> int:
     """Kill −9 at random moments, of limit amplitudes."""
     return signalled(folder, rng, whole(LIMITS), signal.SIGKILL, asked=LIMITS)
+
+
+def store_killed(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Kill −9 at random moments, of a Zarr store."""
+    return signalled(folder, rng, whole(STORING), signal.SIGKILL, asked=STORING)
+
+
+def store_interrupted(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Ctrl-C or SIGTERM at random moments, of a Zarr store."""
+    return signalled(folder, rng, whole(STORING), rng.choice([signal.SIGINT, signal.SIGTERM]), asked=STORING)
 
 
 def children(pid: int) -> list[int]:
@@ -264,23 +318,23 @@ def children(pid: int) -> list[int]:
     return found
 
 
-def worker_killed(folder: Path, rng: random.Random, expected: Values) -> int:
+def worker_killed(folder: Path, rng: random.Random, expected: Values, asked: Asked = SWEEPING) -> int:
     """Kill −9 of a worker of --workers 2: the run goes on."""
-    process = start(folder, "--workers", "2")
-    wait_for_chunk(process, folder, rng.randrange(1, 100))
+    process = start(folder, "--workers", "2", asked=asked)
+    wait_for_chunk(process, folder, rng.randrange(1, 100), asked)
     workers = children(process.pid)
     if process.poll() is None and workers:
         os.kill(rng.choice(workers), signal.SIGKILL)
     status, errors = ended(process)
     assert (status, errors) == (0, "")
-    assert values(folder / "a.nc") == expected
+    assert values(folder / asked.output) == expected
     return min(1, len(workers))
 
 
-def killed_with_workers(folder: Path, rng: random.Random, expected: Values) -> int:
+def killed_with_workers(folder: Path, rng: random.Random, expected: Values, asked: Asked = SWEEPING) -> int:
     """Kill −9 of a run with --workers 2: no worker is left, and the run can be gone on with."""
-    process = start(folder, "--workers", "2")
-    wait_for_chunk(process, folder, rng.randrange(1, 300))
+    process = start(folder, "--workers", "2", asked=asked)
+    wait_for_chunk(process, folder, rng.randrange(1, 300), asked)
     workers = children(process.pid)
     process.kill()
     process.communicate(timeout=PATIENCE)
@@ -288,8 +342,18 @@ def killed_with_workers(folder: Path, rng: random.Random, expected: Values) -> i
     while any(Path(f"/proc/{worker}/cmdline").exists() and _alive(worker) for worker in workers):
         assert time.monotonic() < end, "workers outlive the run"
         time.sleep(0.05)
-    go_on(folder, expected)
+    go_on(folder, expected, asked=asked)
     return 1
+
+
+def store_worker_killed(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Kill −9 of a worker that writes its chunks into a store itself."""
+    return worker_killed(folder, rng, whole(STORING), STORING)
+
+
+def store_killed_with_workers(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Kill −9 of a run whose workers write into a store."""
+    return killed_with_workers(folder, rng, whole(STORING), STORING)
 
 
 def _alive(pid: int) -> bool:
@@ -315,11 +379,11 @@ def small_file_system(folder: Path) -> Iterator[Path]:
         place.rmdir()
 
 
-def full_file_system(folder: Path, rng: random.Random, expected: Values) -> int:
+def full_file_system(folder: Path, rng: random.Random, expected: Values, asked: Asked = SWEEPING) -> int:
     """A file system that is full in the middle of a run, still full on --resume, and then no longer."""
     with small_file_system(folder) as place:
-        process = start(place)
-        wait_for_chunk(process, place, rng.randrange(1, 200))
+        process = start(place, asked=asked)
+        wait_for_chunk(process, place, rng.randrange(1, 200), asked)
         with held(process):
             with (place / "ballast").open("wb", buffering=0) as ballast:
                 try:
@@ -327,16 +391,21 @@ def full_file_system(folder: Path, rng: random.Random, expected: Values) -> int:
                         ballast.write(bytes(4096))
                 except OSError:
                     pass
-            kept = (place / "a.nc.parts" / "journal").read_text().count("\n")
+            kept = (place / asked.journal).read_text().count("\n")
         status, errors = ended(process)
         assert (status, "chunks are kept; go on with --resume" in errors) == (1, True), errors
         assert "is the disk full?" in errors
-        status, errors = ended(start(place, "--resume"))
+        status, errors = ended(start(place, "--resume", asked=asked))
         assert status in (1, 2), errors
         (place / "ballast").unlink()
-        assert (place / "a.nc.parts" / "journal").read_text().count("\n") >= kept
-        go_on(place, expected)
+        assert (place / asked.journal).read_text().count("\n") >= kept
+        go_on(place, expected, asked=asked)
     return 2
+
+
+def full_store(folder: Path, rng: random.Random, expected: Values) -> int:
+    """The same of a Zarr store."""
+    return full_file_system(folder, rng, whole(STORING), STORING)
 
 
 def limited_file_size(folder: Path, rng: random.Random, expected: Values) -> int:
@@ -418,14 +487,8 @@ def revoked_rights(folder: Path, rng: random.Random, expected: Values) -> int:
 # ------------------------------------------------------------------------------------- damaged
 
 
-def damaged(folder: Path, rng: random.Random, expected: Values) -> int:
-    """Flipped bits, bytes overwritten, cut off, or files that are gone, in what a stopped run left."""
-    split = rng.random() < 0.4
-    path = folder / "a.nc"
-    parts = stopped(path, rng.randrange(1, 60), split=split)
-    data = parts / ("data" if split else "data.nc")
-    files = [*sorted(data.iterdir())] if split else [data] * 4
-    victim = rng.choice([*files, parts / "journal", parts / "manifest.json"])
+def spoil(victim: Path, rng: random.Random) -> None:
+    """Flip bits of a file, overwrite bytes, cut some off, or remove it."""
     content = bytearray(victim.read_bytes())
     kind = rng.choice(["flip", "overwrite", "cut", "remove"])
     if kind == "flip":
@@ -440,6 +503,17 @@ def damaged(folder: Path, rng: random.Random, expected: Values) -> int:
         victim.unlink()
     else:
         victim.write_bytes(content)
+
+
+def damaged(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Flipped bits, bytes overwritten, cut off, or files that are gone, in what a stopped run left."""
+    split = rng.random() < 0.4
+    path = folder / "a.nc"
+    parts = stopped(path, rng.randrange(1, 60), split=split)
+    data = parts / ("data" if split else "data.nc")
+    files = [*sorted(data.iterdir())] if split else [data] * 4
+    victim = rng.choice([*files, parts / "journal", parts / "manifest.json"])
+    spoil(victim, rng)
     refused = ""
     try:
         run(path, split=split, resume=True)
@@ -459,6 +533,25 @@ def damaged(folder: Path, rng: random.Random, expected: Values) -> int:
     return 1
 
 
+def damaged_store(folder: Path, rng: random.Random, expected: Values) -> int:
+    """Flipped bits, bytes overwritten, cut off, or objects that are gone, in what a stopped run left of a store."""
+    path = folder / "a.zarr"
+    parts = stopped(path, rng.randrange(1, 60))
+    objects = sorted(one for one in (parts / "data.zarr").rglob("*") if one.is_file())
+    spoil(rng.choice([*objects, parts / "journal", parts / "manifest.json"]), rng)
+    refused = ""
+    try:
+        run(path, resume=True)
+    except InputError as error:
+        refused = str(error)
+    if refused:
+        assert "manifest.json: damaged or missing" in refused
+        run(path, overwrite=True)
+    assert not parts.exists()
+    assert values(path) == whole(STORING)
+    return 1
+
+
 def joined(path: Path) -> Values:
     """The results in a folder of chunks, put together."""
     import xarray as xr
@@ -470,16 +563,21 @@ def joined(path: Path) -> Values:
 # ---------------------------------------------------------------------------------- competitors
 
 
-def competitor(folder: Path, rng: random.Random, expected: Values) -> int:
+def competitor(folder: Path, rng: random.Random, expected: Values, asked: Asked = SWEEPING) -> int:
     """A second run at one output, while the first is at some chunk."""
-    process = start(folder)
-    wait_for_chunk(process, folder, rng.randrange(1, 300))
+    process = start(folder, asked=asked)
+    wait_for_chunk(process, folder, rng.randrange(1, 300), asked)
     with held(process):
-        status, errors = ended(start(folder, *rng.choice([(), ("--resume",), ("--overwrite",)])))
+        status, errors = ended(start(folder, *rng.choice([(), ("--resume",), ("--overwrite",)]), asked=asked))
         assert (status, "another run is writing it" in errors) == (1, True), errors
     assert ended(process) == (0, "")
-    assert values(folder / "a.nc") == expected
+    assert values(folder / asked.output) == expected
     return 1
+
+
+def store_competitor(folder: Path, rng: random.Random, expected: Values) -> int:
+    """The same of a Zarr store."""
+    return competitor(folder, rng, whole(STORING), STORING)
 
 
 def rival(folder: Path, rng: random.Random, expected: Values) -> int:
@@ -508,6 +606,13 @@ FAULTS: dict[str, Fault] = {
     "writing fails beyond some byte (RLIMIT_FSIZE), likewise": limited_file_size,
     "rights revoked (folders, data, journal, manifest, lock)": revoked_rights,
     "bits flipped, bytes overwritten, cut off, files removed": damaged,
+    "Zarr store: killed (SIGKILL) at a random moment": store_killed,
+    "Zarr store: interrupted (SIGINT, SIGTERM)": store_interrupted,
+    "Zarr store: a worker that writes into it killed": store_worker_killed,
+    "Zarr store: a run whose workers write into it killed": store_killed_with_workers,
+    "Zarr store: file system full during the run and on `--resume`": full_store,
+    "Zarr store: objects damaged or removed": damaged_store,
+    "Zarr store: a second run at the same output": store_competitor,
     "a second run at the same output": competitor,
     "the output made by another program meanwhile": rival,
 }
@@ -518,9 +623,14 @@ def can_be_done(name: str) -> str:
     if os.name != "posix":
         return "signals, limits and rights the POSIX way"
     fault = FAULTS[name]
-    if fault is full_file_system and (sys.platform != "linux" or os.getuid() != 0 or not shutil.which("mount")):
+    if fault in (full_file_system, full_store) and (
+        sys.platform != "linux" or os.getuid() != 0 or not shutil.which("mount")
+    ):
         return "only root mounts a small file system, on Linux"
-    if fault in (worker_killed, killed_with_workers) and not Path("/proc/self/stat").exists():
+    if (
+        fault in (worker_killed, killed_with_workers, store_worker_killed, store_killed_with_workers)
+        and not Path("/proc/self/stat").exists()
+    ):
         return "finds the workers in /proc"
     if fault is revoked_rights and os.getuid() == 0:
         if sys.platform != "linux":

@@ -110,6 +110,8 @@ odd = st.one_of(
 # ------------------------------------------------------------------------------- calls
 
 RECORD = slipsweep.Record(np.arange(5) / 10, np.array([0.0, 4.0, -4.0, 2.0, 0.0]))
+SUITE = slipsweep.Suite((RECORD, RECORD), ("a", "b"))
+PAIRS = slipsweep.Suite((slipsweep.Pair(RECORD, RECORD),))
 BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38}
 CELL: dict[str, Any] = {**BLOCK, "amplitude": 3.0, "frequency": 1.0}
 UNCERTAIN = {"mu_s": {"distribution": "lognorm", "s": 0.1, "kind": "factor"}}
@@ -120,6 +122,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "friction_parameters": (slipsweep.friction_parameters, {**BLOCK, "amplitude": 3.0}),
     "simulate": (slipsweep.simulate, {**CELL, "points_per_cycle": 8}),
     "sweep under a record": (slipsweep.sweep, {**BLOCK, "excitation": RECORD}),
+    "sweep under a suite": (slipsweep.sweep, {**BLOCK, "excitation": SUITE}),
+    "sweep under pairs": (slipsweep.sweep, {**BLOCK, "excitation": PAIRS, "azimuth": 30.0}),
     "limit_amplitude": (
         slipsweep.limit_amplitude,
         {"displacement": 0.1, **BLOCK, "frequency": 1.0, "amplitude_steps": 4},
@@ -133,6 +137,10 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Record.sampled": (slipsweep.Record.sampled, {"acceleration": [0.0, 1.0, -1.0], "interval": 0.1}),
     "Record.corrected": (RECORD.corrected, {"baseline": "mean"}),
     "read_record": (slipsweep.read_record, {"path": "none.csv"}),
+    "read_suite": (slipsweep.read_suite, {"paths": ["none.csv"]}),
+    "Suite": (slipsweep.Suite, {"motions": (RECORD,)}),
+    "Pair": (slipsweep.Pair, {"first": RECORD, "second": RECORD}),
+    "Pair.rotated": (PAIRS[0].rotated, {"azimuth": 30.0}),
     "flags": (slipsweep.flags, {"data": xr.DataArray(np.int16(3))}),
 }
 
@@ -143,8 +151,10 @@ WORDS = ("cannot be read", "record: ", "no bit mask", "the name of a result", "i
 _BESIDE: dict[str, dict[str, Any]] = {
     "displacement_amplitude": {"amplitude": None},
     **{
-        key: {"excitation": RECORD, "amplitude": None, "frequency": None} for key in ("scale", "time_scale", "polarity")
+        key: {"excitation": RECORD, "amplitude": None, "frequency": None}
+        for key in ("scale", "pgv", "arias_intensity", "time_scale", "polarity")
     },
+    "azimuth": {"excitation": PAIRS, "amplitude": None, "frequency": None},
 }
 
 
@@ -190,7 +200,8 @@ def is_served(call: Call) -> bool:
         except InputError as error:
             message = one_line(str(error), 500)
         else:
-            assert isinstance(found, (xr.Dataset, slipsweep.Record, Choice)), found
+            kinds = (xr.Dataset, slipsweep.Record, slipsweep.Pair, slipsweep.Suite, Choice)
+            assert isinstance(found, kinds), found
             return True
     assert any(name in message for name in (*call.arguments, *WORDS)), message
     return False

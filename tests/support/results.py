@@ -64,6 +64,7 @@ values = [2, 4, 6, 8]
 values = [1]
 [uncertainty]
 samples = 16
+sensitivity = true
 [uncertainty.mu_s]
 distribution = "norm"
 loc = 0.4

@@ -46,8 +46,8 @@ class SlipsweepAccessor:
         Parameters
         ----------
         kind : str
-            "contours", "modes", "families", "dimensionless", "newmark" or "spread"; of `sample` "fragility" or
-            "quantiles".
+            "contours", "modes", "families", "dimensionless", "newmark" or "spread"; of `sample` "fragility",
+            "quantiles" or "sensitivity".
         at : mapping of axis to value, optional
             Where to cut an axis: a number in its own unit, a text with another ("0.3g"), the label of a case;
             by default its middle.  Several values choose the curves or panels of an axis.

@@ -131,7 +131,7 @@ def alternatives(table: Table) -> dict[str, tuple[Model, dict[str, Any]]]:
     own = MODELS.from_attributes(table.attrs)
     ours = own if isinstance(own, Mendez) else Mendez(g=g)
     found: dict[str, tuple[Model, dict[str, Any]]] = {"Newmark": (Newmark(g=g), {})}
-    for recoupling, text in (("eq12", "Eq. 12"), ("integrate", "integration")):
+    for recoupling, text in (("eq12", "stop by Eq. 12"), ("integrate", "stop by integration")):
         model = ours.but(recoupling=recoupling)
         found[f"λ by Eq. 6, {text}"] = (model, {"decay_rate": None})
         for rate in MEASURED_DECAY:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
 from slipsweep.charts.maps import HATCHES
+from slipsweep.charts.sheet import LEFT_OUT
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import SYMBOLS, drawn_text, model_text, plain, unit
 from slipsweep.model.variables import FLAG_KINDS, PARAMETERS, REFERENCE, RESULTS, STATISTICS, VALIDITY_TEXT
@@ -30,7 +31,11 @@ def write(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
     attributes = result.attrs
-    hatched = [f"{(flag.name or '').lower()} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}" for flag in HATCHES]
+    hatched = [
+        f"{(flag.name or '').lower()} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}"
+        + ("; left out of contours and curves unless their caption says that it is drawn" if flag in LEFT_OUT else "")
+        for flag in HATCHES
+    ]
     sections: Mapping[str, list[str]] = {
         "Results": [f"{name}: {(RESULTS | STATISTICS)[name]['long_name']}" for name in result.variables],
         "Inputs": [*_inputs(result), *filter(None, [drawn_text(attributes)])],
@@ -48,7 +53,7 @@ def title_page(result: Result) -> Figure:
         ],
     }
     figure = Figure(figsize=(8.27, 11.69))
-    figure.text(0.08, 0.94, plain(textwrap.fill(str(attributes.get("title", "")), 60)), fontsize="xx-large", va="top")
+    figure.text(0.08, 0.94, plain(textwrap.fill(str(attributes.get("title", "")), 54)), fontsize="xx-large", va="top")
     lines = []
     for heading, texts in sections.items():
         lines += ["", heading.upper()]

@@ -1,6 +1,7 @@
 """Curves: a result over one axis of a slice, a curve for each value of another, or for each answer there is."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ _CAUTION: dict[str, Any] = {"color": "0.8", "linewidth": 7, "solid_capstyle": "b
 
 #: How the answers are drawn that an engineer has to choose from.
 _ANSWERS: dict[str, dict[str, Any]] = {
-    f"{decay}, {end}": {"color": colour, "markerfacecolor": face, "linestyle": dash, "marker": marker}
+    f"{decay}, stop by {end}": {"color": colour, "markerfacecolor": face, "linestyle": dash, "marker": marker}
     for end, colour, face in (("Eq. 12", BLUE, BLUE), ("integration", VERMILION, "white"))
     for decay, dash, marker in (
         ("λ by Eq. 6", (0, (7, 2)), "o"), ("λ = 2", (0, (3, 1.5)), "s"), ("λ = 3", (0, (7, 2, 1.5, 2)), "^"),
@@ -81,7 +82,7 @@ def families(sheet: Sheet, name: str) -> Figure:
             for ys, look in zip(panel.grid(newmark(panel.table)), looks, strict=True):
                 _draw_newmark(sheet, panel, (panel.values(panel.x), ys * factor), look)
         _mark_accelerations(sheet, panel)
-    sheet.note_left_out()
+    sheet.note_left_out(name)
     if name == _DISPLACEMENT:
         sheet.note_newmark()
     return sheet.finish("outside right upper")
@@ -104,7 +105,8 @@ def dimensionless(sheet: Sheet) -> Figure:
         {"marker": shape, "markersize": 5, "markerfacecolor": "none"} for shape in "ox+"[: frequencies.size - 1]
     ]
     for panel, curves in zip(sheet.panels, drawn, strict=True):
-        panel.axes.set(xscale="log", xlabel="A / Üy", ylabel="u ω² / A")
+        panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
+        panel.axes.set_ylabel("permanent displacement, u ω² / A")
         log_axis(panel.axes, beyond, _LEAST_SCALED)
         found = _on_limit(panel, _DISPLACEMENT)
         edges = dimensionless_curves(panel, found, _sides(panel)["amplitude"], SIDE) if found else {}
@@ -124,11 +126,12 @@ def dimensionless(sheet: Sheet) -> Figure:
                 every = max(1, xs.size // 12)
                 place = (number * every // frequencies.size, every)
                 panel.axes.plot(xs, ys, color=look["color"], linestyle="", markevery=place, **shape)
+        _underlay(sheet, panel, _DISPLACEMENT)
         log_ticks(panel.axes.xaxis, 10)
         panel.axes.set_xlim(left=1.0)
     for frequency, shape in zip(frequencies, [{"linestyle": "-"}, *shapes], strict=True) if shapes else ():
         sheet.legend[value_text("frequency", frequency)] = Line2D([], [], **{"color": "0.3", "linestyle": "", **shape})
-    sheet.note_left_out()
+    sheet.note_left_out(_DISPLACEMENT)
     sheet.note_newmark()
     return sheet.finish("outside right upper")
 
@@ -147,7 +150,8 @@ def spread(sheet: Sheet) -> Figure:
     for panel in sheet.panels:
         panel.lines = boundaries(panel.table, always=True)  # the others have a mode limit, whatever this one is
     flags: list[Variable] = []
-    answers = [_answers(panel, flags) for panel in sheet.panels]
+    own_text = _own_text(sheet.table)  # one for all panels: the caption has what differs
+    answers = [_answers(panel, own_text, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for _, ys in one.values()])
     check_positive(RESULTS[_DISPLACEMENT]["long_name"], values)
     for panel, curves in zip(sheet.panels, answers, strict=True):
@@ -167,7 +171,7 @@ def spread(sheet: Sheet) -> Figure:
             sheet.legend[text] = plot_curve(panel.axes, *_above_zero(curve), place, label=text, **look)
         _underlay(sheet, panel, _DISPLACEMENT, 1000.0)
         _mark_accelerations(sheet, panel)
-    sheet.note_left_out(*flags)
+    sheet.note_left_out(_DISPLACEMENT, *flags)
     sheet.notes.append("All answers have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
     return sheet.finish("outside right upper")
 
@@ -190,7 +194,7 @@ def dimensionless_curves(
     return {(i, j): (ratio[i, j], scaled[i, j]) for i in range(scaled.shape[0]) for j in range(scaled.shape[1])}
 
 
-def _answers(panel: Panel, flags: list[Variable]) -> dict[str, Curve]:
+def _answers(panel: Panel, own_text: str, flags: list[Variable]) -> dict[str, Curve]:
     """The curves of a spread, mm, all over the same abscissae, the result's own last; their validity to `flags`."""
     found = {}
     for text, (model, changed) in alternatives(panel.table).items():
@@ -199,7 +203,7 @@ def _answers(panel: Panel, flags: list[Variable]) -> dict[str, Curve]:
         drawn = reliable(solved, _DISPLACEMENT, panel.look)
         found[text] = _curves(panel, drawn, _on_limit(panel, _DISPLACEMENT, model, **changed))[0]
     own = _curves(panel, panel.result(_DISPLACEMENT), _on_limit(panel, _DISPLACEMENT))[0]
-    found[f"this result:\n{_own_text(panel.table)}"] = own
+    found[f"this result:\n{own_text}"] = own
     return {text: (xs, ys * 1000.0) for text, (xs, ys) in found.items()}
 
 
@@ -210,7 +214,7 @@ def _own_text(table: Table) -> str:
         return "Newmark"
     given = table.coords.get("decay_rate")
     decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.values.size == 1 else "λ as given"
-    return f"{decay}, {'Eq. 12' if model.options['recoupling'] == 'eq12' else 'integration'}"
+    return f"{decay}, stop by {'Eq. 12' if model.options['recoupling'] == 'eq12' else 'integration'}"
 
 
 # -------------------------------------------------------------------------- jumps and gaps
@@ -283,13 +287,19 @@ def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]
     sheet.remarks["Newmark (same dash)" if panel.y else "Newmark"] = Line2D([], [], **_NEWMARK)
 
 
-def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float) -> None:
-    """Put a broad grey line under what a caution is about."""
-    drawn = panel.grid(panel.result(name)) * factor
-    cautious = panel.grid(validity_has(panel.table["validity"], CAUTIONS)) & (drawn > 0)
-    for ys, where in zip(drawn, cautious, strict=True):
-        panel.axes.plot(panel.values(panel.x), np.where(where, ys, np.nan), gid="caution", **_CAUTION)
-    if cautious.any():
+def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> None:
+    """Put a broad grey line under what a caution is about: in units of `factor`, without one dimensionless."""
+    drawn = panel.result(name)
+    flagged = broadcast(validity_has(panel.table["validity"], CAUTIONS), panel.table, drawn.dims)
+    cautious = replace(drawn, values=np.where(flagged & (drawn.values > 0), drawn.values, np.nan))
+    if factor:
+        curves = [(panel.values(panel.x), ys * factor) for ys in panel.grid(cautious)]
+    else:
+        found = dimensionless_curves(panel, cautious)
+        curves = [curve for (_, frequency), curve in found.items() if frequency == 0]
+    for xs, ys in curves:
+        panel.axes.plot(xs, ys, gid="caution", **_CAUTION)
+    if np.isfinite(cautious.values).any():
         values = reliable(sheet.table.data_vars, name, sheet.look).values
         flags = np.bitwise_or.reduce(sheet.table["validity"].values[values > 0].astype(int))
         names = [(flag.name or "").lower() for flag in CAUTIONS & Validity(int(flags))]

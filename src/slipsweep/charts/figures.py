@@ -27,8 +27,9 @@ def history(table: Table) -> Figure:
         relative velocity, relative displacement; the parameters in a caption.
     """
     figure = Figure(figsize=(7.0, 7.0), layout="constrained")
-    accelerations, friction, velocity, displacement = figure.subplots(4, sharex=True)
-    values = {name: table[name].values for name in ("time", *HISTORY)}
+    values = {name: table[name].values for name in ("time", *HISTORY) if name in table}
+    panels = list(figure.subplots(len(values) - 2, sharex=True))  # both accelerations share one
+    accelerations, *_, velocity, displacement = panels
     time = values["time"]
 
     accelerations.plot(time, values["ground_acceleration"], color=BLUE, label="plane")
@@ -36,8 +37,9 @@ def history(table: Table) -> Figure:
     accelerations.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
     accelerations.set_ylabel("acceleration\n(m/s²)")
 
-    friction.plot(time, values["friction_coefficient"], color=VERMILION)
-    friction.set_ylabel("friction\ncoefficient")
+    if "friction_coefficient" in values:
+        panels[1].plot(time, values["friction_coefficient"], color=VERMILION)
+        panels[1].set_ylabel("friction\ncoefficient")
 
     velocity.plot(time, values["relative_velocity"], color=VERMILION)
     velocity.set_ylabel("relative\nvelocity (m/s)")
@@ -47,7 +49,7 @@ def history(table: Table) -> Figure:
     displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
     displacement.set_xlabel("time (s)")
 
-    for axes in (accelerations, friction, velocity, displacement):
+    for axes in panels:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         axes.margins(x=0)
         axes.grid(color="0.9")

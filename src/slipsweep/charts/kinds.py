@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from slipsweep.charts import curves, maps, uncertainty_figures
+from slipsweep.charts import curves, maps, sensitivity_figures, uncertainty_figures
 from slipsweep.charts.sheet import DRIVES, Sheet
 from slipsweep.charts.slices import Cut, Result
 from slipsweep.charts.style import Look
@@ -64,7 +64,9 @@ def check_kind(kind: str) -> str:
 
 def fitting(result: Result) -> tuple[str, ...]:
     """The kinds that a result's sort has."""
-    return STATISTIC_KINDS if "exceedance_probability" in result.variables else SWEEP_KINDS
+    if "exceedance_probability" not in result.variables:
+        return SWEEP_KINDS
+    return tuple(kind for kind in STATISTIC_KINDS if kind != "sensitivity" or "total_index" in result.variables)
 
 
 def draw(result: Result, kind: str, wish: Wish) -> Figure:
@@ -325,6 +327,22 @@ def _quantiles(result: Result, wish: Wish) -> Figure:
     return uncertainty_figures.quantile_bands(_sheet(result, wish, names, x, None, also=also))
 
 
+def _sensitivity(result: Result, wish: Wish) -> Figure:
+    if "total_index" not in result.variables:
+        raise InputError(f"{result.path}: holds no Sobol indices; sensitivity = true in [uncertainty] asks for them")
+    if wish.y is not None:
+        raise InputError(f"{result.path}: --y {wish.y}: not with sensitivity, whose inputs tell curves apart")
+    names = sensitivity_figures.NAMES
+    for name in names:
+        result.result(name)
+    keep: dict[str, slice | list[int]] = {"bound": slice(None)}
+    if wish.x is None and not _free(result, wish, result.dims("total_index")):
+        return sensitivity_figures.bars(_sheet(result, wish, names, "input", None, also=keep), result.inputs)
+    x, _ = _statistic_axes(result, wish, "total_index", None)
+    sheet = _sheet(result, wish, names, x, None, also={**keep, "input": slice(None)})
+    return sensitivity_figures.curves(sheet, result.inputs)
+
+
 KINDS: dict[str, Callable[[Result, Wish], Figure]] = {
     "contours": _contours,
     "modes": _modes,
@@ -334,8 +352,9 @@ KINDS: dict[str, Callable[[Result, Wish], Figure]] = {
     "spread": _spread,
     "fragility": _fragility,
     "quantiles": _quantiles,
+    "sensitivity": _sensitivity,
 }
 
 #: Those of a sweep, and of a sweep with uncertain inputs.
-STATISTIC_KINDS = ("fragility", "quantiles")
+STATISTIC_KINDS = ("fragility", "quantiles", "sensitivity")
 SWEEP_KINDS = tuple(kind for kind in KINDS if kind not in STATISTIC_KINDS)

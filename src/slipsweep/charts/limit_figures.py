@@ -77,8 +77,8 @@ def limit_chart(table: Table, labels: Sequence[str] = ()) -> Figure:
         title = ", ".join(_label(table, d, k, labels) for d, k in ((columns, at_column), (rows, at_row)) if d)
         panel.set_title(title, fontsize="medium")
         panel.grid(color="0.9", which="both")
-        if abscissa == "case":
-            panel.set_xticks(x, list(map(plain, labels)) or None)
+        if abscissa is not None and (abscissa == "case" or _names(table, abscissa, labels)):
+            panel.set_xticks(x, list(map(plain, _names(table, abscissa, labels))) or None)
         elif x.size > 1:
             set_scale(panel, "x", x)
         panel.set_xlabel(_axis_label(abscissa) if i == len(down) - 1 else "")
@@ -96,8 +96,17 @@ def _spread(size: int, most: int) -> list[int]:
 
 
 def _values(table: Table, dim: str, sizes: dict[str, int]) -> np.ndarray:
-    """Coordinates along a dimension; numbers from 1 where it has none (cases)."""
-    return table[dim].values if dim in table.coords else np.arange(1, sizes[dim] + 1)
+    """Coordinates along a dimension; numbers from 1 where it has none (cases), or labels (motions)."""
+    if dim in table.coords and table[dim].values.dtype.kind != "U":
+        return table[dim].values
+    return np.arange(1, sizes[dim] + 1)
+
+
+def _names(table: Table, dim: str, labels: Sequence[str]) -> Sequence[str]:
+    """What the places along a dimension are called, where that is no number."""
+    if dim == "case":
+        return labels
+    return table[dim].values.tolist() if dim in table.coords and table[dim].values.dtype.kind == "U" else ()
 
 
 def _text(name: str, value: float) -> str:
@@ -108,8 +117,8 @@ def _text(name: str, value: float) -> str:
 
 
 def _label(table: Table, name: str, index: int, labels: Sequence[str]) -> str:
-    if name == "case" and labels:
-        return f"case {plain(labels[index])}"
+    if names := _names(table, name, labels):
+        return f"{name} {plain(names[index])}"
     return _text(name, _values(table, name, table["limit_amplitude"].sizes)[index])
 
 

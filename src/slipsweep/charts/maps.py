@@ -45,7 +45,7 @@ RATIO_COLOURS = LinearSegmentedColormap.from_list("pale", mpl.colormaps["PuOr_r"
 MODES = {
     SlidingMode.STUCK: ("#EEF3F8", ""),
     SlidingMode.STICK_SLIP: ("#F2C56B", "//"),
-    SlidingMode.CONTINUOUS: ("#B07AA8", ".."),
+    SlidingMode.CONTINUOUS: ("#B07AA8", "\\\\"),
 }
 
 #: Hatching of the flags under which there is no value, and of cautions.  Notes have none.
@@ -112,7 +112,7 @@ def contours(sheet: Sheet, name: str) -> Figure:
     _colour_bar(sheet, areas, places, texts, RESULTS[name]["long_name"])
     if name == "permanent_displacement":
         sheet.note_newmark()
-    sheet.note_left_out()
+    sheet.note_left_out(name)
     return _finish(sheet)
 
 
@@ -161,7 +161,7 @@ def newmark_ratio(sheet: Sheet) -> Figure:
         areas = _fill(panel, quotient, at_limit, logarithms, colours, norm, texts) or areas
     _colour_bar(sheet, areas, places, texts, "displacement over that of Newmark's block")
     sheet.note_newmark()
-    sheet.note_left_out()
+    sheet.note_left_out(name)
     return _finish(sheet)
 
 

@@ -32,6 +32,12 @@ DRIVES = ("amplitude", "displacement_amplitude")
 #: Flags of values that are not to be relied on at all: left out unless asked for.
 LEFT_OUT = Validity.NOT_RECOUPLED | Validity.UPSLOPE
 
+#: What these flags say, in captions.
+_LEFT_OUT_TEXT = {
+    Validity.NOT_RECOUPLED: "not_recoupled (does not come to rest within the cycle)",
+    Validity.UPSLOPE: "upslope (ends above where it began)",
+}
+
 #: How the lines of yield and of the mode limit are drawn.
 LINES: dict[str, tuple[str, dict[str, Any]]] = {
     "yield_acceleration": ("yield", {"color": "black", "linestyle": "-", "linewidth": 1.6}),
@@ -189,16 +195,21 @@ class Sheet:
             if is_acceleration(name) and outer:
                 second_scale(panel.axes, side, g, self.look)
 
-    def note_left_out(self, *others: Variable) -> None:
-        """Say which values are left out, if any are: by the flags of the slice and by others."""
-        flags = [*others, *(self.table.data_vars[name] for name in ("validity",) if name in self.table.data_vars)]
-        names = [
-            (flag.name or "").lower()
-            for flag in LEFT_OUT
-            if any(validity_has(validity, flag).values.any() for validity in flags)
-        ]
-        if names and not self.look.show_cautions:
-            self.notes.append(f"Left out: values flagged {' or '.join(names)}.")
+    def note_left_out(self, name: str, *others: Variable) -> None:
+        """Say which values of a result are left out, and which are drawn on request: by the slice's flags and others.
+
+        No scale shows what is below zero: displacements upslope are left out in any case.
+        """
+        flags = [*others, *(self.table.data_vars[one] for one in ("validity",) if one in self.table.data_vars)]
+        raised = [flag for flag in LEFT_OUT if any(validity_has(one, flag).values.any() for one in flags)]
+        below_zero = Validity.UPSLOPE if name == "permanent_displacement" else Validity(0)
+        left_out = [flag for flag in raised if not self.look.show_cautions or flag in below_zero]
+        left_out_as = "Left out, below zero on a logarithmic scale" if self.look.show_cautions else "Left out"
+        drawn = [flag for flag in raised if flag not in left_out]
+        for heading, found in ((left_out_as, left_out), ("Drawn as asked", drawn)):
+            if found:
+                texts = " or ".join(_LEFT_OUT_TEXT[flag] for flag in found)
+                self.notes.append(f"{heading}: values flagged {texts}.")
 
     def note_newmark(self) -> None:
         """Say how the displacements drawn compare with those of Newmark's block."""
@@ -211,7 +222,7 @@ class Sheet:
             low, middle, high = np.quantile(ratio, (0.05, 0.5, 0.95))
             self.notes.append(
                 f"Displacement over that of Newmark's block with the same Üy: median {middle:.3g}, "
-                f"5 to 95 % of the cells {low:.3g} to {high:.3g}."
+                f"in 90 % of the cells {low:.3g} to {high:.3g}."
             )
 
     def finish(self, loc: Any = "outside upper center") -> Figure:

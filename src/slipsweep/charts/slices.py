@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from slipsweep.charts.answers import amplitude_of, solve
 from slipsweep.charts.style import drawn_text
 from slipsweep.errors import InputError
-from slipsweep.files.results import ResultFile, Where, open_result
+from slipsweep.files.results import ResultFile, Where, result_file
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import HISTORY, PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
@@ -71,19 +71,17 @@ class Result:
 
     def __init__(self, source: Path | ResultFile) -> None:
         with ExitStack() as stack:
-            self._file: ResultFile = stack.enter_context(open_result(source)) if isinstance(source, Path) else source
+            self._file: ResultFile = stack.enter_context(result_file(source)) if isinstance(source, Path) else source
             path = self.path = self._file.path
-            if "record" in self._file.attrs:
-                raise InputError(
-                    f"{path}: is the response to a recorded motion; charts are drawn of harmonic sweeps only "
-                    "(slipsweep export makes a table of it)"
-                )
+            check_harmonic(self._file)
             check_sweep(self._file)
             self.attrs: dict[str, Any] = self._file.attrs
             #: Names of the results in the file.
             self.variables = [name for name in self._file.results if name in _RESULTS]
             #: Names of the parameters in the file: axes, scalars, and those that lie along other dimensions.
-            self.coordinates = [name for name in _COORDINATES if name in self._file.coordinates]
+            self.coordinates = [
+                name for name in _COORDINATES if name in self._file.coordinates and not self._file[name].is_text
+            ]
             dims = {dim for name in (*self.variables, *self.coordinates) for dim in self._file[name].dims}
             found = {dim: self._file.axis(dim) for dim in self._file.sizes if dim in dims}
             for dim, (values, _) in found.items():
@@ -93,6 +91,8 @@ class Result:
             if not all(values.size for values in self.axes.values()):
                 raise InputError(f"{path}: holds no cells")
             self.labels: list[str] = self._file.labels
+            #: Names of the uncertain inputs that Sobol indices are of.
+            self.inputs: list[str] = self._file.texts("input")
             self._open = stack.pop_all()
 
     def __enter__(self) -> "Result":
@@ -322,8 +322,10 @@ class Result:
         return slice(0, size, math.ceil(size / MOST_POINTS))
 
     def spread(self, dim: str, number: int) -> list[int]:
-        """Indices of `number` values at most, from end to end of an axis."""
+        """Indices of `number` values at most, from end to end of an axis, in even steps if a few less have them."""
         size = self.axes[dim].size
+        even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
+        number = even[0] if even and size > number else number
         return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
 
 
@@ -332,6 +334,15 @@ def check_drawable(path: Path, name: str, values: NDArray[Any], most: float = _M
     beyond = values[np.abs(values) > np.float64(most)]  # np.float64: single precision would make it infinite
     if beyond.size:
         raise InputError(f"{path}: {name}: holds {beyond.flat[0]:.4g}; what is drawn must be within +-{most:g}")
+
+
+def check_harmonic(file: ResultFile) -> None:
+    """Refuse the response to recorded motions (InputError)."""
+    if {"record", "suite"} & file.attrs.keys():
+        raise InputError(
+            f"{file.path}: is the response to recorded motions; charts and pages are drawn of harmonic sweeps only "
+            "(slipsweep export makes a table of it)"
+        )
 
 
 def check_sweep(file: ResultFile) -> None:

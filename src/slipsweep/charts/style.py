@@ -127,8 +127,8 @@ def model_text(attributes: Mapping[str, Any]) -> str:
     """
     model = MODELS.from_attributes(attributes)
     words = [_WORDS[model.name], *(_WORDS[value] for value in model.options.values() if value in _WORDS)]
-    recorded = "record" in attributes
-    shaking = f"record {plain(str(attributes['record']))}" if recorded else WAVEFORMS.from_attributes(attributes)
+    recorded = next((name for name in ("record", "suite") if name in attributes), None)
+    shaking = f"{recorded} {plain(str(attributes[recorded]))}" if recorded else WAVEFORMS.from_attributes(attributes)
     inputs = [plain(str(attributes["friction_inputs"]))] if "friction_inputs" in attributes else []
     return "\n".join([*inputs, f"{', '.join(words)}; {shaking}"])
 

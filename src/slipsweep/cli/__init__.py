@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, explore, export, info, limit, run, simulate, streams
+from slipsweep.cli import calibrate, chart, explore, export, hazard, info, limit, run, simulate, streams, verify
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -47,11 +47,13 @@ app.command(epilog=run.EXAMPLE)(run.run)
 app.command(epilog=info.EXAMPLE)(info.info)
 app.command(epilog=export.EXAMPLE)(export.export)
 app.command(epilog=limit.EXAMPLE)(limit.limit)
+app.command(epilog=hazard.EXAMPLE)(hazard.hazard)
 app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
 app.command(epilog=chart.EXAMPLE)(chart.chart)
 app.command(epilog=calibrate.FRICTION_EXAMPLE)(calibrate.friction)
 app.command(epilog=calibrate.EXAMPLE)(calibrate.calibrate)
 app.command(epilog=explore.EXAMPLE)(explore.explore)
+app.command(epilog=verify.EXAMPLE)(verify.verify)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments
 _UsageError: Any = typer.BadParameter.__mro__[1]
@@ -108,7 +110,7 @@ def _run(arguments: list[str]) -> int:
     except _UsageError as error:
         return _fail(_words(error), 2)
     except InputError as error:
-        return _fail(str(error), 2)
+        return _fail(str(error), 2, getattr(error, "__notes__", ()))
     except MemoryError:
         return _fail("out of memory", 1)
     except (RunError, OSError) as error:
@@ -152,10 +154,15 @@ def _words(error: Any) -> str:
     return message
 
 
-def _fail(message: str, status: int) -> int:
+def _fail(message: str, status: int, notes: Sequence[str] = ()) -> int:
     # one line, whatever a name or a library has in it
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+    line, *more = (
+        "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+        for text in (message, *notes)
+    )
     if len(line) > _LONGEST:  # a page of what was given hides what is wrong with it
         line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
     print(f"slipsweep: error: {line}", file=sys.stderr)
+    for note in more:  # of the files of a suite, say: one each
+        print(f"  {note}", file=sys.stderr)
     return status

@@ -6,10 +6,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, check_ending, examples, typed_command
+from slipsweep.cli.common import (
+    FIGURES,
+    MuS,
+    Overwrite,
+    Quiet,
+    Theta,
+    check_ending,
+    examples,
+    typed_command,
+    write_figure,
+)
 from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
+from slipsweep.model.units import quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,8 +37,6 @@ EXAMPLE = examples(
     "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
 )
 
-_FIGURES = (".png", ".svg", ".pdf")
-
 Test = Annotated[
     Path,
     typer.Argument(
@@ -36,8 +45,6 @@ Test = Annotated[
         "relative velocity (m/s), relative displacement (mm).",
     ),
 ]
-Theta = Annotated[float, typer.Option(help="Plane inclination, degrees.")]
-MuS = Annotated[float, typer.Option(help="Static friction coefficient.")]
 Offset = Annotated[
     list[str] | None,
     typer.Option(metavar="CHANNEL", help="Channel whose sensor has an offset, or all; may be repeated."),
@@ -60,7 +67,11 @@ def friction(
         str | None, typer.Option(metavar="FROM:TO", help="Times of rest, s, to find offsets and drifts by.")
     ] = None,
     threshold: Annotated[
-        float | None, typer.Option(help="Relative acceleration of a slide, m/s² (default: 4 times its noise).")
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Relative acceleration of a slide, like 0.02g, or in m/s² (default: 4 times its noise).",
+        ),
     ] = None,
     output: Annotated[
         list[Path] | None,
@@ -70,19 +81,21 @@ def friction(
     quiet: Quiet = False,
 ) -> None:
     """Compute the friction that a test on a shaking table measured (Eq. 1), and its slides."""
-    paths = _checked(output, overwrite, test, (".nc", *_FIGURES))
+    angle = quantity("--theta", theta, "theta", g)
+    least = None if threshold is None else quantity("--threshold", threshold, "amplitude", g)
+    paths = _checked(output, overwrite, test, (".nc", *FIGURES))
     from slipsweep.motion.shaking import read_test
     from slipsweep.studies.friction import friction_table
 
     table = friction_table(
         read_test(test),
-        theta,
+        angle,
         mu_s,
         g=g,
         offset=_named(offset),
         drift=_named(drift),
         rest=None if rest is None else _times(rest),
-        threshold=threshold,
+        threshold=least,
     )
 
     def figure() -> "Figure":
@@ -124,12 +137,13 @@ def calibrate(
     quiet: Quiet = False,
 ) -> None:
     """Find yield acceleration, λ and Δμ from a test on a shaking table."""
-    paths = _checked(output, overwrite, test, (".nc", ".toml", *_FIGURES))
+    angle = quantity("--theta", theta, "theta", model.g)
+    paths = _checked(output, overwrite, test, (".nc", ".toml", *FIGURES))
     from slipsweep.motion.shaking import read_test
     from slipsweep.studies.calibration import calibration_table
 
     table = calibration_table(
-        read_test(test), theta, mu_s, model=model, offset=_named(offset), drift=_named(drift), cycles=cycles
+        read_test(test), angle, mu_s, model=model, offset=_named(offset), drift=_named(drift), cycles=cycles
     )
 
     def figure() -> "Figure":
@@ -181,11 +195,11 @@ def _write(paths: list[Path], table: "Table", figure: Callable[[], "Figure"], ov
                 overwrite=overwrite,
             )
             continue
+        if path.suffix != ".toml":
+            write_figure(figure(), path, overwrite)
+            continue
         with outputs.complete_or_absent(path, overwrite) as temporary:
-            if path.suffix == ".toml":
-                temporary.write_text(table.attrs["model_table"], encoding="utf-8")
-            else:
-                figure().savefig(temporary, format=path.suffix[1:], dpi=150)
+            temporary.write_text(table.attrs["model_table"], encoding="utf-8")
 
 
 def _summarize(table: "Table") -> None:
@@ -221,7 +235,7 @@ def _summarize(table: "Table") -> None:
         columns.append(table["cycle_attenuation_coefficient"].values)
         for number, (start, *values) in enumerate(zip(*columns, strict=True), 1):
             cells = [f"{value:.3g}" if np.isfinite(value) else "-" for value in values]
-            typer.echo(f"{number:5d}{start:11.4g}{cells[0]:>13}{cells[1]:>8}{cells[2]:>8}{cells[3]:>8}")
+            typer.echo(f"{number:5d} {start:10.4g} {cells[0]:>12} {cells[1]:>7} {cells[2]:>7} {cells[3]:>7}")
     for finding in table.attrs["findings"].splitlines():
         typer.echo(f"note: {finding}")
     typer.echo(f"\n{table.attrs['model_table']}")

@@ -5,12 +5,10 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, check_ending
+from slipsweep.cli.common import FIGURES, Overwrite, check_ending, write_figure
 from slipsweep.errors import InputError
 
 EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
-
-_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def chart(
@@ -21,8 +19,8 @@ def chart(
             "--kind",
             "-k",
             metavar="KIND",
-            help="contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility or "
-            "quantiles; may be repeated (default: all that fit).",
+            help="contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility, "
+            "quantiles or sensitivity; may be repeated (default: all that fit).",
         ),
     ] = None,
     at: Annotated[
@@ -50,7 +48,11 @@ def chart(
         Literal["m/s2", "g"], typer.Option(help="Unit of accelerations on the main axis and in the caption.")
     ] = "m/s2",
     show_cautions: Annotated[
-        bool, typer.Option("--show-cautions", help="Draw values flagged not_recoupled, which are left out otherwise.")
+        bool,
+        typer.Option(
+            "--show-cautions",
+            help="Draw values flagged not_recoupled or upslope, left out otherwise; no displacement below zero.",
+        ),
     ] = False,
     output: Annotated[
         list[Path] | None,
@@ -69,7 +71,7 @@ def chart(
     """
     given = output or []
     for path in given:
-        check_ending(path, _SUFFIXES)
+        check_ending(path, FIGURES)
 
     from slipsweep.charts import book, kinds
     from slipsweep.charts.slices import Result
@@ -97,8 +99,7 @@ def chart(
                 typer.echo(path)
     for name, figure in {} if together else figures.items():
         for path in wanted[name]:
-            with outputs.complete_or_absent(path, overwrite) as temporary:
-                figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+            write_figure(figure, path, overwrite)
             typer.echo(path)
     for name, reason in left_out.items():
         typer.echo(f"no {name}: {reason}")

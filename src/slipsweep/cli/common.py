@@ -12,13 +12,30 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slipsweep.errors import InputError
-from slipsweep.model.variables import FLAG_KIND_TEXT, PARAMETERS, VALIDITY_TEXT, FlagKind, Validity, flags_of
+from slipsweep.model.variables import (
+    FLAG_KIND_TEXT,
+    PARAMETERS,
+    SENSITIVITY_STATUS_TEXT,
+    VALIDITY_TEXT,
+    FlagKind,
+    SensitivityStatus,
+    Validity,
+    flags_of,
+)
 
 if TYPE_CHECKING:
-    from slipsweep.grid.tally import Tally
+    from matplotlib.figure import Figure
+
+    from slipsweep.files.zarr_store import Place
+    from slipsweep.grid.tally import Indices, Tally
     from slipsweep.runs.jobs import Job
     from slipsweep.runs.store import Report
 
+#: Endings of figures.
+FIGURES = (".png", ".svg", ".pdf")
+
+Theta = Annotated[str, typer.Option(metavar="VALUE", help="Plane inclination, like 0.1rad, or in degrees.")]
+MuS = Annotated[float, typer.Option(help="Static friction coefficient.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
 
@@ -26,6 +43,10 @@ Resume = Annotated[
     bool, typer.Option("--resume", help="Go on with an interrupted run, from the chunks that it finished.")
 ]
 Split = Annotated[bool, typer.Option("--split", help="Write a folder with a netCDF file for each chunk, not one file.")]
+Shared = Annotated[
+    bool,
+    typer.Option("--shared", help="Workers of --scheduler reach the output too: they write it themselves."),
+]
 Memory = Annotated[
     str | None, typer.Option(metavar="SIZE", help="Most memory to take, like 512MiB or 2GB (default: 500 to 600 MB).")
 ]
@@ -47,7 +68,7 @@ def echo_tally(tally: "Tally") -> None:
     if tally.modes is not None:
         typer.echo("sliding modes:")
         for mode, count in tally.modes.items():
-            typer.echo(f"  {mode.name.lower():<24}{count / tally.cells:7.2%}")
+            typer.echo(f"  {mode.name.lower():<24}{tally.share(count):7.2%}")
     if tally.flags is not None:
         seen = Validity(sum(flag for flag, count in tally.flags.items() if count))
         typer.echo("flags (validity):" if seen else "flags (validity): none")
@@ -56,15 +77,48 @@ def echo_tally(tally: "Tally") -> None:
                 typer.echo(f"  {kind}: {FLAG_KIND_TEXT[kind]}")
             for flag in seen & flags_of(kind):
                 name = (flag.name or "").lower()
-                typer.echo(f"    {name:<22}{tally.flags[flag] / tally.cells:7.2%}  {VALIDITY_TEXT[flag]}")
+                typer.echo(f"    {name:<22}{tally.share(tally.flags[flag]):7.2%}  {VALIDITY_TEXT[flag]}")
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
         typer.echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
+    if tally.indices is not None:
+        _echo_indices(tally.indices)
 
 
-def echo_found(path: Path) -> None:
+def _echo_indices(indices: "Indices") -> None:
+    """Print what moves the displacement, and why there are grid points that do not say."""
+    points, there = sum(indices.status.values()), indices.status[SensitivityStatus.COMPUTED]
+    typer.echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points:")
+    if there:
+        width = max(24, *map(len, indices.total))
+        typer.echo(f"  {'input (means)':<{width}}  first order   total   largest total at")
+        for name in sorted(indices.total, key=lambda name: -indices.total[name]):
+            first, total = (indices.mean(sums, name) for sums in (indices.first, indices.total))
+            typer.echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
+    for status, count in indices.status.items():
+        if count and status is not SensitivityStatus.COMPUTED:
+            text = SENSITIVITY_STATUS_TEXT[status]
+            typer.echo(f"  none at {count} ({status.name.lower()}): {text}")
+
+
+def place_of(text: str) -> "Place":
+    """An output as typed: a path, or the address of a store."""
+    from slipsweep.files.zarr_store import is_address
+
+    return text if is_address(text) else Path(text)
+
+
+def echo_found(path: Path | str) -> None:
     """Say that there was nothing to go on with."""
     typer.echo(f"{path}: complete already, and of this very sweep; nothing was computed")
+
+
+def write_figure(figure: "Figure", path: Path, overwrite: bool) -> None:
+    """Write a figure in the format that the name ends in."""
+    from slipsweep.files import outputs
+
+    with outputs.complete_or_absent(path, overwrite) as temporary:
+        figure.savefig(temporary, format=path.suffix[1:], dpi=150)
 
 
 def check_ending(path: Path, endings: Sequence[str]) -> None:
@@ -152,8 +206,11 @@ class Chunks:
     memory: str | None
     workers: int | None
     scheduler: str | None
+    shared: bool = False
 
     def __post_init__(self) -> None:
+        if self.shared and self.scheduler is None:
+            raise InputError("--shared: is for the workers of --scheduler; those of --workers reach what this one does")
         if self.resume and self.overwrite:
             raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
 
@@ -162,7 +219,7 @@ class Chunks:
         others = {**asdict(self), "overwrite": None}
         return [f"--{name}" for name, value in others.items() if value not in (None, False)]
 
-    def run(self, job: "Job", path: Path, quiet: bool, unit: str = "cells") -> "Report":
+    def run(self, job: "Job", path: "Path | str", quiet: bool, unit: str = "cells") -> "Report":
         """Solve and write what a command asks for."""
         from slipsweep.grid.resources import parse_size
         from slipsweep.runs import solving, store
@@ -184,6 +241,9 @@ class Chunks:
                 overwrite=self.overwrite,
                 resume=self.resume,
                 split=self.split,
+                shared=self.workers is not None
+                or self.shared
+                or (self.scheduler is not None and isinstance(path, str)),
                 chunk_cells=None if memory is None else solving.cells_within(memory, job.plan, self.workers or 0),
                 shared_cells=shared,
                 progress=stack.enter_context(progress_bar(job.plan.cells, quiet, unit)),

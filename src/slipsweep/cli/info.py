@@ -20,7 +20,11 @@ def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file tha
     for title, entries in (("coordinates", contents.coordinates), ("variables", contents.variables)):
         typer.echo(f"{title}:")
         for name, text in entries.items():
-            typer.echo(f"  {name:<24}{text}")
+            typer.echo(f"  {name:<23} {text}")
+    if contents.motions:
+        typer.echo("motions, as recorded:")
+    for line in contents.motions:
+        typer.echo(f"  {line}")
     if contents.tally is not None:
         echo_tally(contents.tally)
     else:

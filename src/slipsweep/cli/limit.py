@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slipsweep.cli.common import (
+    FIGURES,
     Chunks,
     Memory,
     Overwrite,
@@ -18,6 +19,7 @@ from slipsweep.cli.common import (
     echo_found,
     progress_bar,
     taken_as,
+    write_figure,
 )
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
@@ -27,9 +29,6 @@ if TYPE_CHECKING:
     from slipsweep.grid.tables import Table
 
 EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
-
-#: Endings of figures.
-_FIGURES = (".png", ".svg", ".pdf")
 
 
 def limit(
@@ -65,8 +64,8 @@ def limit(
     figures: list[Path] = []
     for path in output or []:
         if not (split and not path.suffix):  # the folder of a split result needs no ending
-            check_ending(path, (".nc", *_FIGURES))
-        (figures if path.suffix in _FIGURES else results).append(path)
+            check_ending(path, (".nc", *FIGURES))
+        (figures if path.suffix in FIGURES else results).append(path)
     for option in chunks.given() if not results else []:
         raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
 
@@ -80,7 +79,7 @@ def limit(
     outputs.check_outputs(figures, overwrite, reads=checked.files)
     job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
     if results:
-        from slipsweep.runs.store import stored_table
+        from slipsweep.runs.stored import stored_table
 
         report = chunks.run(job, results[0], quiet)
         if report.found and not quiet:
@@ -91,8 +90,12 @@ def limit(
     else:
         with job.named(), progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)
-    for path in figures:
-        _write_figure(table, path, overwrite, job.labels)
+    if figures:
+        from slipsweep.charts.limit_figures import limit_chart
+
+        figure = limit_chart(table, job.labels)
+        for path in figures:
+            write_figure(figure, path, overwrite)
     if not quiet:
         _summarize(table)
         for path in output or []:
@@ -136,12 +139,3 @@ def _summarize(table: "Table") -> None:
         share = np.count_nonzero(status == one) / status.size
         if share:
             typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
-
-
-def _write_figure(table: "Table", path: Path, overwrite: bool, labels: tuple[str, ...]) -> None:
-    from slipsweep.charts import limit_figures
-    from slipsweep.files import outputs
-
-    figure = limit_figures.limit_chart(table, labels)
-    with outputs.complete_or_absent(path, overwrite) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], dpi=150)

@@ -13,12 +13,14 @@ from slipsweep.cli.common import (
     Quiet,
     Resume,
     Scheduler,
+    Shared,
     Split,
     Watch,
     Workers,
     echo_found,
     echo_tally,
     examples,
+    place_of,
 )
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
@@ -44,12 +46,12 @@ def run(
         ),
     ],
     output: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--output",
             "-o",
-            metavar="OUT.nc",
-            help="File to write (default: output.path, else the sweep's name with .nc).",
+            metavar="OUT.nc|OUT.zarr|URL",
+            help="netCDF file or Zarr store to write (default: output.path, else the sweep's name with .nc).",
         ),
     ] = None,
     overwrite: Overwrite = False,
@@ -61,26 +63,29 @@ def run(
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    shared: Shared = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute a sweep and write it to a netCDF file."""
+    """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec
     from slipsweep.grid.resources import grid_text, size_text
 
-    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler)
+    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler, shared)
     checked = spec.load(sweep)
-    if solver is not None and checked.record is not None:
-        raise InputError(f"--solver {solver}: not allowed with excitation.record, to which the response is exact")
+    if solver is not None and checked.recorded is not None:
+        raise InputError(f"--solver {solver}: not allowed with recorded motions, to which the response is exact")
     if solver is not None:
         same = solver == checked.solver.name  # with the options that the sweep file gives it
         checked = checked if same else checked.with_solver(SOLVERS.of(solver))
     if output is None and checked.output.path is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; give the output's with -o or output.path")
-    path = output or Path(checked.output.path or f"{sweep.stem}.nc")
-    if split and output is None:
+    path = place_of(checked.output.path or f"{sweep.stem}.nc" if output is None else output)
+    if split and output is None and isinstance(path, Path):
         path = path.with_suffix("")
-    if path.suffix.lower() in _OTHER_FORMATS:
-        raise InputError(f"{path}: the name must end in .nc, the format that is written")
+    if isinstance(path, str) and not path.rstrip("/").endswith(".zarr"):
+        raise InputError(f"{path}: the name of a store at an address must end in .zarr")
+    if isinstance(path, Path) and path.suffix.lower() in _OTHER_FORMATS:
+        raise InputError(f"{path}: the name must end in .nc or .zarr, the formats that are written")
     from slipsweep.runs.jobs import sweep_job
 
     job = sweep_job(checked)
@@ -99,8 +104,13 @@ def run(
             typer.echo(f"{report.tally.cells} cells ({grid}) in {took}")
         else:
             points = math.prod(job.plan.sizes.values())
-            typer.echo(f"{points} grid points ({grid}), {checked.sampling.samples} samples each")
+            runs = checked.sampling.sensitivity_runs
+            beside = f", and {runs} runs each for Sobol indices" if runs else ""
+            typer.echo(f"{points} grid points ({grid}), {checked.sampling.samples} samples each{beside}")
             typer.echo(f"{report.tally.cells} samples solved in {took}")
-    typer.echo(f"inputs: {job.plan.empty().attrs['friction_inputs']}")
+    about = job.plan.empty().attrs
+    typer.echo(f"inputs: {about['friction_inputs']}")
+    if "duplicate_motions" in about:
+        typer.echo(f"the same motion under several labels: {about['duplicate_motions']}")
     echo_tally(report.tally)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, check_ending, examples, taken_as, typed_command
+from slipsweep.cli.common import (
+    FIGURES,
+    Overwrite,
+    Quiet,
+    check_ending,
+    examples,
+    taken_as,
+    typed_command,
+    write_figure,
+)
 from slipsweep.cli.options import chooses, option_name, reads_record
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
@@ -41,8 +50,10 @@ EXAMPLE = examples(
 @chooses(excitation=WAVEFORMS, model=MODELS)
 def simulate(
     *,
-    theta: Annotated[float, typer.Option(help="Plane inclination, degrees.")],
-    mu_s: Annotated[float, typer.Option(help="Static friction coefficient.")],
+    theta: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Plane inclination, like 0.1rad, or in degrees.")
+    ] = None,
+    mu_s: Annotated[float | None, typer.Option(help="Static friction coefficient.")] = None,
     frequency: Annotated[
         str | None, typer.Option(metavar="VALUE", help="Excitation frequency, Hz; not with a record.")
     ] = None,
@@ -71,6 +82,13 @@ def simulate(
     ] = None,
     reading: Mapping[str, Any],
     scale: Annotated[float | None, typer.Option(help="Factor on a record's acceleration (default: 1).")] = None,
+    pgv: Annotated[
+        str | None,
+        typer.Option(metavar="VALUE", help="Peak ground velocity that a record is scaled to, like 40cm/s, or in m/s."),
+    ] = None,
+    arias_intensity: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Arias intensity that a record is scaled to, m/s.")
+    ] = None,
     time_scale: Annotated[float | None, typer.Option(help="Factor on a record's time (default: 1).")] = None,
     polarity: Annotated[
         Literal["1", "-1"] | None, typer.Option(help="Sign that a record is taken with (default: 1).")
@@ -78,6 +96,10 @@ def simulate(
     yield_acceleration: Annotated[
         str | None,
         typer.Option(metavar="VALUE", help="Yield acceleration, like 0.1g, or in m/s² (default: Coulomb's)."),
+    ] = None,
+    yield_coefficient: Annotated[
+        float | None,
+        typer.Option(help="Yield coefficient, Üy/g, of Newmark's block, in place of --theta and --mu-s."),
     ] = None,
     decay_rate: Annotated[float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).")] = None,
     delta_mu: Annotated[float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).")] = None,
@@ -97,15 +119,18 @@ def simulate(
     writers: dict[str, Callable[[Table, Path, bool, Waveform | Record], None]] = {
         ".nc": _write_netcdf,
         ".csv": _write_csv,
-        **dict.fromkeys((".png", ".svg", ".pdf"), _write_figure),
+        **dict.fromkeys(FIGURES, _write_figure),
     }
     paths = output or []
     for path in paths:
         check_ending(path, tuple(writers))
     typed = {
+        "theta": theta,
         "amplitude": amplitude,
         "displacement_amplitude": displacement_amplitude,
         "frequency": frequency,
+        "pgv": pgv,
+        "arias_intensity": arias_intensity,
         "yield_acceleration": yield_acceleration,
         "structure_frequency": structure_frequency,
     }
@@ -118,12 +143,12 @@ def simulate(
 
     outputs.check_outputs(paths, overwrite, reads=[record] if record else ())
     table = history_table(
-        theta=theta,
         mu_s=mu_s,
         excitation=motion,
         scale=scale,
         time_scale=time_scale,
         polarity=None if polarity is None else int(polarity),
+        yield_coefficient=yield_coefficient,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
@@ -134,13 +159,13 @@ def simulate(
     flags = Validity(table["validity"].item())
     if flags & VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in flags & VALUELESS)
-        raise RunError(f"the model gives no value: {why} ({taken_as({'theta': theta, **given}, model.g)})")
+        raise RunError(f"the model gives no value: {why} ({taken_as(given, model.g)})")
     for path in paths:
         writers[path.suffix](table, path, overwrite, motion)
     if quiet:
         return
     _summarize(table)
-    typer.echo(f"{'taken as':<24}{taken_as({'theta': theta, **given}, model.g)}")
+    typer.echo(f"{'taken as':<24}{taken_as(given, model.g)}")
     for path in paths:
         typer.echo(path)
 
@@ -181,14 +206,14 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool, motion: "Waveform
         title="Time history of a sliding block",
         command=typed_command(),
         overwrite=overwrite,
-        record=None if isinstance(motion, Waveform) else motion,
+        recorded=None if isinstance(motion, Waveform) else motion,
     )
 
 
 def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import outputs
 
-    columns = {name: table[name] for name in ("time", *HISTORY)}
+    columns = {name: table[name] for name in ("time", *HISTORY) if name in table}
     with (
         outputs.complete_or_absent(path, overwrite) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,
@@ -200,8 +225,5 @@ def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | 
 
 def _write_figure(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.charts import figures
-    from slipsweep.files import outputs
 
-    figure = figures.history(table)
-    with outputs.complete_or_absent(path, overwrite) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+    write_figure(figures.history(table), path, overwrite)

@@ -133,7 +133,7 @@
       [canvas.width, canvas.height] = [30, 16];
       const context = canvas.getContext("2d"), pixels = context.createImageData(30, 16);
       const words = new Uint32Array(pixels.data.buffer);
-      for (let j = 0; j < 16; j++) for (let i = 0; i < 30; i++) words[j * 30 + i] = mark(name, i, j) || (name === "flagged" ? rgba(94, 201, 98, 255) : MISSING);
+      for (let j = 0; j < 16; j++) for (let i = 0; i < 30; i++) words[j * 30 + i] = mark(name, i, j) || (name === "flagged" ? rgba(104, 190, 194, 255) : MISSING);
       context.putImageData(pixels, 0, 0);
       item.append(canvas, text);
       host.append(item);

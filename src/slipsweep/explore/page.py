@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.charts.answers import amplitude_of
-from slipsweep.charts.slices import CODES, check_drawable, check_sweep
+from slipsweep.charts.slices import CODES, check_drawable, check_harmonic, check_sweep
 from slipsweep.charts.style import BLUE, VERMILION, axis_label, caption, unit, value_text
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
-from slipsweep.files.results import FileVariable, open_result
+from slipsweep.files.results import FileVariable, result_file
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tables import Table, Variable
@@ -131,7 +131,8 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     InputError
         The file cannot be read, or holds no displacement over amplitude and frequency.
     """
-    with open_result(path) as file:
+    with result_file(path) as file:
+        check_harmonic(file)
         if "exceedance_probability" in file:
             raise InputError(f"{path}: holds statistics of uncertain inputs, which slipsweep chart draws")
         if "permanent_displacement" not in file.results:
@@ -492,8 +493,10 @@ def _figures(excerpt: Excerpt) -> dict[str, Any]:
         Range1d,
     )
     from bokeh.models.annotations import ColorBar
-    from bokeh.palettes import viridis
     from bokeh.plotting import figure
+    from matplotlib.colors import to_hex
+
+    from slipsweep.charts.maps import COLOURS
 
     up, across = excerpt.map_dims
     low, high = _decades(excerpt)
@@ -514,9 +517,8 @@ def _figures(excerpt: Excerpt) -> dict[str, Any]:
     chart.toolbar.logo = None
     chart.grid.visible = False
     # three bands a decade: their edges are contours of displacement
-    mapper = LogColorMapper(
-        palette=viridis(3 * (high - low)), low=10.0**low, high=10.0**high, nan_color="rgba(0, 0, 0, 0)"
-    )
+    palette = [to_hex(colour) for colour in COLOURS(np.linspace(0, 1, 3 * (high - low)))]
+    mapper = LogColorMapper(palette=palette, low=10.0**low, high=10.0**high, nan_color="rgba(0, 0, 0, 0)")
     place: dict[str, Any] = {"x": "x", "y": "y", "dw": "dw", "dh": "dh"}
     corner: dict[str, Any] = {"x": [1.0], "y": [1.0], "dw": [1.0], "dh": [1.0]}
     colours = ColumnDataSource({"image": [np.zeros((1, 1), np.float32)], **corner}, name="colours")

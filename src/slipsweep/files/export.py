@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs
-from slipsweep.files.results import FileVariable, ResultFile, open_result
+from slipsweep.files.results import FileVariable, ResultFile, result_file
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.model.suggest import did_you_mean
-from slipsweep.model.variables import LIMIT_RESULTS, RESULTS
+from slipsweep.model.variables import LIMIT_RESULTS, MOTION_FILES, RESULTS
 
 #: Rows made at a time; text of ten columns takes a hundred times as many bytes.
 CHUNK_CELLS = 2**18
@@ -125,7 +125,7 @@ def export(
     if path.suffix == ".parquet":
         _check_pyarrow(path)
     outputs.check_outputs([path], overwrite, reads=[source])
-    with open_result(source) as file:
+    with result_file(source) as file:
         columns, shape = _columns(file, variables, words)
         make = _csv if path.suffix == ".csv" else _parquet
         attributes = {name: str(value) for name, value in file.attrs.items()}
@@ -143,7 +143,7 @@ def export(
 
 def count_rows(source: Path, variables: Sequence[str] | None = None) -> int:
     """Return the number of rows that `export` makes; arguments and errors are its."""
-    with open_result(source) as file:
+    with result_file(source) as file:
         return math.prod(_columns(file, variables, False)[1].values())
 
 
@@ -159,7 +159,7 @@ def _columns(file: ResultFile, wanted: Sequence[str] | None, words: bool) -> tup
         raise InputError(f"{file.path}: holds no results")
     dims = {dim for name in chosen for dim in file[name].dims}
     shape = {dim: length for dim, length in file.sizes.items() if dim in dims}
-    beside = [name for name in file.coordinates if dims.issuperset(file[name].dims)]
+    beside = [name for name in file.coordinates if dims.issuperset(file[name].dims) and name not in MOTION_FILES]
     return [Column(file[name], words) for name in (*beside, *chosen)], shape
 
 

@@ -1,8 +1,7 @@
 """netCDF files of results: made by the CF conventions, and read."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,21 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.files.contents import (
+    CHECKSUM_ATTRIBUTES,
+    CHECKSUM_BYTES,
+    CHECKSUM_DIMS,
+    CHECKSUM_GROUP,
+    CHECKSUMS,
+    Contents,
+    Head,
+    Stored,
+    contents_of,
+    storable,
+)
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import complete_or_absent, writing
 from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode
 from slipsweep.motion.records import Record
-
-#: Results that are whole numbers, -1 where there is no value.
-_WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
-
-#: Attribute that tells of the run that made a file, for programs.
-RUN = "slipsweep_run"
-
-#: Dimension of the samples of a record.
-RECORD_DIM = "record_sample"
-
+from slipsweep.motion.suites import Suite
 
 # --------------------------------------------------------------------------- making a file
 
@@ -47,52 +48,12 @@ def new_file(temporary: Path, path: Path) -> Iterator[netCDF4.Dataset]:
         file.close()
 
 
-def _define(file: netCDF4.Dataset, table: Table, dtype: Callable[[str], np.dtype[Any]]) -> None:
-    """Define the dimensions and variables of `table`."""
-    sizes = table.sizes
-    # in the order of the results, which that of the coordinates need not be
-    widest = max((result.dims for result in table.data_vars.values()), key=len, default=())
-    shape = {dim: sizes[dim] for dim in (*widest, *sizes)}
-    for dim, length in shape.items():
-        file.createDimension(dim, length)
-    for name, coordinate in table.coords.items():
-        variable = file.createVariable(name, coordinate.values.dtype, coordinate.dims)
-        _describe(variable, coordinate.attrs)
-    for name, result in table.data_vars.items():
-        dims, kind = result.dims, dtype(name)
-        fill = np.nan if kind.kind == "f" else SlidingMode.MISSING if name in _WITH_MISSING else None
-        variable = file.createVariable(name, kind, dims, fill_value=fill, contiguous=True)
-        attributes = dict(result.attrs)
-        if attributes.get("ancillary_variables") not in table:
-            attributes.pop("ancillary_variables", None)
-        auxiliary = [c for c in table.coords if c not in shape and {*table[c].dims} <= {*dims}]
-        if auxiliary:
-            attributes["coordinates"] = " ".join(auxiliary)
-        _describe(variable, attributes)
-
-
-def _label_cases(file: netCDF4.Dataset, labels: tuple[str, ...]) -> None:
-    """Write the names of the rows of [[cases]]: as characters, since few programs read netCDF strings."""
-    if not labels:
-        return
-    text = np.array([label.encode() for label in labels])
-    file.createDimension("label_length", text.dtype.itemsize)
-    variable = file.createVariable("label", "S1", ("case", "label_length"))
-    variable.set_auto_chartostring(False)
-    _describe(variable, {"long_name": "name of the case", "_Encoding": "utf-8"})
-    variable[:] = text.view("S1").reshape(len(labels), -1)
-    for other in file.variables.values():
-        if "case" in other.dimensions and "coordinates" in other.ncattrs():
-            _describe(other, {"coordinates": f"{other.getncattr('coordinates')} label"})
-
-
 def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[str, Any]) -> None:
     """Set attributes: text as characters in UTF-8, flag values in the type of their variable."""
     for name, value in attributes.items():
         if isinstance(value, str):
             # as bytes: the library would write text beyond ASCII as a netCDF string
-            # (a name with bytes that are no UTF-8 has them spelled out)
-            target.setncattr(name, value.encode(errors="backslashreplace"))
+            target.setncattr(name, storable(value).encode())
         elif name in ("flag_values", "flag_masks"):
             target.setncattr(name, np.asarray(value, target.dtype))
         elif np.asarray(value).dtype.kind == "i":
@@ -106,57 +67,77 @@ def history_of(command: str) -> str:
     return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
 
 
-def _provenance(history: str) -> dict[str, str]:
-    return {"Conventions": "CF-1.11", "history": history}
-
-
-@dataclass(frozen=True)
-class Head:
-    """What a file says beside its results.
-
-    Attributes
-    ----------
-    title : str
-    labels : tuple of str
-        Names of the cases.
-    record : Record, optional
-        The motion that the results are the response to: its samples are written with them.
-    sweep : str, optional
-        The text of a sweep file, from which the run can be repeated.
-    run : str
-        What another run must have in common with the one that made the file (`slipsweep.runs.parts.stamp`).
-    """
-
-    title: str
-    labels: tuple[str, ...] = ()
-    record: Record | None = None
-    sweep: str | None = None
-    run: str = ""
-
-
-def write_head(
-    file: netCDF4.Dataset, head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]], history: str
-) -> None:
-    """Write all of a file but its results."""
-    _define(file, table, dtype)
-    _label_cases(file, head.labels)
-    sweep = {} if head.sweep is None else {"sweep": head.sweep}
-    run = {RUN: head.run} if head.run else {}
-    _describe(file, {**table.attrs, "title": head.title, **_provenance(history), **sweep, **run})
+def write_head(file: netCDF4.Dataset, contents: Contents) -> None:
+    """Write all of a file but its results, for which there is room then."""
+    for dim, length in contents.sizes.items():
+        file.createDimension(dim, length)
+    for name, stored in contents.variables.items():
+        _create(file, name, stored, contents.compression)
+    if contents.chunks:
+        group = file.createGroup(CHECKSUM_GROUP)
+        for dim, length in zip(CHECKSUM_DIMS, (contents.chunks, CHECKSUM_BYTES), strict=True):
+            group.createDimension(dim, length)
+        variable = group.createVariable(CHECKSUMS.rpartition("/")[2], "u1", CHECKSUM_DIMS, contiguous=True)
+        _describe(variable, CHECKSUM_ATTRIBUTES)
+    _describe(file, contents.attrs)
     file.set_auto_maskandscale(False)
-    for name, coordinate in table.coords.items():
-        file[name][...] = coordinate.values
-    if head.record is not None:
-        _embed(file, head.record)
+    for name, stored in contents.variables.items():
+        if stored.values is not None:
+            file[name][...] = _characters(stored.values) if stored.is_text else stored.values
 
 
-def _embed(file: netCDF4.Dataset, record: Record) -> None:
-    """Write the samples of a record, from which the run can be repeated when its file is gone."""
-    file.createDimension(RECORD_DIM, record.times.size)
-    for name, values in zip(RECORD_SAMPLES, (record.times, record.acceleration), strict=True):
-        variable = file.createVariable(name, "f8", (RECORD_DIM,))
-        _describe(variable, RECORD_SAMPLES[name])
-        variable[:] = values
+def _create(file: netCDF4.Dataset, name: str, stored: Stored, compression: int) -> None:
+    if stored.is_text:
+        # as characters, since few programs read netCDF strings
+        assert stored.values is not None
+        length = f"{name}_length"
+        file.createDimension(length, _characters(stored.values).shape[-1])
+        variable = file.createVariable(name, "S1", (*stored.dims, length))
+        variable.set_auto_chartostring(False)
+        _describe(variable, {**stored.attrs, "_Encoding": "utf-8"})
+        return
+    # zlib and shuffle: what every build of the library has
+    packed = {"zlib": True, "complevel": compression, "shuffle": True}
+    how = packed if compression and stored.values is None and stored.dims else {"contiguous": True}
+    variable = file.createVariable(name, stored.dtype, stored.dims, fill_value=stored.fill, **how)
+    _describe(variable, stored.attrs)
+
+
+def read_head(file: Any, results: Collection[str]) -> Contents:
+    """Read what `write_head` wrote, or of a store what was made of the same contents.
+
+    Parameters
+    ----------
+    file : netCDF4.Dataset or StoreFile
+    results : collection of str
+        Names of the variables whose values do not belong to it.
+    """
+    variables = {}
+    for name, variable in file.variables.items():
+        attributes = {key: variable.getncattr(key) for key in variable.ncattrs() if key != "_FillValue"}
+        dims, kind, values = tuple(variable.dimensions), variable.dtype, None
+        if name not in results:
+            variable.set_auto_maskandscale(False)
+            variable.set_auto_chartostring(False)
+            values = np.asarray(variable[...])
+        if kind == "S1" and values is not None:
+            attributes.pop("_Encoding", None)
+            dims, kind = dims[:-1], np.dtype(object)
+            rows = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+            texts = np.array([row.tobytes().rstrip(b"\0").decode() for row in rows], dtype=object)
+            values = texts.reshape(values.shape[:-1])
+        elif kind is str:
+            kind = np.dtype(object)
+        variables[name] = Stored(dims, kind, attributes, None, values)
+    used = {dim for one in variables.values() for dim in one.dims}
+    sizes = {dim: len(length) for dim, length in file.dimensions.items() if dim in used}
+    return Contents(sizes, variables, {key: file.getncattr(key) for key in file.ncattrs()})
+
+
+def _characters(texts: NDArray[Any]) -> NDArray[Any]:
+    """Texts as rows of characters in UTF-8."""
+    encoded = np.array([text.encode() for text in texts.flat])
+    return encoded.view("S1").reshape(*texts.shape, -1)
 
 
 class TooLarge(InputError):
@@ -185,20 +166,20 @@ def write_table(
     title: str,
     command: str,
     overwrite: bool = False,
-    record: Record | None = None,
+    recorded: Record | Suite | None = None,
     labels: tuple[str, ...] = (),
 ) -> None:
     """Write a table that is in memory (a time history) by the rules that sweeps are written by.
 
-    The `record` that it is the response to is written with it, and the `labels` of its cases.
+    The `recorded` motion that it is the response to is written with it, and the `labels` of its cases.
     """
     with (
         complete_or_absent(path, overwrite) as temporary,
         new_file(temporary, path) as file,
         writing(path),
     ):
-        head = Head(title, labels, record)
-        write_head(file, head, table, lambda name: table[name].values.dtype, history_of(command))
+        head = Head(title, labels, recorded)
+        write_head(file, contents_of(head, table, lambda name: table[name].values.dtype, history_of(command)))
         for name, array in table.data_vars.items():
             file[name][...] = array.values
 

@@ -11,12 +11,14 @@ import secrets
 import shutil
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files.names import check_name
+from slipsweep.files.zarr_store import is_nothing_else
 from slipsweep.grid.resources import size_text
 
 #: Names of files that are being written begin so.
@@ -30,12 +32,20 @@ _CHUNK_FILE = re.compile(r"chunk-\d{6,}\.nc")
 Read = Path | int
 
 
+@dataclass(frozen=True)
+class Kind:
+    """What an output is: in words, and whether a path that exists is one."""
+
+    text: str
+    fits: Callable[[Path], bool]
+
+
 def check_outputs(
     paths: Sequence[Path],
     overwrite: bool,
     *,
     reads: Iterable[Read],
-    folder: bool = False,
+    kind: Kind | None = None,
     work: Path | None = None,
 ) -> None:
     """Refuse outputs of a command that cannot be written, may not be replaced, or are what it reads.
@@ -51,8 +61,8 @@ def check_outputs(
     reads : iterable of Path or int
         All that the command reads.  Files are compared, not their names: links, relative paths and
         names in other letters are the same file.
-    folder : bool
-        The outputs are folders of chunks, not files.
+    kind : Kind, optional
+        What the outputs are, if not files.
     work : Path, optional
         A folder that is emptied for the outputs.
 
@@ -64,14 +74,14 @@ def check_outputs(
     for path in paths:
         try:
             check_name(path)
-            chunks = [path] if folder and _is_folder_of_chunks(path) else []
+            chunks = [path] if kind is CHUNKS and _is_folder_of_chunks(path) else []
             for file in (path, *_below(*chunks, *([work, work / "data"] if work else []))):
                 if (found := _identity(file)) in inputs:
                     name = inputs[found] or "standard input"
                     raise InputError(
                         f"{path}: writing it would replace {name}, which this command reads; give another name with -o"
                     )
-            _check_output(path, overwrite, folder)
+            _check_output(path, overwrite, kind or FILE)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
         except UnicodeEncodeError as error:  # a name from a sweep file
@@ -81,8 +91,8 @@ def check_outputs(
             raise InputError(f"{other}: is given twice as an output of this command; give each another name")
 
 
-def _check_output(path: Path, overwrite: bool, folder: bool) -> None:
-    """Refuse an output (a file, or a `folder` of chunks) that cannot be written, or exists and may not be replaced."""
+def _check_output(path: Path, overwrite: bool, kind: Kind) -> None:
+    """Refuse an output that cannot be written, or exists and may not be replaced."""
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist")
     if not os.access(path.parent, os.W_OK):
@@ -93,19 +103,24 @@ def _check_output(path: Path, overwrite: bool, folder: bool) -> None:
         return
     link = stat.S_ISLNK(found.st_mode)
     if link and not path.exists():
-        kind = f"is a symbolic link to {os.readlink(path)}, which does not exist"
-    elif not (_is_folder_of_chunks(path) if folder else path.is_file()):
-        raise InputError(f"{path}: exists and is not a {'folder of chunks' if folder else 'file'}")
+        found_text = f"is a symbolic link to {os.readlink(path)}, which does not exist"
+    elif not kind.fits(path):
+        raise InputError(f"{path}: exists and is not a {kind.text}")
     else:
-        kind = "exists already"
+        found_text = "exists already"
     if not overwrite:
-        raise InputError(f"{path}: {kind}; give --overwrite to replace it, or another name with -o")
+        raise InputError(f"{path}: {found_text}; give --overwrite to replace it, or another name with -o")
 
 
 def _is_folder_of_chunks(path: Path) -> bool:
     """Whether a folder, no link to one and neither "." nor "..", holds files of chunks and nothing else."""
     named = path.name not in ("", "..") and not path.is_symlink()
     return named and path.is_dir() and all(map(_CHUNK_FILE.fullmatch, os.listdir(path)))
+
+
+FILE = Kind("file", Path.is_file)
+CHUNKS = Kind("folder of chunks", _is_folder_of_chunks)
+ZARR = Kind("Zarr store", is_nothing_else)
 
 
 def _identity(file: Read) -> tuple[int, int] | None:
@@ -216,7 +231,7 @@ _NO_MATTER_OF_ROOM = (
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path | str) -> Iterator[None]:
     """Turn what the system and the netCDF library raise into one message."""
     try:
         yield
@@ -229,5 +244,5 @@ def writing(path: Path) -> Iterator[None]:
             raise RunError(message) from error
         # all that the netCDF library says of a full disk is "HDF error"
         with suppress(OSError):  # the folder itself may be gone
-            message += f"; is the disk full? ({size_text(shutil.disk_usage(path.parent).free)} free)"
+            message += f"; is the disk full? ({size_text(shutil.disk_usage(Path(path).parent).free)} free)"
         raise RunError(message) from error

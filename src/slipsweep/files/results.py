@@ -6,7 +6,7 @@ Values come out as the CF conventions (2.5.1, 8.1) mean them; what is missing is
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,14 +20,18 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.files import guard
+from slipsweep.files.contents import RUN
+from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import RECORD_DIM, RUN
+from slipsweep.files.zarr_store import StoreFile, is_finished, nbytes
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import available_memory, size_text
-from slipsweep.grid.tally import Tally
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tally import Indices, Tally
 from slipsweep.model.variables import (
     HISTORY,
     LIMIT_RESULTS,
+    MOTION_COORDINATES,
     PARAMETERS,
     RECORD_RESULTS,
     RESULT_DTYPES,
@@ -43,7 +47,7 @@ Where = Mapping[str, Any]
 
 #: All that a command of slipsweep writes, but for the samples of a record, and what it lies along.
 _RESULTS = {**RECORD_RESULTS, **LIMIT_RESULTS, **HISTORY, **STATISTICS, **RESULTS}
-_COORDINATES = {**STATISTIC_COORDINATES, **PARAMETERS}
+_COORDINATES = {**STATISTIC_COORDINATES, **PARAMETERS, **MOTION_COORDINATES}
 
 #: Attributes by which a file says values in other numbers, or none.
 _VALID = ("valid_range", "valid_min", "valid_max")
@@ -67,7 +71,7 @@ _LIBRARY_ERRORS = (OSError, RuntimeError, AttributeError, UnicodeError, LookupEr
 
 
 @contextmanager
-def open_result(path: Path) -> Iterator["ResultFile"]:
+def result_file(path: Path) -> Iterator["ResultFile"]:
     """Open a file of slipsweep to read from.
 
     Raises
@@ -81,7 +85,8 @@ def open_result(path: Path) -> Iterator["ResultFile"]:
         raise InputError(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    guard.try_out(read_through, path)
+    if not is_finished(path):
+        guard.try_out(read_through, path)
     with ResultFile(path) as file:
         if not str(file.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in file.attrs:
             raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
@@ -130,6 +135,8 @@ class FileVariable:
     attrs : dict
         But for those by which values are packed or missing; units, names and meanings are texts.
     is_text : bool
+    encoding : dict
+        The others, by which they are.
     stored : dtype
         That of the numbers in the file.
     """
@@ -139,7 +146,7 @@ class FileVariable:
         variable.set_auto_chartostring(False)
         self.path, self.name, self._variable = path, str(variable.name), variable
         attributes = {name: _attribute(variable, name) for name in variable.ncattrs()}
-        self._encoding = {name: attributes.pop(name) for name in _ENCODING if name in attributes}
+        self.encoding = {name: attributes.pop(name) for name in _ENCODING if name in attributes}
         texts = {name: str(attributes[name]) for name in _TEXTS if name in attributes}
         self.attrs: dict[str, Any] = attributes | texts
         self._has_characters = variable.dtype == "S1"
@@ -172,27 +179,27 @@ class FileVariable:
     @property
     def _raw(self) -> np.dtype[Any]:
         """The stored type, without its sign where `_Unsigned` says so (netCDF-3 has no unsigned numbers)."""
-        unsigned = self.stored.kind == "i" and str(self._encoding.get("_Unsigned")).lower() == "true"
+        unsigned = self.stored.kind == "i" and str(self.encoding.get("_Unsigned")).lower() == "true"
         return np.dtype(f"u{self.stored.itemsize}") if unsigned else self.stored
 
     @cached_property
     def _packing(self) -> tuple[Any, Any] | None:
         """scale_factor and add_offset, or None without them."""
-        if self._encoding.keys().isdisjoint(("scale_factor", "add_offset")):
+        if self.encoding.keys().isdisjoint(("scale_factor", "add_offset")):
             return None
         found = []
         for name, default in (("scale_factor", np.int8(1)), ("add_offset", np.int8(0))):
-            value = np.asarray(self._encoding.get(name, default))
+            value = np.asarray(self.encoding.get(name, default))
             if value.dtype.kind not in "iuf" or value.size != 1:
-                raise InputError(f"{self.path}: {self.name}: {name} = {self._encoding[name]!r}: must be one number")
+                raise InputError(f"{self.path}: {self.name}: {name} = {self.encoding[name]!r}: must be one number")
             found.append(value.ravel()[0])
         return found[0], found[1]
 
     @cached_property
     def _signs(self) -> list[Any]:
         """The stored numbers that stand for no value, but for NaN."""
-        given = [self._encoding.get(name, ()) for name in ("_FillValue", "missing_value")]
-        if "_FillValue" not in self._encoding and self.stored.itemsize > 1:
+        given = [self.encoding.get(name, ()) for name in ("_FillValue", "missing_value")]
+        if "_FillValue" not in self.encoding and self.stored.itemsize > 1:
             # that of values which were never written; by convention not of bytes, all of which may be in use
             given.append(netCDF4.default_fillvals[self.stored.str[1:]])
         signs = []
@@ -208,7 +215,7 @@ class FileVariable:
     @property
     def _is_plain(self) -> bool:
         """Whether values are stored as they are, what is missing as NaN."""
-        return not (self._packing or self._signs or self._raw != self.stored or {*_VALID} & self._encoding.keys())
+        return not (self._packing or self._signs or self._raw != self.stored or {*_VALID} & self.encoding.keys())
 
     # ------------------------------------------------------------------------------ values
 
@@ -226,7 +233,7 @@ class FileVariable:
         for sign in self._signs:
             missing |= raw == sign
         for name in _VALID:
-            bounds = np.atleast_1d(self._encoding.get(name, ()))
+            bounds = np.atleast_1d(self.encoding.get(name, ()))
             if bounds.dtype.kind not in "iuf" or bounds.size != (2 if name == "valid_range" else 1):
                 continue
             if bounds.dtype == self.stored:
@@ -259,7 +266,7 @@ class FileVariable:
         """
         self._check_numbers()
         kind = np.dtype(RESULT_DTYPES.get(self.name, np.int32))
-        if self.stored == kind and self._encoding in ({}, {"_FillValue": -1}):
+        if self.stored == kind and self.encoding in ({}, {"_FillValue": -1}):
             return self._hyperslab(where).astype(kind, copy=False)  # as slipsweep writes them
         values, limits = self.read(where), np.iinfo(kind)
         there = values.compressed()
@@ -355,7 +362,7 @@ def _attribute(owner: netCDF4.Dataset | netCDF4.Variable, name: str) -> Any:
 
 
 class ResultFile:
-    """A netCDF file open to read from, whatever program wrote it; a context manager.
+    """A netCDF file, whatever program wrote it, or a Zarr store, open to read from; a context manager.
 
     Attributes
     ----------
@@ -378,7 +385,7 @@ class ResultFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         with _library(path):
-            self._file = open_netcdf(path)
+            self._file: Any = StoreFile(path) if is_finished(path) else open_netcdf(path)
         try:
             with _library(path):
                 self._read_head()
@@ -443,15 +450,19 @@ class ResultFile:
         The samples of a record do not, nor do bounds of cells that another program added.
         """
         own = [name for name in self.results if name in _RESULTS] or self.results
-        dims = {dim for name in own for dim in self[name].dims} - {RECORD_DIM}
+        dims = {dim for name in own for dim in self[name].dims} - {RECORD_DIM, SUITE_DIM}
         return [name for name in self.results if dims.issuperset(self[name].dims)]
 
     @cached_property
     def labels(self) -> list[str]:
         """Names of the cases; empty without them."""
-        for name in ("label", "case"):
-            if name in self and self[name].is_text and self[name].dims == ("case",):
-                return [str(text) for text in self[name].read({}).data]
+        return self.texts("case", "label") or self.texts("case")
+
+    def texts(self, dim: str, name: str = "") -> list[str]:
+        """Texts along a dimension, those of the variable of its name if not of another; empty without them."""
+        name = name or dim
+        if name in self and self[name].is_text and self[name].dims == (dim,):
+            return [str(text) for text in self[name].read({}).data]
         return []
 
     def axis(self, dim: str) -> tuple[Floats, NDArray[np.intp]]:
@@ -477,6 +488,29 @@ class ResultFile:
         return values, order
 
 
+def read_table(file: ResultFile, names: Sequence[str]) -> Table:
+    """Read some results, and all coordinates along their dimensions.
+
+    Raises
+    ------
+    InputError
+        One of the results is not in the file.
+    """
+    for name in names:
+        if name not in file:
+            raise InputError(f"{file.path}: {name}: not in this file, which has {', '.join(file.results) or 'nothing'}")
+    dims = {dim for name in names for dim in file[name].dims}
+
+    def read(name: str) -> Variable:
+        one = file[name]
+        if name == "validity":
+            return Variable(one.dims, one.read_codes({}, 0), one.attrs)
+        return Variable(one.dims, np.asarray(one.read({}).data if one.is_text else one.read_floats({})), one.attrs)
+
+    coords = {name: read(name) for name in file.coordinates if dims.issuperset(file[name].dims)}
+    return Table(coords, {name: read(name) for name in names}, dict(file.attrs))
+
+
 # ------------------------------------------------------------------------------ what it holds
 
 
@@ -484,7 +518,8 @@ class ResultFile:
 class Contents:
     """What a file of slipsweep holds and how it was made; coordinates and variables in words.
 
-    The tally is None where it cannot be made, for the reason in `untold`.
+    The tally is None where it cannot be made, for the reason in `untold`.  `motions` is a table of a suite's, a header
+    and a line each.
     """
 
     path: Path
@@ -494,6 +529,21 @@ class Contents:
     variables: dict[str, str]
     tally: Tally | None
     untold: str = ""
+    motions: tuple[str, ...] = ()
+
+
+#: Columns of the table of motions: what stands above, a coordinate, and how it is written.
+_MOTION_COLUMNS = (
+    ("samples", "motion_samples", ".0f"),
+    ("interval (s)", "motion_interval", ".4g"),
+    ("PGA (m/s2)", "motion_pga", ".4g"),
+    ("PGV (m/s)", "motion_pgv", ".4g"),
+    ("PGD (m)", "motion_pgd", ".4g"),
+    ("Arias (m/s)", "motion_arias_intensity", ".4g"),
+    ("CAV (m/s)", "motion_cav", ".4g"),
+    ("D5-95 (s)", "motion_significant_duration", ".4g"),
+    ("Tm (s)", "motion_mean_period", ".4g"),
+)
 
 
 def read_contents(path: Path) -> Contents:
@@ -504,22 +554,45 @@ def read_contents(path: Path) -> Contents:
     InputError
         It cannot be read, is not netCDF, or was not written by slipsweep.
     """
-    with open_result(path) as file:
+    with result_file(path) as file:
         tally, untold = None, ""
         try:
             tally = _count(file)
         except InputError as error:
             untold = str(error).removeprefix(f"{path}: ")
+        motions = _motions_text(file)
+        told = {*MOTION_COORDINATES} if motions else set()
         return Contents(
             path,
-            path.stat().st_size,
+            nbytes(path) if is_finished(path) else path.stat().st_size,
             {name: str(value) for name, value in file.attrs.items() if name != RUN},
-            {name: _values_text(file[name]) for name in file.coordinates},
-            {name: _variable_text(file[name]) for name in file.results}
+            {
+                name: f"{file[name].size} motions" if motions and name == "motion" else _values_text(file[name])
+                for name in file.coordinates
+                if not (name in told and file[name].dims == ("motion",))
+            },
+            {name: _variable_text(file[name]) for name in file.results if file[name].dims != (SUITE_DIM,)}
             | {name: f"not read: {kind}" for name, kind in file.unread.items()},
             tally,
             untold,
+            motions,
         )
+
+
+def _motions_text(file: ResultFile) -> tuple[str, ...]:
+    """The motions of a suite as a table, a header and a line each; empty without them."""
+    if "motion" not in file or not file["motion"].is_text or file["motion"].dims != ("motion",):
+        return ()
+    columns = [["motion", *map(str, file["motion"].read({}).data)]]
+    for header, name, form in _MOTION_COLUMNS:
+        if name in file and file[name].dims == ("motion",) and not file[name].is_text:
+            values = np.ma.filled(file[name].read({}).astype(np.float64), math.nan)
+            columns.append([header, *(format(value, form) for value in values)])
+    widths = [max(map(len, column)) for column in columns]
+    rows = (
+        [label.ljust(widths[0]), *map(str.rjust, cells, widths[1:])] for label, *cells in zip(*columns, strict=True)
+    )
+    return tuple("  ".join(row) for row in rows)
 
 
 def stored_tally(path: Path) -> Tally:
@@ -545,7 +618,24 @@ def _count(file: ResultFile) -> Tally:
     if len(both) == 2 and both[0].sizes == both[1].sizes and not any(one.is_text for one in both):
         for chunk in grid_chunks(both[0].sizes, CHUNK_CELLS):
             tally.add({one.name: np.ma.filled(one.read(chunk).astype(np.float64), math.nan) for one in both})
+    tally.indices = _indices(file)
     return tally
+
+
+def _indices(file: ResultFile) -> Indices | None:
+    """Count Sobol indices, where there are any."""
+    if not {"sensitivity_status", "first_order_index", "total_index"} <= file.variables.keys():
+        return None
+    status, found = file["sensitivity_status"], [file["first_order_index"], file["total_index"]]
+    dims = (*status.dims, "input")
+    inputs = file.texts("input")
+    if any(sorted(one.dims) != sorted(dims) or one.is_text for one in found) or not inputs:
+        return None
+    counted = Indices.counted(inputs, np.empty((0, len(inputs))), np.empty((0, len(inputs))), np.empty(0))
+    for chunk in grid_chunks(status.sizes, max(CHUNK_CELLS // max(len(inputs), 1), 1)):
+        first, total = (one.read_floats(chunk).transpose([one.dims.index(dim) for dim in dims]) for one in found)
+        counted = Indices.counted(inputs, first, total, status.read_codes(chunk)).merged(counted)
+    return counted
 
 
 def _values_text(variable: FileVariable) -> str:

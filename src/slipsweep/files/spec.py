@@ -6,6 +6,7 @@ know of another, turn axes into arrays and convert their units.  Every refusal i
 `InputError` of one line, ``FILE: key = VALUE: what is allowed``.
 """
 
+import itertools
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -19,7 +20,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from slipsweep.errors import InputError
+from slipsweep.files.motions import read_embedded
 from slipsweep.files.outputs import Read
+from slipsweep.files.zarr_store import is_finished
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.tables import Variable
 from slipsweep.model.choices import Family, declared
@@ -30,29 +33,36 @@ from slipsweep.model.units import show, unit_factor
 from slipsweep.model.variables import (
     DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
+    DEFAULT_SUITE_RESULTS,
     DRAWN,
     PARAMETERS,
+    RECORD_INPUTS,
     RECORD_RESULTS,
-    RECORD_SAMPLES,
     RESULTS,
+    STRENGTHS,
+    WAVEFORM_INPUTS,
 )
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.records import Record, read_record
+from slipsweep.motion.suites import Suite, suite_in
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.studies.uncertainty import Sampling
+    from slipsweep.studies.sampling import Sampling
 
 Floats = NDArray[np.float64]
 
 #: Parameters that [model] may give as one number for the whole sweep.
-_MODEL_PARAMETERS = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency")
+_MODEL_PARAMETERS = (
+    "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency",
+)  # fmt: skip
 
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
 _INPUTS = tuple(name for name in PARAMETERS if name != "polarity")
 
-#: Keys of [excitation] that go with a record, and no other.
-_RECORD_KEYS = ("record", *(one.name for one in declared(Reading)), "polarity")
+#: Keys of [excitation] that name recorded motions, and those that go with either of them.
+_RECORDED = ("record", "records")
+_RECORD_KEYS = (*_RECORDED, "pairs", *(one.name for one in declared(Reading)), "polarity")
 
 #: What stands for standard input on a command line.
 _STANDARD_INPUT = Path("-")
@@ -128,11 +138,14 @@ ModelTable = _family(
     | {"yield_acceleration": (Annotated[Number | None, BeforeValidator(_coulomb_or_number)], None)},
 )
 
+#: A path or a pattern.
+_Name = Annotated[Text, Field(pattern=r"^[^\x00]+$")]
+
 #: The shaking, but for its strength and its time, which are axes.
 ExcitationTable = _family(
     WAVEFORMS,
     "The shaking.",
-    {"record": (Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None, None)}
+    {"record": (_Name | None, None), "records": (Any, None), "pairs": (list[Text] | None, None)}
     | {one.name: (Any, None) for one in declared(Reading)}
     | {"polarity": (Literal[1, -1, "both"], 1)},
 )
@@ -144,13 +157,14 @@ SolverTable = _family(SOLVERS, "The solver.", {})
 class Output(_Table):
     """Where the result goes and what it holds."""
 
-    path: Annotated[Text, Field(pattern=r"^[^\x00]+$")] | None = None
+    path: _Name | None = None
     title: Text = "Permanent displacement of a rigid block on a shaken inclined plane"
     variables: Annotated[list[Text], Field(min_length=1)] = list(DEFAULT_RESULTS)
     dtype: Literal["float64", "float32"] = "float64"
+    compression: Annotated[int, Field(strict=True, ge=0, le=9)] = 0
 
 
-#: One table of [uncertainty]; `slipsweep.studies.uncertainty` knows what each distribution may hold.
+#: One table of [uncertainty]; `slipsweep.studies.distributions` knows what each distribution may hold.
 Drawn = dict[Text, Any]
 
 
@@ -163,10 +177,11 @@ class _Sampling(_Table):
     quantiles: list[Number] = [0.05, 0.5, 0.95]
     thresholds: list[Any] = [0.01, 0.1, 1.0]
     correlation: list[Any] = []
+    sensitivity: Annotated[bool, Field(strict=True)] = False
 
     def sampling(self, g: float) -> "Sampling":
-        """What `slipsweep.studies.uncertainty` makes of the table (InputError: what is not allowed)."""
-        from slipsweep.studies.uncertainty import check_sampling  # imports scipy: only for sweeps that need it
+        """What `slipsweep.studies.sampling` makes of the table (InputError: what is not allowed)."""
+        from slipsweep.studies.sampling import check_sampling  # imports scipy: only for sweeps that need it
 
         return check_sampling(
             {name: drawn for name in DRAWN if (drawn := getattr(self, name)) is not None},
@@ -176,6 +191,7 @@ class _Sampling(_Table):
             quantiles=self.quantiles,
             thresholds=self.thresholds,
             correlation=self.correlation,
+            sensitivity=self.sensitivity,
             g=g,
             keys="uncertainty.",
         )
@@ -229,7 +245,7 @@ class SweepSpec:
     labels : tuple of str
         Names of the rows of [[cases]]; empty without them.
     model : Mendez or Newmark
-    excitation : Waveform or Record
+    excitation : Waveform, Record or Suite
     solver : Cycle or Step
     output : Output
         The table of the sweep file.
@@ -244,16 +260,16 @@ class SweepSpec:
     parameters: dict[str, Parameter]
     labels: tuple[str, ...]
     model: Model
-    excitation: Waveform | Record
+    excitation: Waveform | Record | Suite
     solver: Solver
     output: Output
     sampling: "Sampling | None" = None
     files: tuple[Read, ...] = ()
 
     @property
-    def record(self) -> Record | None:
-        """The recorded motion, where the shaking is one."""
-        return self.excitation if isinstance(self.excitation, Record) else None
+    def recorded(self) -> Record | Suite | None:
+        """The recorded motion or motions, where these are the shaking."""
+        return None if isinstance(self.excitation, Waveform) else self.excitation
 
     def with_solver(self, solver: Solver) -> "SweepSpec":
         """Return the same sweep under another solver."""
@@ -290,7 +306,7 @@ class SweepSpec:
                 raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
             from slipsweep.studies.limits import plan_limits
 
-            given = self._arguments_but("amplitude", "displacement_amplitude", "scale", "solver", "variables")
+            given = self._arguments_but("displacement_amplitude", *STRENGTHS, "solver", "variables")
             return plan_limits(displacement=displacement, maximum_amplitude=maximum_amplitude, **given)
 
     @contextmanager
@@ -332,7 +348,7 @@ def load(path: str | Path) -> SweepSpec:
     Parameters
     ----------
     path : str or Path
-        A sweep file (TOML), or a netCDF file that `slipsweep run` wrote: then the sweep
+        A sweep file (TOML), or a netCDF file or Zarr store that `slipsweep run` wrote: then the sweep
         it was made from.  A sweep file may be a pipe, or ``-`` for standard input; the record
         that it names is then looked for in the folder that the command runs in.
 
@@ -347,6 +363,8 @@ def load(path: str | Path) -> SweepSpec:
         the file, the key, its value and what is allowed.
     """
     path = Path(path)
+    if is_finished(path):
+        return replace(_load_result(path), files=(path, path / "zarr.json"))
     try:
         stream = is_stream(path)
         read: Read = 0 if path == _STANDARD_INPUT else path
@@ -378,23 +396,14 @@ def is_stream(path: Path) -> bool:
 
 
 def _load_result(path: Path) -> SweepSpec:
-    from slipsweep.files.results import open_result  # brings along the netCDF library
+    from slipsweep.files.results import result_file  # brings along the netCDF library
 
-    with open_result(path) as file:
+    with result_file(path) as file:
         attributes = file.attrs
-        samples = {name: file[name].read_floats({}) for name in RECORD_SAMPLES if name in file}
+        recorded = read_embedded(file, path)
     if "sweep" not in attributes:
         raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
-    about = {name: str(text) for name, text in attributes.items() if name == "baseline" or name.startswith("record")}
-    record = None
-    if len(samples) == len(RECORD_SAMPLES):
-        times, acceleration = samples.values()
-        name = about.get("record", str(path))
-        try:
-            record = Record(times, acceleration, name, about)
-        except InputError as error:  # changed by another program
-            raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
-    spec = parse(str(attributes["sweep"]), str(path), path.parent, record)
+    spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     try:
         return spec.with_solver(SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
@@ -402,7 +411,7 @@ def _load_result(path: Path) -> SweepSpec:
         raise InputError(f"{path}: {error}") from None
 
 
-def parse(text: str, source: str, folder: Path | None = None, record: Record | None = None) -> SweepSpec:
+def parse(text: str, source: str, folder: Path | None = None, recorded: Record | Suite | None = None) -> SweepSpec:
     """Check the text of a sweep file. See `load`.
 
     Parameters
@@ -411,9 +420,9 @@ def parse(text: str, source: str, folder: Path | None = None, record: Record | N
     source : str
         What to call it in errors.
     folder : Path, optional
-        Where its record is looked for; by default the folder that the command runs in.
-    record : Record, optional
-        That record, as a result has kept it: then no file is read.
+        Where its records are looked for; by default the folder that the command runs in.
+    recorded : Record or Suite, optional
+        These records, as a result has kept them: then no file is read.
     """
     try:
         # tomllib raises ValueError for integers too long to convert, RecursionError for deep nesting
@@ -428,14 +437,16 @@ def parse(text: str, source: str, folder: Path | None = None, record: Record | N
         model = _chosen(MODELS, file.model, dict.fromkeys(_MODEL_PARAMETERS))
         sampling = file.uncertainty.sampling(model.g) if file.uncertainty is not None else None
         parameters = _parameters(file, model, sampling)
-        files = [(folder or Path()) / name for name in [file.excitation.record] if name and record is None]
-        excitation = record or _excitation(file.excitation, *files)
+        excitation = recorded or _excitation(file.excitation, folder or Path())
         solver = _chosen(SOLVERS, file.solver, {})
         output = _output(file, parameters)
     except InputError as error:
-        raise InputError(f"{source}: {_one_line(str(error))}") from None
+        raise _said_of(error, f"{source}: {_one_line(str(error))}") from None
+    components = excitation.components if isinstance(excitation, Suite) else ()
+    records = (excitation,) if isinstance(excitation, Record) else components
+    files = () if recorded else tuple(Path(one.name) for one in records)
     labels = tuple(row.label or str(number) for number, row in enumerate(file.cases or (), 1))
-    return SweepSpec(source, text, parameters, labels, model, excitation, solver, output, sampling, tuple(files))
+    return SweepSpec(source, text, parameters, labels, model, excitation, solver, output, sampling, files)
 
 
 def _chosen(family: Family[Any], table: BaseModel, others: Mapping[str, Any]) -> Any:
@@ -445,19 +456,32 @@ def _chosen(family: Family[Any], table: BaseModel, others: Mapping[str, Any]) ->
     return family.made(name, given, lambda text: f"{family.keyword}.{text}")
 
 
-def _excitation(table: Any, path: Path | None = None) -> Waveform | Record:
-    """What [excitation] says: a waveform, or the record in a file."""
-    if path is None:
+def _excitation(table: Any, folder: Path) -> Waveform | Record | Suite:
+    """What [excitation] says: a waveform, or the records in files."""
+    key = _recorded(table)
+    if key is None:
         waveform: Waveform = _chosen(WAVEFORMS, table, {})
         return waveform
     try:
-        reading = Reading(**table.model_dump(exclude_unset=True, exclude={"record", "polarity"}))
+        reading = Reading(**table.model_dump(exclude_unset=True, exclude={*_RECORDED, "pairs", "polarity"}))
     except InputError as error:
         raise InputError(f"excitation.{error}") from None
     try:
-        return read_record(path, **reading.options)
+        if key == "record":
+            return read_record(folder / table.record, **reading.options)
+        return suite_in(folder, table.records, table.pairs, reading)
     except InputError as error:
-        raise InputError(f"excitation.record: {error}") from None
+        text = str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
+        named = text.startswith((key, "pairs"))
+        raise _said_of(error, f"excitation.{text}" if named else f"excitation.{key}: {text}") from None
+
+
+def _said_of(error: InputError, text: str) -> InputError:
+    """The same error, said in other words: what it notes goes along."""
+    other = InputError(text)
+    for note in getattr(error, "__notes__", ()):
+        other.add_note(note)
+    return other
 
 
 # ------------------------------------------------------------- from tables to parameters
@@ -480,15 +504,16 @@ def _parameters(file: Any, model: Model, sampling: "Sampling | None") -> dict[st
     if sampling is not None:
         sampling.check_given(tuple(given))
         given |= {*sampling.absolute}
-    harmonic = file.excitation.record is None
-    for name in ("theta", "mu_s", *(["frequency"] if harmonic else [])):
+    harmonic = _recorded(file.excitation) is None
+    interface = () if "yield_coefficient" in given else ("theta", "mu_s")
+    for name in (*interface, *(["frequency"] if harmonic else [])):
         if name not in given:
             raise InputError(f"axes.{name}: missing: give it in [axes.{name}] or in every row of [[cases]]")
     if harmonic and not given & {"amplitude", "displacement_amplitude"}:
         raise InputError("axes.amplitude: missing: give amplitude or displacement_amplitude, in [axes] or [[cases]]")
-    for other in ("displacement_amplitude", "scale"):
-        if given >= {"amplitude", other}:
-            raise InputError(f"axes.{other}: not allowed beside amplitude: give one of them")
+    for first, other in itertools.combinations(("amplitude", "displacement_amplitude", *STRENGTHS[1:]), 2):
+        if given >= {first, other}:
+            raise InputError(f"axes.{other}: not allowed beside {first}: give one of them")
 
     parameters = {name: Parameter(name, _axis(name, axis, model.g)) for name, axis in axes.items()}
     parameters |= {name: Parameter("case", values) for name, values in cases.items()}
@@ -505,16 +530,21 @@ def _parameters(file: Any, model: Model, sampling: "Sampling | None") -> dict[st
 
 
 def _check_shaking(file: Any, model: Model) -> None:
-    """Refuse keys of a harmonic motion beside a record, and keys of a record without one."""
+    """Refuse keys of a harmonic motion beside records, and keys of records without any."""
     given = file.excitation.model_fields_set
-    if file.excitation.record is None:
-        for key in sorted(given & {*_RECORD_KEYS}):
-            raise InputError(f"excitation.{key}: only beside excitation.record, the file of a recorded motion")
-        for name in ("scale", "time_scale"):
-            if place := _place(file, name):
+    key = _recorded(file.excitation)
+    if key is None:
+        for other in sorted(given & {*_RECORD_KEYS}):
+            raise InputError(f"excitation.{other}: only beside excitation.record, the file of a recorded motion")
+        for name in RECORD_INPUTS:
+            if name not in WAVEFORM_INPUTS and (place := _place(file, name)):
                 raise InputError(f"{place}: only with excitation.record, the file of a recorded motion")
         return
-    why = "not allowed with excitation.record"
+    if {*_RECORDED} <= given:
+        raise InputError("excitation.records: not allowed beside record: give one of them")
+    if key == "record" and "pairs" in given:
+        raise InputError("excitation.pairs: only beside excitation.records, the files of a suite")
+    why = f"not allowed with excitation.{key}"
     for key in sorted(given - {*_RECORD_KEYS}):
         raise InputError(f"excitation.{key}: {why}, which is the shaking itself")
     for name in ("displacement_amplitude", "frequency", "structure_frequency"):
@@ -526,6 +556,11 @@ def _check_shaking(file: Any, model: Model) -> None:
     for name in ("decay_rate", "delta_mu", "minimum_friction"):
         if isinstance(model, Newmark) and (place := _place(file, name)):
             raise InputError(f'{place}: not allowed with friction = "newmark", which has no friction law')
+
+
+def _recorded(table: Any) -> str | None:
+    """The key of [excitation] that names recorded motions; None of a waveform."""
+    return next((key for key in _RECORDED if getattr(table, key) is not None), None)
 
 
 def _place(file: Any, name: str) -> str | None:
@@ -609,13 +644,14 @@ def _first_bad(name: str, values: Floats) -> int | None:
 def _output(file: Any, parameters: Mapping[str, Parameter]) -> Output:
     """The table [output]; under a record all results are returned if none are named."""
     output: Output = file.output
+    key = _recorded(file.excitation)
     if "variables" not in output.model_fields_set:
-        named = DEFAULT_RECORD_RESULTS if file.excitation.record is not None else DEFAULT_RESULTS
+        named = {None: DEFAULT_RESULTS, "record": DEFAULT_RECORD_RESULTS, "records": DEFAULT_SUITE_RESULTS}[key]
         return output.model_copy(update={"variables": list(named)})
     variables = file.output.variables
     if file.uncertainty is not None:
         raise InputError("output.variables: not allowed beside [uncertainty], which has statistics as its results")
-    known = RESULTS if file.excitation.record is None else RECORD_RESULTS
+    known = RESULTS if key is None else RECORD_RESULTS
     for number, name in enumerate(variables, 1):
         where = f"output.variables[entry {number}] = {show(name)}"
         if name not in known:

@@ -32,9 +32,12 @@ def chunk_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim]
 
 def grid_chunks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> Iterator[dict[Dim, slice]]:
     """Cut a grid into chunks as `chunk_lengths` says, in the order of the file; a grid without cells has none."""
-    if 0 in shape.values():
-        return
-    lengths = chunk_lengths(shape, most, together)
+    if 0 not in shape.values():
+        yield from cut(shape, chunk_lengths(shape, most, together))
+
+
+def cut(shape: Mapping[Dim, int], lengths: Mapping[Dim, int]) -> Iterator[dict[Dim, slice]]:
+    """Cut a grid into chunks of these lengths, but for the last along each dimension, in the order of the file."""
     starts = (range(0, shape[dim], lengths[dim]) for dim in shape)
     for corner in itertools.product(*starts):
         yield {

@@ -35,10 +35,12 @@ from slipsweep.kernels.sine.cells import room_of
 from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
 from slipsweep.kernels.step.table import steps_of
 from slipsweep.model.options import Mendez, Model, Solver, Step
-from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, Validity
+from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, STRENGTHS, Validity
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.cutting import wave_of, wave_of_record
+from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
@@ -79,7 +81,7 @@ class Problem:
     """What all cells of a grid share: what `slipsweep.sweep` was asked to solve, and how."""
 
     model: Model
-    excitation: Waveform | Record
+    excitation: Waveform | Record | Suite
     solver: Solver
 
     def options(self, wants_peak: bool) -> Options:
@@ -96,14 +98,16 @@ class Problem:
         )
 
 
-def cell_inputs(arrays: Mapping[str, Array], dimensions: int) -> list[Array]:
+def cell_inputs(arrays: Mapping[str, Array], dimensions: int, g: float) -> list[Array]:
     """The seven fields of `Cell` as arrays of `dimensions` dimensions; what is not given is NaN.
 
-    The amplitude may be given as a peak displacement with its frequency.
+    The amplitude may be given as a peak displacement with its frequency, the yield acceleration over g.
     """
     if "displacement_amplitude" in arrays:
         amplitude = peak_acceleration(arrays["displacement_amplitude"], arrays["frequency"])
         arrays = {**arrays, "amplitude": amplitude}
+    if "yield_coefficient" in arrays:
+        arrays = {**arrays, "yield_acceleration": arrays["yield_coefficient"] * g}
     inputs = []
     for name in Cell._fields:
         source = arrays.get("theta" if name == "tan_theta" else name)
@@ -140,8 +144,9 @@ class Request:
         Shape of the results.
     arrays : mapping of str to array
         `theta` (degrees), `mu_s`, the optional parameters and the strength and the time of the shaking: under a
-        waveform `amplitude` or `displacement_amplitude`, and `frequency` (Hz); under a record `amplitude` or `scale`,
-        `time_scale` and `polarity`.  Each has as many dimensions as `shape`, of length 1 where it does not vary.
+        waveform `amplitude` or `displacement_amplitude`, and `frequency` (Hz); under records one of
+        `variables.STRENGTHS`, `time_scale` and `polarity`, of a suite also the place of the `motion` in it, and of
+        pairs `azimuth`.  Each has as many dimensions as `shape`, of length 1 where it does not vary.
     wanted : tuple of str
         Names of results; nothing else is computed.
     progress : callable, optional
@@ -173,7 +178,7 @@ class Request:
 
 
 def solve(asked: Request) -> Arrays:
-    """Solve a grid for `MOTION_RESULTS` or, under a record, `variables.RECORD_RESULTS`.
+    """Solve a grid for `MOTION_RESULTS` or, under records, `variables.RECORD_RESULTS`.
 
     Raises
     ------
@@ -219,7 +224,7 @@ def newmark(asked: Request) -> Arrays:
 
 def _parts(asked: Request) -> Iterator[tuple[tuple[slice, ...], Request]]:
     """Parts that are solved one after the other: those of one motion, and those whose amplitudes memory holds."""
-    if isinstance(asked.problem.excitation, Record):
+    if isinstance(asked.problem.excitation, (Record, Suite)):
         yield from motions(asked)
     elif _amplitudes(asked.arrays) <= _AMPLITUDES:
         yield (slice(None),) * len(asked.shape), asked
@@ -229,12 +234,58 @@ def _parts(asked: Request) -> Iterator[tuple[tuple[slice, ...], Request]]:
             yield slab, asked.part(slab)
 
 
+#: Inputs that make another motion of the plane, hence another table of pieces.
+_MOTIONS = ("motion", "azimuth", "polarity")
+
+
 def motions(asked: Request) -> Iterator[tuple[tuple[slice, ...], Request]]:
-    """The parts of a grid of records that one motion shakes, and where in the grid they lie; all of a waveform's."""
-    polarity = asked.arrays.get("polarity", np.ones((1,) * len(asked.shape)))
-    for side in np.ndindex(polarity.shape):
-        where = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, polarity.shape, strict=True))
-        yield where, asked.part(where)
+    """The parts of a grid of records that one motion shakes, and where in the grid they lie; all of a waveform's.
+
+    Of a suite each is under a record of its own, with which a solver goes on as if there were no other.
+    """
+    own = [asked.arrays[name].shape for name in _MOTIONS if name in asked.arrays]
+    varying = np.broadcast_shapes((1,) * len(asked.shape), *own)
+    for side in np.ndindex(varying):
+        where = tuple(slice(at, at + 1) if n > 1 else slice(None) for at, n in zip(side, varying, strict=True))
+        yield where, _under_one(asked.part(where))
+
+
+def _under_one(part: Request) -> Request:
+    """A part that one motion of a suite shakes, under the record of that motion."""
+    suite = part.problem.excitation
+    if not isinstance(suite, Suite):
+        return part
+    arrays = dict(part.arrays)
+    motion, azimuth = arrays.pop("motion"), arrays.pop("azimuth", np.zeros(1))
+    record = suite.record(int(motion.item()), float(azimuth.item()))
+    return replace(part, problem=replace(part.problem, excitation=record), arrays=arrays)
+
+
+def narrowed(problem: Problem, inputs: Mapping[str, Array]) -> tuple[Problem, dict[str, Array]]:
+    """A problem with no more motions than its inputs name, which goes to another process with as many samples."""
+    suite = problem.excitation
+    if not isinstance(suite, Suite):
+        return problem, dict(inputs)
+    used, places = np.unique(inputs["motion"].astype(np.int64), return_inverse=True)
+    if used.size == len(suite):
+        return problem, dict(inputs)
+    part = suite.only([suite.labels[at] for at in used])
+    return replace(problem, excitation=part), {
+        **inputs,
+        "motion": places.reshape(inputs["motion"].shape).astype(np.float64),
+    }
+
+
+def factors(asked: Request) -> Arrays:
+    """The factor on the acceleration of every motion, whatever says how strong it is."""
+    results = asked.results()
+    for where, part in motions(asked):
+        record = part.problem.excitation
+        assert isinstance(record, Record)
+        for values in results.values():
+            values[where] = strength_factor(record, part.arrays)
+        asked.tell(math.prod(part.shape))
+    return results
 
 
 def _amplitudes(arrays: Mapping[str, Array]) -> int:
@@ -244,7 +295,7 @@ def _amplitudes(arrays: Mapping[str, Array]) -> int:
     return math.prod(np.broadcast_shapes(arrays["displacement_amplitude"].shape, arrays["frequency"].shape))
 
 
-def _is_plain_sine(motion: Waveform | Record) -> bool:
+def _is_plain_sine(motion: Waveform | Record | Suite) -> bool:
     """Whether a motion is a sine without ramps, for which there are shorter ways."""
     return isinstance(motion, Sine) and motion == Sine(motion.cycles)
 
@@ -267,21 +318,24 @@ def _solve_into(results: Arrays, asked: Request) -> None:
         mark_flexible_blocks(results["validity"], arrays["frequency"], arrays["structure_frequency"])
 
 
-def extremes_of(motion: Waveform | Record) -> dict[str, Array]:
-    """The largest numbers of a motion itself, by what they are called in errors."""
+def extremes_of(motion: Waveform | Record | Suite) -> dict[str, Array]:
+    """The largest numbers of a motion itself, or of each of a suite, by what they are called in errors."""
     if isinstance(motion, Waveform):
         return {}
-    own = {"acceleration of the record": motion.peak, "time of the record": np.abs(motion.times).max()}
-    return {name: np.array(value) for name, value in own.items()}
+    records = motion.components if isinstance(motion, Suite) else (motion,)
+    peaks, times = [one.peak for one in records], [np.abs(one.times).max() for one in records]
+    return {
+        "acceleration of the record": np.array(peaks if len(peaks) > 1 else peaks[0]),
+        "time of the record": np.array(times if len(times) > 1 else times[0]),
+    }
 
 
 def are_ordinary(problem: Problem, given: Mapping[str, Array]) -> bool:
     """Whether no result can be too large for double precision, whatever the given values are combined to."""
     values = {name: values for name, values in given.items() if name not in UNBOUNDED}
     looked_at = [np.array(problem.model.g), *values.values(), *extremes_of(problem.excitation).values()]
-    if "amplitude" in values and isinstance(problem.excitation, Record) and problem.excitation.peak > 0.0:
-        with np.errstate(over="ignore"):
-            looked_at.append(values["amplitude"] / problem.excitation.peak)
+    if isinstance(problem.excitation, (Record, Suite)):
+        looked_at += _extreme_factors(problem.excitation, values)
     if {"displacement_amplitude", "frequency"} <= values.keys():
         # A = ω²d grows with both: of the extremes of both, it has its own
         d, f = (
@@ -293,14 +347,27 @@ def are_ordinary(problem: Problem, given: Mapping[str, Array]) -> bool:
     return all(map(is_ordinary, looked_at))
 
 
+def _extreme_factors(motion: Record | Suite, values: Mapping[str, Array]) -> list[Array]:
+    """The least and the largest factors on records, whatever the strengths are combined with."""
+    extremes = {name: np.array([values[name].min(), values[name].max()]) for name in STRENGTHS if name in values}
+    time_scale = values.get("time_scale", np.ones(1))
+    found = []
+    for record in motion.components if isinstance(motion, Suite) else (motion,):
+        if record.peak > 0.0:
+            for stretch in (time_scale.min(), time_scale.max()):
+                given = {**extremes, "time_scale": np.array(stretch)}
+                found.append(strength_factor(record, given if extremes else {"scale": np.ones(1)}))
+    return found
+
+
 def kernel_inputs(asked: Request) -> tuple[list[Array], Array, tuple[str, ...]]:
     """What kernels take: the fields of `Cell`, 1/ω or the factor on time, and the names of their rows of codes."""
-    motion, arrays, dimensions = asked.problem.excitation, asked.arrays, len(asked.shape)
+    motion, arrays, dimensions, g = asked.problem.excitation, asked.arrays, len(asked.shape), asked.problem.model.g
     if isinstance(motion, Waveform):
-        return cell_inputs(arrays, dimensions), 1.0 / (2.0 * math.pi * arrays["frequency"]), MOTION_CODES
-    with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
-        scale = arrays["scale"] if "scale" in arrays else arrays["amplitude"] / motion.peak
-    return cell_inputs({**arrays, "amplitude": scale}, dimensions), arrays["time_scale"], RECORD_CODES
+        return cell_inputs(arrays, dimensions, g), 1.0 / (2.0 * math.pi * arrays["frequency"]), MOTION_CODES
+    assert isinstance(motion, Record)  # `motions` has made a suite into its parts
+    own = {**arrays, "amplitude": strength_factor(motion, arrays)}
+    return cell_inputs(own, dimensions, g), arrays["time_scale"], RECORD_CODES
 
 
 def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
@@ -315,6 +382,18 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
 
         # some 2 µs against 0.1, and more for a long record
         return call, max(32, recorded.pieces.shape[0] // 64)
+    assert isinstance(motion, Waveform)
+    if _is_plain_sine(motion) and not isinstance(solver, Step):
+
+        def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+            tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
+            count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
+            if count:
+                # only here: to cut a sine into pieces takes 0.1 s, a seventh of a small run
+                stretches, wave = remaining[:count], wave_of(motion)
+                REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile)
+
+        return call_sine, 1
     wave = wave_of(motion)
     if isinstance(solver, Step):
         kernel, steps = STEP_KERNELS[options.rule], steps_of(wave, options.steps_per_cycle, options.rule)
@@ -325,17 +404,10 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         # a step takes about 1/16 of a cell of the cycle solver
         return call_step, 1 + options.steps_per_cycle // 16
 
-    def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-        tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
-        count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
-        if count:
-            stretches = remaining[:count]
-            REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile)
-
     def call_wave(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
         WAVE_KERNEL(grid, first, last, rows, periods, options, wave, targets, tile_of(grid))
 
-    return call_sine if _is_plain_sine(motion) else call_wave, 1
+    return call_wave, 1
 
 
 def amplitudes(asked: Request) -> Arrays:
@@ -415,7 +487,7 @@ def estimates(asked: Request, checked: bool = False) -> Arrays:
 
     def solve_slab(slab: tuple[slice, ...]) -> None:
         own = asked.part(slab)
-        inputs = cell_inputs(own.arrays, len(own.shape))
+        inputs = cell_inputs(own.arrays, len(own.shape), own.problem.model.g)
         grid = layout(own.shape, None, [*inputs, np.ones((1,) * len(own.shape))])
         cells = math.prod(own.shape)
         parameters = np.empty((len(FRICTION_PARAMETERS), cells))
@@ -449,7 +521,7 @@ def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
         PARAMETER_KERNEL.expect()
     elif solver not in (solve, newmark):
         return
-    elif isinstance(problem.excitation, Record):
+    elif isinstance(problem.excitation, (Record, Suite)):
         RECORD_KERNEL.expect()
     elif isinstance(problem.solver, Step):
         STEP_KERNELS[RULES[problem.solver.rule]].expect()

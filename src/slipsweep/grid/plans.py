@@ -21,7 +21,7 @@ from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.model.estimates import friction_inputs
-from slipsweep.model.options import MODELS, SOLVERS, Cycle, Newmark, Step
+from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Step
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choices,
@@ -36,22 +36,30 @@ from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
+    DEFAULT_SUITE_RESULTS,
     DIMENSION_ORDER,
     FRICTION_PARAMETERS,
+    INTERFACE_INPUTS,
+    MOTION,
+    MOTION_COORDINATES,
     PARAMETERS,
     RECORD_INPUTS,
     RECORD_RESULTS,
     REFERENCE,
     RESULT_DTYPES,
     RESULTS,
+    STRENGTHS,
     WAVEFORM_INPUTS,
 )
 from slipsweep.motion.amplitude import peak_acceleration
+from slipsweep.motion.cutting import MOST_TABLES, TABLE_BYTES
 from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 _FRICTION_INPUTS = (
-    "theta", "mu_s", "amplitude", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction",
+    "theta", "mu_s", "amplitude", "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu",
+    "minimum_friction",
 )  # fmt: skip
 
 #: Cells of the cycle solver that a cell of a record takes, about.
@@ -96,7 +104,8 @@ class Task:
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
         sizes = {dim: cut.stop - cut.start for dim, cut in zip(self.sizes, slices, strict=True)}
-        return replace(self, sizes=sizes, inputs=engine.cut(self.inputs, slices))
+        problem, inputs = engine.narrowed(self.problem, engine.cut(self.inputs, slices))
+        return replace(self, problem=problem, sizes=sizes, inputs=inputs)
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,7 @@ class Plan:
         Results in the order they are returned in.
     attrs : dict
         What the results say of themselves.
-    cost, together, cell_memory, is_ordinary
+    cost, together, memory, cell_memory, is_ordinary
         As in `anyplan.AnyPlan`.
     described : mapping of str to dict
         Attributes of the results.
@@ -127,12 +136,10 @@ class Plan:
     attrs: dict[str, Any]
     cost: float = 1.0
     together: tuple[str, ...] = ()
+    memory: int = 0
     cell_memory: int = 0
     is_ordinary: bool = True
     described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: RESULTS | RECORD_RESULTS)
-
-    #: Slabs of friction parameters, say: nothing beside what a program takes.
-    memory = 0
 
     def __post_init__(self) -> None:
         check_dimensions(self.sizes, self.coords, self.names)
@@ -216,8 +223,8 @@ def plan_sweep(
     """
     problem = check_problem(excitation, model, solver)
     parameters = check_parameters(problem, given)
-    if isinstance(problem.excitation, Record):
-        return _plan_record(problem, parameters, variables)
+    if isinstance(problem.excitation, (Record, Suite)):
+        return _plan_records(problem, parameters, variables)
     return _plan_waveform(problem, parameters, variables)
 
 
@@ -229,22 +236,85 @@ def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, Va
         check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
         if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
             raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
-        check_given(parameters, ("theta", "mu_s", "frequency"))
+        _check_interface(problem.model, parameters)
+        check_given(parameters, ("frequency",))
         return checked(parameters)
-    check_inputs(parameters, RECORD_INPUTS, "a Record")
-    check_given(parameters, ("theta", "mu_s"))
-    if {"amplitude", "scale"} <= parameters.keys():
-        raise InputError("amplitude, scale: must not both be given; either is the strength of the record")
-    if "amplitude" in parameters and not motion.peak > 0.0:
-        raise InputError(f"amplitude: {motion.name} has no acceleration to scale; give scale")
+    check_inputs(parameters, RECORD_INPUTS, "a Suite" if isinstance(motion, Suite) else "a Record")
+    _check_interface(problem.model, parameters)
+    strengths = [name for name in STRENGTHS if name in parameters]
+    if len(strengths) > 1:
+        raise InputError(f"{', '.join(strengths[:2])}: must not both be given; either is the strength of the motion")
+    if isinstance(motion, Suite) and motion.has_pairs:
+        if "azimuth" not in parameters:
+            raise InputError("azimuth: must be given with pairs of components")
+    elif "azimuth" in parameters:
+        raise InputError("azimuth: only with a Suite of pairs of components (read_suite: pairs)")
     if isinstance(problem.model, Newmark):
         for name in ("decay_rate", "delta_mu", "minimum_friction"):
             if name in parameters:
                 raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
     polarity = _polarity(parameters.pop("polarity", 1))
-    defaults = {"time_scale": 1.0} if "amplitude" in parameters else {"scale": 1.0, "time_scale": 1.0}
+    defaults = {"time_scale": 1.0} if strengths else {"scale": 1.0, "time_scale": 1.0}
     parameters = defaults | parameters
-    return checked({name: parameters[name] for name in PARAMETERS if name in parameters}) | {"polarity": polarity}
+    found = checked({name: parameters[name] for name in PARAMETERS if name in parameters}) | {"polarity": polarity}
+    found |= motion_coordinates(motion, found)
+    if strengths and strengths != ["scale"]:
+        _check_moving(motion, found, strengths[0])
+    return found
+
+
+def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
+    """Refuse an interface that is not known, or known twice."""
+    if "yield_coefficient" not in parameters:
+        check_given(parameters, ("theta", "mu_s"))
+        return
+    if not isinstance(model, Newmark):
+        raise InputError(
+            f"yield_coefficient: not allowed with model = {model.name!r}, whose friction needs theta and mu_s; "
+            "only with model = 'newmark'"
+        )
+    for name in INTERFACE_INPUTS:
+        if name in parameters:
+            raise InputError(f"{name}: not allowed beside yield_coefficient, which is all of the interface")
+
+
+def motion_coordinates(motion: Record | Suite, coords: Mapping[str, Variable]) -> dict[str, Variable]:
+    """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
+    if not isinstance(motion, Suite):
+        return {}
+    found = {"motion": Variable(("motion",), np.array(motion.labels), MOTION)}
+    found |= {name: Variable(("motion",), one, MOTION_COORDINATES[name]) for name, one in motion.measures.items()}
+    if motion.has_pairs:
+        azimuth, places = coords["azimuth"], Variable(("motion",), np.arange(len(motion)))
+        sizes = grid_sizes({"azimuth": azimuth, "motion": places})
+        values = aligned({"azimuth": azimuth}, sizes)["azimuth"]
+        for name, one in motion.intensities(np.broadcast_to(values, tuple(sizes.values()))).items():
+            found[name] = Variable(tuple(sizes), one, MOTION_COORDINATES[name])
+    return found
+
+
+def inputs_of(problem: Problem, coords: Mapping[str, Variable]) -> dict[str, Variable]:
+    """The coordinates that cells are solved for: of a motion its place in the suite, and no more."""
+    suite = problem.excitation
+    if not isinstance(suite, Suite):
+        return dict(coords)
+    places = np.array([suite.index(str(label)) for label in coords["motion"].values], np.float64)
+    own = {name: one for name, one in coords.items() if name not in MOTION_COORDINATES}
+    return own | {"motion": Variable(("motion",), places)}
+
+
+def _check_moving(motion: Record | Suite, coords: Mapping[str, Variable], strength: str) -> None:
+    """Refuse to scale a motion that has no acceleration."""
+    if isinstance(motion, Record):
+        if not motion.peak > 0.0:
+            raise InputError(f"{strength}: {motion.name} has no acceleration to scale; give scale")
+        return
+    peaks = coords["motion_pga"]
+    still = np.argwhere(~(peaks.values > 0.0))
+    if still.size:
+        at = dict(zip(peaks.dims, still[0], strict=True))
+        where = f" at azimuth {coords['azimuth'].pick(at).item():g}" if motion.has_pairs else ""
+        raise InputError(f"{strength}: {motion.labels[at['motion']]}{where} has no acceleration to scale; give scale")
 
 
 def _polarity(given: Any) -> Variable:
@@ -260,29 +330,51 @@ def _polarity(given: Any) -> Variable:
     return Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
 
 
-def _plan_record(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
-    """Plan of a sweep under a record; `coords` as `check_parameters` gives them."""
-    wanted = DEFAULT_RECORD_RESULTS if variables is None else check_choices("variables", variables, RECORD_RESULTS)
-    sizes = grid_sizes(coords)
-    tasks = _motion_tasks(problem, wanted, RECORD_RESULTS, sizes, aligned(coords, sizes))
-    attrs = about("Response of a rigid block to a recorded motion", problem, coords)
+def _plan_records(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+    """Plan of a sweep under a record or a suite; `coords` as `check_parameters` gives them."""
+    is_suite = isinstance(problem.excitation, Suite)
+    default = DEFAULT_SUITE_RESULTS if is_suite else DEFAULT_RECORD_RESULTS
+    wanted = default if variables is None else check_choices("variables", variables, RECORD_RESULTS)
+    inputs = inputs_of(problem, coords)
+    sizes = grid_sizes(inputs)
+    tasks = list(_motion_tasks(problem, wanted, RECORD_RESULTS, sizes, aligned(inputs, sizes)))
+    cost = cost_of(problem) * max(len(tasks), 1)
+    if "motion_factor" in wanted:
+        tasks.append(_factor_task(problem, inputs))
+    motions = "suite of recorded motions" if is_suite else "recorded motion"
+    attrs = about(f"Response of a rigid block to a {motions}", problem, coords)
     return Plan(
-        sizes, coords, tasks, wanted, attrs, cost_of(problem) * len(tasks), is_ordinary=ordinary(problem, coords)
+        sizes,
+        coords,
+        tuple(tasks),
+        wanted,
+        attrs,
+        cost,
+        memory=memory_of(problem),
+        is_ordinary=ordinary(problem, coords),
     )
+
+
+def _factor_task(problem: Problem, inputs: Mapping[str, Variable]) -> Task:
+    """The factor on each motion, on the dimensions it depends on."""
+    strength = next(name for name in STRENGTHS if name in inputs)
+    names = [strength, *(["time_scale"] if strength in ("pgv", "arias_intensity") else []), "azimuth", "motion"]
+    own = {name: inputs[name] for name in names if name in inputs}
+    sizes = grid_sizes(own)
+    return Task(engine.factors, problem, ("motion_factor",), sizes, aligned(own, sizes))
 
 
 def _motion_tasks(
     problem: Problem, wanted: Collection[str], results: Collection[str], sizes: dict[str, int], inputs: Arrays
 ) -> tuple[Task, ...]:
     """The motion of the block, and of Newmark's on the same cells; `results` are those of a motion, in order."""
-    motion = tuple(name for name in results if name in wanted and name != "newmark_displacement")
+    motion = tuple(name for name in results if name in wanted and name not in ("newmark_displacement", "motion_factor"))
     beside = tuple(name for name in ("newmark_displacement",) if name in wanted)
-    classical = replace(problem, model=Newmark(problem.model.g))
-    tasks = (
-        Task(engine.solve, problem, motion, sizes, inputs),
-        Task(engine.newmark, classical, beside, sizes, inputs),
-    )
-    return tuple(task for task in tasks if task.names)
+    tasks = (Task(engine.solve, problem, motion, sizes, inputs),) if motion else ()
+    if beside:
+        classical = replace(problem, model=Newmark(problem.model.g))
+        tasks = (*tasks, Task(engine.newmark, classical, beside, sizes, inputs))
+    return tasks
 
 
 def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
@@ -306,6 +398,9 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
     cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
     friction = tuple(name for name in FRICTION_PARAMETERS if name in wanted and name not in inputs)
+    for name in friction if "yield_coefficient" in inputs else ():
+        if name != "yield_acceleration":
+            raise InputError(f"variables: {name} needs theta and mu_s in place of yield_coefficient")
     if friction:
         tasks.append(_friction_task(problem, friction, inputs))
     amplitude = ("amplitude",) if "amplitude" in wanted and "amplitude" not in coords else ()
@@ -343,10 +438,10 @@ def plan_friction_parameters(*, model: Any = "mendez", **given: Any) -> Plan:
 
 def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
     """What is to be solved, and how; each is an object, or the name of one with its defaults."""
-    motion = excitation if isinstance(excitation, Record) else WAVEFORMS.of(excitation)
+    motion = excitation if isinstance(excitation, (Record, Suite)) else WAVEFORMS.of(excitation)
     chosen = SOLVERS.of(solver)
-    if isinstance(motion, Record) and not isinstance(chosen, Cycle):
-        raise InputError(f"solver = {chosen}: not allowed with a Record, to which Cycle() is exact")
+    if isinstance(motion, (Record, Suite)) and not isinstance(chosen, Cycle):
+        raise InputError(f"solver = {chosen}: not allowed with a {type(motion).__name__}, to which Cycle() is exact")
     return Problem(MODELS.of(model), motion, chosen)
 
 
@@ -445,12 +540,23 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
 
 def ordinary(problem: Problem, coords: Mapping[str, Variable]) -> bool:
     """Whether no result can be too large for double precision."""
-    return engine.are_ordinary(problem, {name: one.values for name, one in coords.items()})
+    own = {name: one for name, one in coords.items() if name not in ("motion", *MOTION_COORDINATES)}
+    return engine.are_ordinary(problem, {name: one.values for name, one in own.items()})
+
+
+def memory_of(problem: Problem) -> int:
+    """Bytes of the tables of pieces of recorded motions, while cells are solved."""
+    if isinstance(problem.excitation, Waveform):
+        return 0
+    suite = problem.excitation
+    lengths = [one.times.size for one in (suite if isinstance(suite, Suite) else (suite,))]
+    # of two polarities; one table is made beside those that are kept
+    return TABLE_BYTES * max(lengths) + min(2 * TABLE_BYTES * sum(lengths), MOST_TABLES)
 
 
 def cost_of(problem: Problem) -> float:
     """What a cell takes, in cells of the cycle solver."""
-    if isinstance(problem.excitation, Record):
+    if isinstance(problem.excitation, (Record, Suite)):
         return _RECORD_COST
     return 1.0 + problem.solver.steps_per_cycle / 16 if isinstance(problem.solver, Step) else 1.0
 
@@ -464,8 +570,11 @@ def about(title: str, problem: Problem, given: Collection[str]) -> dict[str, Any
     """What results say of themselves: the choices read back from it are those of the problem."""
     inputs = {"friction_inputs": friction_inputs(problem.model.name, given)}
     motion = problem.excitation
+    shaking: Mapping[str, Any]
     if isinstance(motion, Record):
         shaking = {"record": motion.name, **motion.attrs}
+    elif isinstance(motion, Suite):
+        shaking = motion.attrs
     else:
         shaking = WAVEFORMS.attributes(motion) | SOLVERS.attributes(problem.solver)
     return {"title": title, **_SOURCE, **MODELS.attributes(problem.model), **inputs, **shaking}

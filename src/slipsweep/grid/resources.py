@@ -6,6 +6,9 @@ from pathlib import Path
 
 from slipsweep.errors import InputError
 
+#: Bytes that are always there: to ask the system takes longer than to solve a small grid.
+_LITTLE = 1_000_000
+
 
 def available_memory() -> int | None:
     """Bytes of memory that can be had without swapping, or None where the system does not say."""
@@ -25,7 +28,7 @@ def check_memory(what: str, needed: int, advice: str) -> None:
     InputError
         Naming what takes how much, and what to do about it.
     """
-    free = available_memory()
+    free = available_memory() if needed > _LITTLE else None
     if free is not None and needed > free:
         raise InputError(f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}")
 

@@ -1,14 +1,14 @@
 """Counts of sliding modes and flags over a grid, and the spread of the displacement about Newmark's."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.model.variables import SlidingMode, Validity
+from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
 
 #: Bits that are left off a ratio in single precision where ratios are counted: to one part in a thousand.
 _LEFT_OFF = 13
@@ -58,17 +58,76 @@ class Ratios:
         return math.nan
 
 
+#: What Sobol indices are summed in: whole numbers have the same sum in any order.
+_MILLIONTH = 1e-6
+
+
+@dataclass
+class Indices:
+    """Sobol indices of grid points, counted.
+
+    Attributes
+    ----------
+    status : dict of SensitivityStatus to int
+        Grid points with indices, and without for each reason.
+    first, total : dict of str to int
+        Sums of the indices of each input, in millionths.
+    largest : dict of str to int
+        Grid points at which the total index of this input is the largest.
+    """
+
+    status: dict[SensitivityStatus, int]
+    first: dict[str, int]
+    total: dict[str, int]
+    largest: dict[str, int]
+
+    @classmethod
+    def counted(
+        cls, inputs: Sequence[str], first: NDArray[Any], total: NDArray[Any], status: NDArray[Any]
+    ) -> "Indices":
+        """Count indices, whose last dimension is that of the inputs, and their status."""
+        by_status = {one: int(np.count_nonzero(status == int(one))) for one in SensitivityStatus}
+        both = np.stack([first, total]).reshape(2, -1, len(inputs)).astype(np.float64)
+        # a file may have passed through other programs
+        rows = both[:, (status.ravel() == 0) & np.isfinite(both).all(axis=(0, 2))]
+        sums = np.rint(np.clip(rows, -1e6, 1e6) / _MILLIONTH).astype(np.int64).sum(axis=1).tolist()
+        largest = np.bincount(rows[1].argmax(axis=1), minlength=len(inputs)).tolist()
+        by_input = [dict(zip(inputs, values, strict=True)) for values in (*sums, largest)]
+        return cls(by_status, *by_input)
+
+    def mean(self, sums: Mapping[str, int], name: str) -> float:
+        """The mean of one of the sums over all grid points with indices."""
+        return sums[name] * _MILLIONTH / max(self.status[SensitivityStatus.COMPUTED], 1)
+
+    def merged(self, other: "Indices | None") -> "Indices":
+        """Those of other grid points added."""
+        if other is None:
+            return self
+        status = {one: count + other.status[one] for one, count in self.status.items()}
+        sums = (
+            {name: count + more[name] for name, count in own.items()}
+            for own, more in ((self.first, other.first), (self.total, other.total), (self.largest, other.largest))
+        )
+        return Indices(status, *sums)
+
+
 @dataclass
 class Tally:
     """Counts of cells, and among them of each sliding mode and each flag, and displacements over Newmark's.
 
-    None: not stored.
+    None: not stored.  Modes and flags are of all cells, or of `counted` if that is not 0.
     """
 
     cells: int = 0
     modes: dict[SlidingMode, int] | None = None
     flags: dict[Validity, int] | None = None
     ratios: Ratios | None = None
+    indices: Indices | None = None
+    counted: int = 0
+
+    def share(self, count: int) -> float:
+        """A count of a mode or a flag over all that was counted."""
+        return count / (self.counted or self.cells)
 
     def add(self, results: Mapping[str, NDArray[Any]]) -> None:
         """Count one chunk; `results` holds its arrays by variable name."""
@@ -89,6 +148,9 @@ class Tally:
     def merge(self, other: "Tally") -> None:
         """Add the counts of other cells."""
         self.cells += other.cells
+        self.counted += other.counted
+        if other.indices is not None:
+            self.indices = other.indices.merged(self.indices)
         if other.modes is not None:
             self.modes = {mode: (self.modes or {}).get(mode, 0) + count for mode, count in other.modes.items()}
         if other.flags is not None:

@@ -22,8 +22,8 @@ from slipsweep.jit.garbage import no_collections
 #: The folder of the package.
 PACKAGE = Path(__file__).parents[1]
 
-#: How the sources begin that results come from, and those that machine code comes from.
-RESULTS = "files/spec.py"
+#: How the sources begin that results come from, or are written by, and those that machine code comes from.
+RESULTS: tuple[str, ...] = ("files/spec.py", "files/checksums.py", "files/netcdf.py", "files/zarr_store.py")
 MACHINE_CODE = "kernels/"
 
 #: How a string with a blank begins in what `_append_code` writes.
@@ -65,7 +65,7 @@ def keys_of(sources: Mapping[str, Source]) -> Keys:
     )
 
 
-def reached(sources: Mapping[str, Source], start: str) -> list[str]:
+def reached(sources: Mapping[str, Source], start: str | tuple[str, ...]) -> list[str]:
     """Names of the sources that begin with `start`, and of all that they import, directly or not."""
     todo = [name for name in sources if name.startswith(start)]
     found: set[str] = set()

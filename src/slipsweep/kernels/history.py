@@ -12,10 +12,10 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block, Options, block_at, cell_of, response
 from slipsweep.kernels.cycle.eq4 import eq4_integrals
-from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, Room
-from slipsweep.kernels.cycle.pulse import follow_pulse
+from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, STATE_SIZE, Room
+from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
-from slipsweep.kernels.pulse import STATE_ROWS, beginning, first_pulse
+from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.kernels.record import block_in_pulse, end_of_following, one_pulse, slides_on
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP
@@ -79,7 +79,7 @@ def history_room(wave: Wave) -> Room:
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
     legs = np.zeros((longest * MOST_LEGS + wave.pieces.shape[0] + 2, LEG_COLUMNS))
-    return Room(np.zeros(STATE_ROWS), legs, np.zeros((2, MOST_LEGS)))
+    return Room(np.zeros(STATE_SIZE), legs, np.zeros((2, MOST_LEGS)))
 
 
 @scalar
@@ -128,7 +128,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         offset = 2.0 * math.pi * repeat
         room.legs[0, 0] = 0.0
         start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, again) + offset
-        now = follow_pulse(block, options, wave, room, k, again, velocity)
+        now = pulse(block, options, wave, room, k, again, velocity)
         at = sample_pulse(
             block, wave, room.legs, start, until, offset, displacement, now.displacement, phases, at, history
         )

@@ -8,30 +8,31 @@ together).  No step is taken, no error but rounding.  Derivations: docs/numerics
 
 import math
 
+import numpy as np
+
 from slipsweep.jit.decorators import scalar
 
-#: From here on the moments' closed forms lose less than a digit; below, their power series is summed.
-_SERIES_END = 2.0
-_SERIES_TERMS = 24
+#: From here on the moments' closed forms lose less than a digit; below, φ₃'s power series Σ (−z)^k / (k + 3)! is
+#: summed, whose first terms are enough where z is small, as on the short pieces of a record.
+_SERIES_END, _SHORT_SERIES_END = 2.0, 0.0625
+_SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
+_SHORT_SERIES = 8
 
 
 @scalar
 def exponential_moments(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w(1 − w) over w from 0 to 1, for z ≥ 0.
 
-    The first two are φ₁ and φ₂ of exponential integrators at −z.  Below z = 2 by their power
-    series Σ (−z)^k/k! B(k), beyond by the closed forms, which cancel at small z.
+    The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z = 2 that is
+    summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
     """
     if z < _SERIES_END:
-        whole, early, late, both = 0.0, 0.0, 0.0, 0.0
-        term = 1.0
-        for k in range(_SERIES_TERMS):
-            whole += term / (k + 1.0)
-            early += term / ((k + 1.0) * (k + 2.0))
-            late += term / (k + 2.0)
-            both += term / ((k + 2.0) * (k + 3.0))
-            term *= -z / (k + 1.0)
-        return whole, early, late, both
+        third = 0.0
+        for k in range((_SHORT_SERIES if z < _SHORT_SERIES_END else _SERIES.size) - 1, -1, -1):
+            third = _SERIES[k] - z * third
+        early = 0.5 - z * third
+        whole = 1.0 - z * early
+        return whole, early, whole - early, early - 2.0 * third
     decayed = math.exp(-z)
     square = z * z
     return (
@@ -66,7 +67,7 @@ def held_stop(velocity: float, rate: float, slope: float) -> float:
         # accelerations over their size: their squares are no doubles
         size = max(abs(rate), math.sqrt(abs(slope)) * math.sqrt(velocity))
         if size == 0.0:
-            return math.inf
+            return math.inf if slope >= 0.0 else 0.0
         square = (rate / size) * (rate / size) - 2.0 * (slope / size) * (velocity / size)
     if rate > 0.0:
         return (rate + size * math.sqrt(square)) / -slope if slope < 0.0 else math.inf

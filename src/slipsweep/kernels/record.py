@@ -139,7 +139,7 @@ def one_pulse(
     if slides_on(block, peak):
         return continuous_pulse(block, options, wave, k, following, peak, velocity, room)
     # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
-    return pulse(block, options, wave, room.legs, k, following, max(velocity, 0.0), room.state)
+    return pulse(block, options, wave, room, k, following, max(velocity, 0.0))
 
 
 @scalar
@@ -155,7 +155,7 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
     if eq.normal_acceleration(scale * wave.lowest, cell.tan_theta, options.g) <= 0.0:
         validity |= UPLIFT
     room.state[SLIPS] = 0.0
-    velocity, displacement, highest = 0.0, 0.0, 0.0
+    velocity, displacement, lost, highest = 0.0, 0.0, 0.0, 0.0
     stick_slips, continuous = 0, 0
     k = first_pulse(block, wave, 0)
     while k < wave.height.size and validity & NO_VALUE == 0:
@@ -182,10 +182,12 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
             validity |= now.validity if math.isnan(now.displacement) else 0
             if now.velocity > 0.0 and following < wave.height.size:
                 validity |= NOT_RECOUPLED
-        velocity, displacement, highest = now.velocity, displacement + now.displacement, max(now.peak, highest)
+        velocity, highest = now.velocity, max(now.peak, highest)
+        displacement, lost = add(displacement, lost, now.displacement)
         if math.isnan(displacement + highest) and validity & NO_VALUE == 0:
             validity |= UNSOLVED
         k = following
+    displacement += lost
     codes[3, j] = settled(validity, displacement)
     if validity & NO_VALUE:
         codes[0, j] = codes[1, j] = codes[2, j] = -1
@@ -205,6 +207,59 @@ def lines_of(wave: Wave, options: Options) -> np.ndarray:
     return lines
 
 
+@in_lanes
+def add(total: float, lost: float, term: float) -> tuple[float, float]:
+    """A sum and what rounding has lost of it, with a term more: a record has up to a million of them."""
+    now = total + term
+    without = now - total
+    rounded = (total - (now - without)) + (term - without)
+    return now, lost + (rounded if math.isfinite(now) else 0.0)
+
+
+@in_lanes
+def slide(
+    lines: np.ndarray, p: int, threshold: float, velocity: float, displacement: float, peak: float
+) -> tuple[int, float, float, float]:
+    """Slide on with b = `threshold` from the beginning of piece p to the stop, or to the end of the record.
+
+    The piece it has come to, V, W and the largest V.  A loop each above and below Üy: a piece then takes no more than
+    its sums, and what can end the loop.
+    """
+    pieces = lines.shape[0]
+    while p < pieces:
+        while p < pieces and lines[p, 0] >= threshold and lines[p, 1] >= threshold:
+            rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
+            displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
+            velocity += 0.5 * (rate + rate_end) * step
+            p += 1
+        if p == pieces:
+            break
+        rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
+        if rate >= 0.0:
+            peak = max(peak, velocity + 0.5 * rate * (rate / (rate - rate_end)) * step)
+        gained = 0.5 * (rate + rate_end) * step
+        while rate_end < 0.0 < velocity + gained:
+            displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
+            velocity += gained
+            p += 1
+            if p == pieces:
+                return p, velocity, displacement, peak
+            rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
+            gained = 0.5 * (rate + rate_end) * step
+        # V falls to zero within the piece if it would at its end, or perhaps before it turns up again
+        slope = (rate_end - rate) / step
+        stop = held_stop(velocity, rate, slope)
+        if rate_end < 0.0 or stop <= step:
+            stop = min(stop, step)
+            displacement += velocity * stop + held_integrals(rate, slope, stop)[1]
+            # a rise may begin the next slide on the same piece
+            return p if rate_end > 0.0 else p + 1, 0.0, displacement, peak
+        displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
+        velocity += gained
+        p += 1
+    return p, velocity, displacement, max(peak, velocity)
+
+
 @scalar
 def newmark(
     cell: Cell, options: Options, wave: Wave, lines: np.ndarray, codes: np.ndarray, j: int
@@ -214,14 +269,14 @@ def newmark(
     `cycle.pulse` gives the same in ten times the time, most of which goes to the rules it has to look
     at; a slide along straight pieces is a sum of three terms a piece.  In units of the scale (`cell.amplitude`).
     """
-    scale, pieces = cell.amplitude, lines.shape[0]
+    scale = cell.amplitude
     block = block_of(cell, NEWMARK, options.g)
     codes[3, j] = block.validity & STATICALLY_UNSTABLE
     codes[0, j] = codes[1, j] = codes[2, j] = -1 if codes[3, j] else 0
     if codes[3, j]:
         return math.nan, math.nan
     threshold = block.yield_acceleration / scale
-    velocity, displacement, peak, p, slips, pulses = 0.0, 0.0, 0.0, 0, 0, 0
+    velocity, displacement, lost, peak, p, slips, pulses = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
     for k in range(wave.height.size):
         if wave.height[k] <= threshold:
             continue
@@ -232,33 +287,17 @@ def newmark(
                 p += 1
                 continue
             slips += 1
-            rate, rate_end = lines[p, 0] - threshold, lines[p, 1] - threshold
+            velocity, moved, rate, rate_end = 0.0, 0.0, lines[p, 0] - threshold, lines[p, 1] - threshold
             if rate <= 0.0:
                 rising = lines[p, 3] * (rate_end / (rate_end - rate))
-                velocity, displacement = 0.5 * rate_end * rising, displacement + rate_end * rising * rising / 6.0
+                velocity, moved = 0.5 * rate_end * rising, rate_end * rising * rising / 6.0
                 p += 1
-            while p < pieces:
-                rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
-                gained = 0.5 * (rate + rate_end) * step
-                if rate > 0.0 > rate_end:
-                    peak = max(peak, velocity + 0.5 * rate * (rate / (rate - rate_end)) * step)
-                # V falls to zero within the piece only if it would at its end, or if it turns up again
-                if rate < 0.0 <= rate_end or (rate_end < 0.0 and velocity + gained <= 0.0):
-                    slope = (rate_end - rate) / step
-                    stop = held_stop(velocity, rate, slope)
-                    if stop <= step:
-                        displacement += velocity * stop + held_integrals(rate, slope, stop)[1]
-                        velocity = 0.0
-                        p += 0 if rate_end > 0.0 else 1  # a rise may begin the next slide on the same piece
-                        break
-                displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
-                velocity += gained
-                peak = max(peak, velocity)
-                p += 1
+            p, velocity, moved, peak = slide(lines, p, threshold, velocity, moved, peak)
+            displacement, lost = add(displacement, lost, moved)
     codes[0, j], codes[1, j] = slips, pulses
     # the record may have ended before the slide: then the plane is at rest
-    displacement += eq.attenuated_displacement(velocity, threshold, math.inf)
-    return scale * displacement, scale * max(peak, velocity)
+    displacement, lost = add(displacement, lost, eq.attenuated_displacement(velocity, threshold, math.inf))
+    return scale * (displacement + lost), scale * max(peak, velocity)
 
 
 @scalar

@@ -148,6 +148,9 @@ def _option(field: "dataclasses.Field[Any]", hint: Any) -> Option:
 
 Some = TypeVar("Some", bound=Choice)
 
+#: Choices that a name has stood for, with all their defaults; they are frozen.
+_BY_NAME: dict[tuple[str, str], Choice] = {}
+
 
 @dataclass(frozen=True)
 class Family(Generic[Some]):
@@ -184,7 +187,11 @@ class Family(Generic[Some]):
         if isinstance(given, self.choices):
             return given
         if isinstance(given, str) and given in self.names:
-            return self.made(given, {})
+            # checked once: a call for a small grid would spend a tenth of its time on it
+            known: Any = _BY_NAME.get((self.keyword, given))
+            if known is None:
+                known = _BY_NAME[self.keyword, given] = self.made(given, {})
+            return known
         objects = ", ".join(f"{choice.__name__}(...)" for choice in self.choices)
         raise InputError(
             f"{self.keyword} = {shown(given)}: must be one of {', '.join(map(repr, self.names))}, or {objects}"

@@ -30,6 +30,8 @@ def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str]
     'Üy, λ given; Δμ by Eqs. 10–11: estimated'
     """
     drawn = drawn or {}
+    if "yield_coefficient" in drawn or "yield_coefficient" in given:
+        return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
     known, uncertain, estimated = [], [], []
     for name, (symbol, rule) in _INPUTS.items():
         if model == "newmark" and name != "yield_acceleration":

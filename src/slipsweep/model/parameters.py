@@ -64,12 +64,18 @@ BOUNDS: dict[str, Bound] = {
     "displacement": _POSITIVE_AMOUNT,
     "maximum_amplitude": _POSITIVE_AMOUNT,
     "yield_acceleration": Bound(-LARGEST, True, LARGEST, f"a finite number from {-LARGEST:g} to {LARGEST:g}"),
+    "yield_coefficient": Bound(
+        -LARGEST_FACTOR, True, LARGEST_FACTOR, f"a finite number from {-LARGEST_FACTOR:g} to {LARGEST_FACTOR:g}"
+    ),
     "decay_rate": _FACTOR,
     "delta_mu": _FACTOR,
     "minimum_friction": _POSITIVE_FACTOR,
     "structure_frequency": _POSITIVE_FACTOR,
     "scale": _POSITIVE_FACTOR,
+    "pgv": _AMOUNT,
+    "arias_intensity": _AMOUNT,
     "time_scale": _POSITIVE_FACTOR,
+    "azimuth": Bound(0.0, True, 360.0, "0 <= azimuth <= 360 degrees"),
     "g": Bound(1.0 / LARGEST, True, LARGEST, f"a finite number > 0, from {1.0 / LARGEST:g} to {LARGEST:g}"),
     "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1", includes_high=False),
     "threshold": _AMOUNT,

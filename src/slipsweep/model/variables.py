@@ -70,6 +70,22 @@ LIMIT_STATUS_TEXT: dict[LimitStatus, str] = {
     LimitStatus.INVALID: "the model gives no value at any amplitude (no limit)",
 }
 
+
+class SensitivityStatus(IntEnum):
+    """Whether there are Sobol indices, or why there are none."""
+
+    COMPUTED = 0
+    NO_VARIANCE = 1
+    RUNS_WITHOUT_VALUE = 2
+
+
+#: One line a status, for people.
+SENSITIVITY_STATUS_TEXT: dict[SensitivityStatus, str] = {
+    SensitivityStatus.COMPUTED: "there are indices",
+    SensitivityStatus.NO_VARIANCE: "all runs have the same displacement",
+    SensitivityStatus.RUNS_WITHOUT_VALUE: "some runs have no value",
+}
+
 #: End of the search for a limit amplitude when none is given, in g.
 MAXIMUM_AMPLITUDE_IN_G = 5.0
 
@@ -129,13 +145,18 @@ DIMENSION_ORDER = (
     "displacement_amplitude",
     "frequency",
     "yield_acceleration",
+    "yield_coefficient",
     "decay_rate",
     "delta_mu",
     "minimum_friction",
     "structure_frequency",
     "scale",
+    "pgv",
+    "arias_intensity",
     "time_scale",
     "polarity",
+    "azimuth",
+    "motion",
 )
 
 #: Inputs: attributes of their coordinates.
@@ -146,23 +167,34 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "displacement_amplitude": {"units": "m", "long_name": "peak ground displacement"},
     "frequency": {"units": "Hz", "long_name": "excitation frequency"},
     "yield_acceleration": {"units": "m s-2", "long_name": "yield acceleration"},
+    "yield_coefficient": {"units": "1", "long_name": "yield coefficient, yield acceleration over g"},
     "decay_rate": {"units": "1", "long_name": "friction decay with loading rate"},
     "delta_mu": {"units": "1", "long_name": "friction above static"},
     "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient"},
     "structure_frequency": {"units": "Hz", "long_name": "natural frequency of the structure"},
     "scale": {"units": "1", "long_name": "scale factor of the recorded acceleration"},
+    "pgv": {"units": "m s-1", "long_name": "peak ground velocity that motions are scaled to"},
+    "arias_intensity": {"units": "m s-1", "long_name": "Arias intensity that motions are scaled to"},
     "time_scale": {"units": "1", "long_name": "factor on the time of the record"},
     "polarity": {"units": "1", "long_name": "sign that the recorded acceleration is taken with"},
+    "azimuth": {"units": "degree", "long_name": "downslope direction, from the first component to the second"},
 }
+
+#: Inputs of the interface, in place of which Newmark's block may have its yield coefficient alone.
+INTERFACE_INPUTS = ("theta", "mu_s", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
 
 #: Inputs that the shaking has if it is a waveform, and if it is a record.
 WAVEFORM_INPUTS = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
-RECORD_INPUTS = ("amplitude", "scale", "time_scale", "polarity")
+RECORD_INPUTS = ("amplitude", "scale", "pgv", "arias_intensity", "time_scale", "polarity", "azimuth")
+
+#: Of them, those that say how strong a motion is: one of them is given.
+STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = (
     "theta", "mu_s", "amplitude", "displacement_amplitude", "frequency",
-    "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction", "scale", "time_scale",
+    "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu", "minimum_friction", "scale", "pgv",
+    "arias_intensity", "time_scale",
 )  # fmt: skip
 
 #: Results of a sweep: attributes of the variables.
@@ -251,7 +283,34 @@ RECORD_RESULTS: dict[str, dict[str, Any]] = {
     **RECORD_COUNTS,
     "validity": RESULTS["validity"],
     "newmark_displacement": RESULTS["newmark_displacement"],
+    "motion_factor": {"units": "1", "long_name": "factor on the recorded acceleration"},
 }
+
+#: Intensity measures of a motion as it was recorded (`slipsweep.motion.intensity`).
+INTENSITY_MEASURES: dict[str, dict[str, Any]] = {
+    "pga": {"units": "m s-2", "long_name": "peak ground acceleration as recorded"},
+    "pgv": {"units": "m s-1", "long_name": "peak ground velocity as recorded"},
+    "pgd": {"units": "m", "long_name": "peak ground displacement as recorded"},
+    "arias_intensity": {"units": "m s-1", "long_name": "Arias intensity as recorded"},
+    "cav": {"units": "m s-1", "long_name": "cumulative absolute velocity as recorded"},
+    "significant_duration": {"units": "s", "long_name": "significant duration, 5 to 95 % of the Arias intensity"},
+    "mean_period": {"units": "s", "long_name": "mean period, 0.25 to 20 Hz"},
+}
+
+#: Coordinates of a suite along `motion`, beside it.
+MOTION_COORDINATES: dict[str, dict[str, Any]] = {
+    "motion_file": {"long_name": "file of the motion"},
+    "motion_sha256": {"long_name": "SHA-256 of the file of the motion"},
+    "motion_samples": {"units": "1", "long_name": "samples of the motion"},
+    "motion_interval": {"units": "s", "long_name": "mean sampling interval of the motion"},
+    **{f"motion_{name}": about for name, about in INTENSITY_MEASURES.items()},
+}
+
+#: Of them, long texts, that no table repeats in every row: `slipsweep info` and the file itself tell them.
+MOTION_FILES = ("motion_file", "motion_sha256")
+
+#: The labels of a suite, along the dimension of their name.
+MOTION: dict[str, Any] = {"long_name": "recorded motion"}
 
 #: The record itself, in the files of results: what is read back to repeat a run.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {
@@ -277,6 +336,8 @@ STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
         "flag_values": [int(flag) for flag in Validity],
         "flag_meanings": RESULTS["validity"]["flag_meanings"],
     },
+    "input": {"long_name": "uncertain input; inputs that are correlated are one, with + between them"},
+    "bound": {"units": "1", "long_name": "probability below an end of an interval"},
 }
 
 #: Statistics of `sample`; quantiles, mean and probabilities are of the samples that have a value.
@@ -299,6 +360,68 @@ STATISTICS: dict[str, dict[str, Any]] = {
     "mode_share": {"units": "1", "long_name": "share of the samples in a sliding mode"},
     "flag_share": {"units": "1", "long_name": "share of the samples with a flag"},
     "valueless_share": {"units": "1", "long_name": "share of the samples without a value"},
+    "first_order_index": {
+        "units": "1",
+        "long_name": "first-order Sobol index of the permanent displacement",
+        "ancillary_variables": "sensitivity_status",
+    },
+    "first_order_interval": {
+        "units": "1",
+        "long_name": "95 % interval of the first-order Sobol index",
+        "ancillary_variables": "sensitivity_status",
+    },
+    "total_index": {
+        "units": "1",
+        "long_name": "total Sobol index of the permanent displacement",
+        "ancillary_variables": "sensitivity_status",
+    },
+    "total_interval": {
+        "units": "1",
+        "long_name": "95 % interval of the total Sobol index",
+        "ancillary_variables": "sensitivity_status",
+    },
+    "sensitivity_status": {
+        "long_name": "whether there are Sobol indices, or why there are none",
+        "flag_values": [int(status) for status in SensitivityStatus],
+        "flag_meanings": " ".join(status.name.lower() for status in SensitivityStatus),
+    },
+}
+
+#: Statistics over the motions of a suite; all but counts and shares are of the motions that have a value.
+SUITE_STATISTICS: dict[str, dict[str, Any]] = {
+    "value_count": {"units": "1", "long_name": "number of motions with a value"},
+    "valueless_count": {"units": "1", "long_name": "number of motions without a value"},
+    "valueless_flag_count": {"units": "1", "long_name": "number of motions without a value that have a flag"},
+    "valueless_share": {"units": "1", "long_name": "share of the motions without a value"},
+    **{
+        name: {"units": units, "long_name": text, "ancillary_variables": "valueless_share"}
+        for name, units, text in (
+            ("zero_probability", "1", "probability of zero permanent displacement"),
+            ("nonzero_median", "m", "median of the non-zero permanent displacements"),
+            ("nonzero_geometric_mean", "m", "geometric mean of the non-zero permanent displacements"),
+            ("log_standard_deviation", "1", "standard deviation of ln u of the non-zero permanent displacements u"),
+            ("displacement_quantile", "m", "quantile of the permanent displacement"),
+        )
+    },
+    "exceedance_probability": STATISTICS["exceedance_probability"],
+}
+
+#: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the grid's amplitudes.
+HAZARD_RESULTS: dict[str, dict[str, Any]] = {
+    "annual_rate": {
+        "units": "year-1",
+        "long_name": "mean annual rate of exceeding a permanent displacement",
+        "ancillary_variables": "held_rate omitted_rate valueless_share",
+    },
+    "held_rate": {
+        "units": "year-1",
+        "long_name": "part of it above the largest amplitude, where the probability is held",
+    },
+    "omitted_rate": {
+        "units": "year-1",
+        "long_name": "at most what is left out of it below the smallest amplitude, where the probability is taken as 0",
+    },
+    "valueless_share": {"units": "1", "long_name": "largest share of the motions without a value at any amplitude"},
 }
 
 #: dtype of each result; everything else is float64.
@@ -306,12 +429,14 @@ RESULT_DTYPES: dict[str, str] = {
     "sliding_mode": "int8",
     "validity": "int16",
     "limit_status": "int8",
+    "sensitivity_status": "int8",
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }
 
 #: What `sweep` returns when nothing is asked for by name.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 DEFAULT_RECORD_RESULTS = ("permanent_displacement", "peak_relative_velocity", *RECORD_COUNTS, "validity")
+DEFAULT_SUITE_RESULTS = (*DEFAULT_RECORD_RESULTS, "motion_factor")
 
 #: The parameters of Eqs. 7-11.
 FRICTION_PARAMETERS = (

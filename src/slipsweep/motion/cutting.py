@@ -48,6 +48,9 @@ _INTERVALS = 12
 #: have one of the last between them.
 _DEPTH = 3
 
+#: Steps of Newton's iteration towards a zero that is bracketed; bisection goes on from there.
+_NEWTON = 5
+
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
 _TURN = _Extended("6.283185307179586476925286766559005768")
@@ -74,9 +77,9 @@ def _sine_of_turns(turns: Exact) -> Exact:
     """sin 2πt, exact at every quarter."""
     quarters = np.rint(4 * turns)
     rest = (turns - quarters / 4) * _TURN
-    sine, cosine = np.sin(rest), np.cos(rest)
     quadrant = np.mod(quarters, 4)
-    return np.select([quadrant == 0, quadrant == 1, quadrant == 2], [sine, cosine, -sine], -cosine)
+    value = np.where(np.mod(quadrant, 2) == 0, np.sin(rest), np.cos(rest))
+    return np.where(quadrant < 2, value, -value)
 
 
 @functools.lru_cache
@@ -138,14 +141,30 @@ def _sign_changes(derivative: Callable[[int, Exact], Exact], order: int, edges: 
     """
     if depth:
         edges = np.sort(np.concatenate([edges, _sign_changes(derivative, order + 1, edges, depth - 1)]))
-    below = derivative(order, edges) < 0
-    crosses = below[:-1] != below[1:]
-    low, high, below = edges[:-1][crosses], edges[1:][crosses], below[:-1][crosses]
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        same = (derivative(order, middle) < 0) == below
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    values = derivative(order, edges)
+    crosses = (values[:-1] < 0) != (values[1:] < 0)
+    low, high, below = edges[:-1][crosses], edges[1:][crosses], values[:-1][crosses] < 0
+    if not low.size:
+        return np.asarray(high)
+    # Newton's iteration comes within some roundings of most; where it has not, the edges are still the bracket
+    near = 0.5 * (low + high)
+    for _ in range(_NEWTON):
+        slope = derivative(order + 1, near) * _TURN
+        step = derivative(order, near) / np.where(slope == 0, 1, slope)
+        near = np.clip(near - step.astype(np.float64), low, high)
+    for side in (near - 4 * np.spacing(near), near + 4 * np.spacing(near)):
+        low, high = _halved(derivative, order, below, low, high, np.clip(side, low, high))
+    while ((low < (middle := 0.5 * (low + high))) & (middle < high)).any():
+        low, high = _halved(derivative, order, below, low, high, middle)
     return np.asarray(high)
+
+
+def _halved(
+    derivative: Callable[[int, Exact], Exact], order: int, below: NDArray[np.bool_], low: Exact, high: Exact, at: Exact
+) -> tuple[Exact, Exact]:
+    """The part of each bracket, before or behind a place in it, in which the sign changes."""
+    same = (derivative(order, at) < 0) == below
+    return np.where(same, at, low), np.where(same, high, at)
 
 
 def _turning_points(
@@ -323,26 +342,44 @@ def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray
 # ------------------------------------------------------------------------------- a record
 
 
-#: Tables of the last records, by identity and polarity: of 10⁵ samples one takes as long as ten cells.
+#: Tables of the last records, by identity and polarity: of 10⁵ samples one takes as long as ten cells, and each chunk
+#: of a run asks for those of all motions of a suite.
 _TABLES: dict[tuple[int, float], tuple[weakref.ref[Record], Wave]] = {}
-_MOST_TABLES = 4
+
+#: Bytes that they may take, and those of a sample, about: a line through zero is two pieces.
+MOST_TABLES = 2**27
+TABLE_BYTES = 160
 
 
 def wave_of_record(record: Record, polarity: float) -> Wave:
     """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
     key = (id(record), polarity)
     known = _TABLES.get(key)
-    if known is None or known[0]() is not record:
-        while len(_TABLES) >= _MOST_TABLES:
-            _TABLES.pop(next(iter(_TABLES)), None)
-        known = _TABLES[key] = (weakref.ref(record), _record_cut(record, polarity))
-    return known[1]
+    if known is not None and known[0]() is record:
+        return known[1]
+    wave = _record_cut(record, polarity)
+    room = MOST_TABLES - wave.pieces.nbytes
+    while _TABLES and sum(own.pieces.nbytes for _, own in list(_TABLES.values())) > room:
+        _TABLES.pop(next(iter(_TABLES)), None)
+    _TABLES[key] = (weakref.ref(record, lambda _: _TABLES.pop(key, None)), wave)
+    return wave
+
+
+def _intervals(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The intervals between samples: one, where the times are its multiples to rounding.
+
+    Differences of times have the rounding of the times, 1e-10 of an interval after a million samples.
+    """
+    interval = np.diff(times)
+    even = (times[-1] - times[0]) / interval.size
+    off = np.abs(times - (times[0] + even * np.arange(times.size))).max()
+    return np.full(interval.size, even) if off <= 2.0 * np.spacing(np.abs(times).max()) else interval
 
 
 def _record_cut(record: Record, polarity: float) -> Wave:
     times, values = record.times, polarity * record.acceleration
     with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
-        interval, change = np.diff(times), np.diff(values)
+        interval, change = _intervals(times), np.diff(values)
         slope = change / interval
     # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0

@@ -98,6 +98,22 @@ class Record:
                 "the time before it"
             )
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Record):
+            return NotImplemented
+        return (
+            (self.name, self.attrs) == (other.name, other.attrs)
+            and np.array_equal(self.times, other.times)
+            and np.array_equal(self.acceleration, other.acceleration)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.times.size, float(self.times[-1]), float(self.acceleration[-1])))
+
+    def __repr__(self) -> str:
+        lasts = self.times[-1] - self.times[0]
+        return f"Record({self.name!r}: {self.times.size} samples, {lasts:.6g} s, peak {self.peak:.4g} m/s2)"
+
     @property
     def peak(self) -> float:
         """Peak ground acceleration: the largest magnitude of the samples, m/s²."""

@@ -6,7 +6,6 @@ channel does not have.  Nothing is taken off a channel here but what is asked fo
 """
 
 import hashlib
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
+from slipsweep.motion.columns import columns_of, words_and_unit
 from slipsweep.motion.records import STANDARD_GRAVITY, UNITS, read_lines
 
 Floats = NDArray[np.float64]
@@ -193,34 +193,23 @@ def read_test(path: str | Path) -> ShakingTest:
     except TypeError:
         raise InputError(f"test = {shown(path)}: must be the path of a file, a Dataset or a ShakingTest") from None
     content, lines = read_lines(path, "test")
-    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    if not rows:
-        raise InputError(f"{path}: has no line of names and no samples")
-    (number, header), *body = rows
-    separator = next((one for one in ("\t", ";", ",") if one in header), ",")
-    columns = [_column(path, cell.strip()) for cell in header.split(separator)]
+    file = columns_of(path, lines, "has no line of names and no samples")
+    columns = [_column(path, cell) for cell in file.names]
     found = [channel for channel, _ in columns if channel is not None]
     for channel in ("time", *CHANNELS):
         if found.count(channel) > 1:
-            raise InputError(f"{path}: line {number}: {found.count(channel)} columns are {channel}: must be one")
+            raise InputError(f"{path}: line {file.number}: {found.count(channel)} columns are {channel}: must be one")
     for channel in ("time", TABLE):
         if channel not in found:
             raise InputError(
-                f"{path}: line {number}: no column {'time' if channel == 'time' else 'table acceleration'}: must "
+                f"{path}: line {file.number}: no column {'time' if channel == 'time' else 'table acceleration'}: must "
                 "name its columns, such as time (s), table acceleration (m/s2), block acceleration (m/s2)"
             )
-    values = np.full((len(body), len(columns)), np.nan)
-    for row, (at, line) in zip(values, body, strict=True):
-        cells = [cell.strip() for cell in line.split(separator)]
-        if len(cells) != len(columns):
-            raise InputError(f"{path}: line {at}: {len(cells)} cells, where {len(columns)} columns are named")
+    values = np.full((len(file.body), len(columns)), np.nan)
+    for row, (number, cells) in zip(values, file.rows(), strict=True):
         for i, (cell, (named, _)) in enumerate(zip(cells, columns, strict=True)):
-            if named is None or (cell == "" and named not in ("time", TABLE)):
-                continue
-            try:
-                row[i] = float(cell)
-            except ValueError:
-                raise InputError(f"{path}: line {at}: {named} = {shown(cell)}: must be a number") from None
+            if named is not None and (cell != "" or named in ("time", TABLE)):
+                row[i] = file.value(number, cell, named)
     read = {channel: factor * values[:, i] for i, (channel, factor) in enumerate(columns) if channel is not None}
     return ShakingTest(
         read.pop("time"),
@@ -235,9 +224,7 @@ def read_test(path: str | Path) -> ShakingTest:
 
 def _column(path: Path, cell: str) -> tuple[str | None, float]:
     """The channel of a column, None of one that is left out, and the factor to its unit."""
-    matched = re.fullmatch(r"(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*", cell.strip('"'))
-    name, unit = (matched[1], matched[2]) if matched else (cell.strip('"'), "")
-    words = set(re.split(r"[\s_\-]+", name.lower()))
+    words, unit = words_and_unit(cell)
     channel = next((one for one, (first, second) in _NAMES.items() if words & first and words & second), None)
     if words & {"time", "t"}:
         channel = "time"

@@ -1,7 +1,8 @@
 """Chunks of a sweep solved by the workers of a dask.distributed cluster.
 
 The client (this process) sends the plan of a chunk, a few kilobytes, and gets its results
-back as plain arrays; it alone writes the file, so that workers need no shared folder.  A task
+back as plain arrays, which it alone writes, so that workers need no shared folder; or workers that share one write
+their chunks themselves, and send back what goes on record (`slipsweep.runs.targets.Delivery`).  A task
 runs on a thread of its worker, hence on one core (`slipsweep.grid.threads`): a worker with n threads
 solves n chunks at a time.  What a dead worker had is solved again by another.
 """
@@ -16,14 +17,14 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import Chunk
-from slipsweep.grid.tables import Table
 from slipsweep.runs.parts import installation
-from slipsweep.runs.solving import Progress, Solved
+from slipsweep.runs.solving import Deliver, Progress, Solved
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -79,11 +80,14 @@ def cluster(
     with ExitStack() as stack:
 
         def solved(
-            plan: AnyPlan, chunks: Mapping[int, Chunk], progress: Progress | None = None
-        ) -> Iterator[tuple[int, Table]]:
+            plan: AnyPlan,
+            chunks: Mapping[int, Chunk],
+            progress: Progress | None = None,
+            deliver: Deliver | None = None,
+        ) -> Iterator[tuple[int, Any]]:
             if chunks:
                 client, name = _connect(stack, workers, scheduler)
-                yield from _Run(client, name, patience).solve(plan, chunks, progress)
+                yield from _Run(client, name, patience, deliver).solve(plan, chunks, progress)
 
         yield solved
 
@@ -158,14 +162,15 @@ def _close(client: "Client") -> None:
         client.close(timeout=_SILENCE)
 
 
-def _solve(client: dict[str, str], part: bytes) -> Table:
-    """Solve one chunk, on a worker: its plan, which only the same installation can read."""
+def _solve(client: dict[str, str], task: bytes) -> Any:
+    """Solve one chunk, on a worker, and deliver it from there if asked to: only the same installation can read it."""
     if client != installation():  # a worker that came after `_check_installations`
         from distributed import get_worker
 
         raise RunError(_mismatch(get_worker().address, installation(), client))
-    plan: AnyPlan = pickle.loads(part)
-    return plan.solve()
+    one: _Task = pickle.loads(task)
+    results = one.plan.solve()
+    return results if one.deliver is None else one.deliver(one.plan, one.number, one.chunk, results)
 
 
 def _mismatch(worker: str, found: dict[str, str] | None, client: dict[str, str]) -> str:
@@ -174,20 +179,29 @@ def _mismatch(worker: str, found: dict[str, str] | None, client: dict[str, str])
     return f"the worker at {worker} has {has}: install the same versions everywhere"
 
 
+@dataclass(frozen=True)
+class _Task:
+    """A chunk to solve: its plan and its place, and what becomes of it there (None: it is sent back)."""
+
+    plan: AnyPlan
+    number: int
+    chunk: Chunk
+    deliver: Deliver | None
+
+
 class _Run:
     """One sweep on one cluster."""
 
-    def __init__(self, client: "Client", name: str, patience: float) -> None:
+    def __init__(self, client: "Client", name: str, patience: float, deliver: Deliver | None) -> None:
         self.client = client
+        self.deliver = deliver
         self.name = name
         self.patience = patience
         self.threads = 0
         self.looked = self.had_workers = time.monotonic()
         self.finished: queue.SimpleQueue[Future] = queue.SimpleQueue()
 
-    def solve(
-        self, plan: AnyPlan, chunks: Mapping[int, Chunk], progress: Progress | None
-    ) -> Iterator[tuple[int, Table]]:
+    def solve(self, plan: AnyPlan, chunks: Mapping[int, Chunk], progress: Progress | None) -> Iterator[tuple[int, Any]]:
         """Yield chunks as they come back; a bounded number of them is under way."""
         self._wait_for_workers()
         self._check_installations()
@@ -196,7 +210,7 @@ class _Run:
         while True:
             for number, chunk in itertools.islice(remaining, max(0, _AHEAD * self.threads - len(pending))):
                 part = plan.part(chunk)
-                future = self._submit(pickle.dumps(part))
+                future = self._submit(pickle.dumps(_Task(part, number, chunk, self.deliver)))
                 pending[future.key] = number, part.cells
                 future.add_done_callback(self.finished.put)
                 del future  # the workers may forget a chunk once it is here
@@ -213,12 +227,12 @@ class _Run:
             yield number, results
             del results
 
-    def _submit(self, part: bytes) -> "Future":
+    def _submit(self, task: bytes) -> "Future":
         with warnings.catch_warnings():
             # scattering large [[cases]] instead would lose them with the worker that has them
             warnings.filterwarnings("ignore", "Sending large graph")
             try:
-                return self.client.submit(_solve, installation(), part, pure=False)
+                return self.client.submit(_solve, installation(), task, pure=False)
             except Exception as error:
                 raise self._lost() from error
 
@@ -231,13 +245,13 @@ class _Run:
         except queue.Empty:
             return None
 
-    def _result(self, future: "Future", number: int) -> Table:
+    def _result(self, future: "Future", number: int) -> Any:
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
         from distributed.comm import CommClosedError
 
         try:
-            results: Table = future.result()
+            results = future.result()
         except (InputError, RunError, MemoryError):
             raise
         except (FutureCancelledError, CommClosedError):

@@ -2,19 +2,21 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from slipsweep.errors import InputError
-from slipsweep.files.netcdf import Head
+from slipsweep.files.checksums import checksum
+from slipsweep.files.contents import Contents, Head, contents_of
+from slipsweep.files.motions import samples_of
 from slipsweep.files.outputs import Read
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.model.variables import RESULT_DTYPES
-from slipsweep.runs.parts import checksum
+from slipsweep.motion.records import Record
 from slipsweep.runs.solving import try_out
 
 
@@ -35,6 +37,8 @@ class Job:
         Data type of floating-point results in the file.
     asked : dict of str to object
         All that the results depend on, by what users know it by: numbers, text, lists of these.
+    compression : int
+        Level at which the output is compressed; 0 for not.
     """
 
     source: str
@@ -43,6 +47,7 @@ class Job:
     head: Head
     floats: str
     asked: dict[str, Any]
+    compression: int = 0
 
     @cached_property
     def plan(self) -> AnyPlan:
@@ -62,6 +67,15 @@ class Job:
         """Data type of a result in the file."""
         return np.dtype(RESULT_DTYPES.get(name, self.floats))
 
+    @cached_property
+    def dims(self) -> dict[str, tuple[str, ...]]:
+        """Dimensions of the results."""
+        return {name: one.dims for name, one in self.plan.empty().data_vars.items()}
+
+    def contents(self, history: str) -> Contents:
+        """What the file of the whole result holds beside the values of the results."""
+        return contents_of(replace(self.head, labels=self.labels), self.plan.empty(), self.dtype, history)
+
     @contextmanager
     def named(self) -> Iterator[None]:
         """Name the sweep file in front of what turns out, while it is solved, not to be allowed."""
@@ -74,8 +88,9 @@ class Job:
 
 def sweep_job(spec: SweepSpec) -> Job:
     """The job of `slipsweep run`: a sweep, or the statistics of samples."""
-    head = Head(spec.output.title, spec.labels, spec.record, spec.text)
-    return Job(spec.source, spec.files, spec.plan, head, spec.output.dtype, _asked(spec, solver=repr(spec.solver)))
+    head = Head(spec.output.title, spec.labels, spec.recorded, spec.text)
+    asked = _asked(spec, solver=repr(spec.solver))
+    return Job(spec.source, spec.files, spec.plan, head, spec.output.dtype, asked, spec.output.compression)
 
 
 def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None) -> Job:
@@ -93,14 +108,15 @@ def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplit
         spec.source,
         spec.files,
         lambda: spec.limits(displacement, maximum_amplitude),
-        Head("Amplitudes at which a tolerable displacement is reached", spec.labels, spec.record),
+        Head("Amplitudes at which a tolerable displacement is reached", spec.labels, spec.recorded),
         "float64",  # a limit is exact to the last bit
         {**_asked(spec), "--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
+        spec.output.compression,
     )
 
 
 def _asked(spec: SweepSpec, **options: str) -> dict[str, Any]:
     record: Mapping[str, Any] = {}
-    if spec.record is not None:
-        record = {"record": checksum({"times": spec.record.times, "acceleration": spec.record.acceleration})}
+    if spec.recorded is not None:
+        record = {"record" if isinstance(spec.recorded, Record) else "suite": checksum(samples_of(spec.recorded))}
     return {"sweep file": spec.text, **record, **options}

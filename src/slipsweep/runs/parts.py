@@ -12,17 +12,19 @@ Beside an output ``OUT.nc`` lies, while it is being made, the folder ``OUT.nc.pa
     is written after the chunk itself, so that a run that is killed has all that its journal
     promises.  Both are brought to the disk itself some time later: after a power cut the
     journal may promise more than there is, which is why it holds checksums.
-``data.nc``, or with --split the folder ``data``
-    The chunks.
+``data.nc``, with --split the folder ``data``, of a Zarr store the folder ``data.zarr``
+    The chunks.  (Those of a store on a network are in the store itself.)
 
 The data are renamed to the output when all chunks are there; then the folder is removed.
 """
 
 import hashlib
 import json
+import math
 import os
 import re
-from collections.abc import Iterator, Mapping
+import shutil
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -31,12 +33,12 @@ from typing import Any
 
 import filelock
 import numpy as np
-import xxhash
 from numpy.typing import NDArray
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, RunError
-from slipsweep.files.netcdf import RUN
+from slipsweep.files.checksums import contents_checksum, text_checksum
+from slipsweep.files.contents import CHECKSUM_BYTES, RUN, Contents
 from slipsweep.files.outputs import sync
 from slipsweep.jit import sources
 from slipsweep.runs.placed import Layout
@@ -50,11 +52,14 @@ _CHUNK = re.compile(r"chunk-\d{6,}\.(nc|tmp)")
 _LINE = re.compile(r"(\d+) ([0-9a-f]+)\n")
 
 
-def identity(asked: Mapping[str, Any], split: bool) -> dict[str, Any]:
-    """What two runs must have in common for one to go on with the chunks of the other; `asked` as in `jobs.Job`."""
+def identity(asked: Mapping[str, Any], target: Mapping[str, Any]) -> dict[str, Any]:
+    """What two runs must have in common for one to go on with the chunks of the other.
+
+    `asked` is that of `jobs.Job`, `target` that of `targets.Target`.
+    """
     return {
         **asked,
-        "--split": split,
+        **target,
         "checksums": "XXH3-128",
         **installation(),
     }
@@ -71,19 +76,6 @@ def installation() -> dict[str, str]:
     }
 
 
-def checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """XXH3 of 128 bits of the variables of a chunk, names and types among them.
-
-    It is to find flipped bits and missing sectors, not forgeries, and is made for every byte that
-    a run writes: at 45 GB/s, where zlib's CRC-32 made 4.3 and SHA-256 1.8.
-    """
-    digest = xxhash.xxh3_128()
-    for name, values in arrays.items():
-        digest.update(f"{name} {values.dtype.str} {values.shape};".encode())
-        digest.update(np.ascontiguousarray(values).data)
-    return digest.hexdigest()
-
-
 @dataclass
 class Manifest:
     """What the chunks in a work folder belong to.
@@ -93,11 +85,13 @@ class Manifest:
     identity : dict
         See `identity`.
     chunk_cells : int
-        Largest number of cells of a chunk: with the grid, it says how chunks are cut.
+        Largest number of cells of a chunk.
     overwrite : bool
         Whether the run may replace an output that exists.
     history : str
         The `history` of the files.
+    sizes, lengths : dict of str to int
+        The grid, and its chunks but for the last along each dimension.
     layout : Layout, optional
         Where the results lie in the file that has all chunks (None: each has its own).
     head : str
@@ -108,8 +102,15 @@ class Manifest:
     chunk_cells: int
     overwrite: bool
     history: str
+    sizes: dict[str, int]
+    lengths: dict[str, int]
     layout: Layout | None = None
     head: str = ""
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks there are."""
+        return math.prod(math.ceil(size / self.lengths[dim]) for dim, size in self.sizes.items())
 
     def difference(self, other: Mapping[str, Any]) -> str | None:
         """Say in what another identity differs, or None."""
@@ -125,27 +126,42 @@ class Manifest:
         return None
 
 
-def stamp(manifest: Manifest) -> str:
-    """What a file says of the run that made it, so that a run that would make it again can tell."""
-    cells = {"chunk_cells": manifest.chunk_cells} if manifest.identity["--split"] else {}
-    # the text itself may be long, and most files have it
-    text = _digest(manifest.identity["sweep file"])
-    return json.dumps({"identity": {**manifest.identity, "sweep file": text}, **cells})
+def stamp(manifest: Manifest, contents: Contents, results: Collection[str], **more: object) -> str:
+    """What a file says of the run that made it.
+
+    By it a run that would make the file again can tell, and `slipsweep.runs.verify` what it must hold: `contents` as
+    they are without this, the `results` among them, and how their grid was cut.
+    """
+    # the sweep's text itself may be long, and most files have it
+    identity = {**manifest.identity, "sweep file": text_checksum(manifest.identity["sweep file"])}
+    told = {"chunk_cells": manifest.chunk_cells, "sizes": manifest.sizes, "lengths": manifest.lengths}
+    return json.dumps(
+        {"identity": identity, **told, "results": [*results], "contents": contents_checksum(contents), **more}
+    )
+
+
+def checksum_rows(finished: Mapping[int, str]) -> NDArray[np.uint8]:
+    """Checksums of all chunks in their order, as a file holds them: a row of bytes each."""
+    content = bytes.fromhex("".join(finished[number] for number in sorted(finished)))
+    return np.frombuffer(content, np.uint8).reshape(-1, CHECKSUM_BYTES)
 
 
 def read_stamp(attributes: Mapping[str, Any], identity: Mapping[str, Any]) -> Manifest | None:
     """The run that made a file, by its attributes, to be compared with an `identity`; None where they do not tell."""
     try:
         found = json.loads(attributes[RUN])
-        same = found["identity"]["sweep file"] == _digest(identity["sweep file"])
+        same = found["identity"]["sweep file"] == text_checksum(identity["sweep file"])
         text = identity["sweep file"] if same else attributes.get("sweep")
-        return Manifest({**found["identity"], "sweep file": text}, int(found.get("chunk_cells", 0)), False, "")
+        return Manifest(
+            {**found["identity"], "sweep file": text},
+            int(found["chunk_cells"]),
+            False,
+            "",
+            dict(found["sizes"]),
+            dict(found["lengths"]),
+        )
     except (KeyError, TypeError, ValueError):
         return None
-
-
-def _digest(text: str) -> str:
-    return xxhash.xxh3_128_hexdigest(text.encode(errors="surrogatepass"))
 
 
 def _shown(value: object) -> str:
@@ -171,10 +187,6 @@ class Folder:
         self.known = False  # whether `finished` and `complete` are what the folder holds
         self.done = False
         self._descriptor: int | None = None  # of the folder, while it is locked
-
-    def data(self, split: bool) -> Path:
-        """Where the chunks are."""
-        return self.path / ("data" if split else "data.nc")
 
     def read(self) -> None:
         """Read manifest and journal, as far as they are there.
@@ -244,6 +256,8 @@ class Folder:
                 if _CHUNK.fullmatch(entry.name):
                     entry.unlink()
             data.rmdir()
+        if (self.path / "data.zarr").is_dir():
+            shutil.rmtree(self.path / "data.zarr")
         self.manifest, self.finished, self.complete, self.known = None, {}, False, True
 
     def remove(self) -> None:

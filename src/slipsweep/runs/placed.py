@@ -16,7 +16,7 @@ import math
 import mmap
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,9 +27,9 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from slipsweep.files.netcdf import Head, new_file, write_head
+from slipsweep.files.contents import Contents
+from slipsweep.files.netcdf import new_file, write_head
 from slipsweep.grid.chunks import places
-from slipsweep.grid.tables import Table
 
 #: What is written directly begins and ends at multiples of this, in the file and in memory: as much as any disk asks.
 _SECTOR = 4096
@@ -61,8 +61,8 @@ class Layout:
     nbytes: int
 
 
-def make_file(path: Path, head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]], history: str) -> Layout:
-    """Make a file with all but the results in it, and room for those.
+def make_file(path: Path, contents: Contents) -> Layout:
+    """Make a file with all that has values, and room for what has none yet.
 
     Raises
     ------
@@ -72,16 +72,16 @@ def make_file(path: Path, head: Head, table: Table, dtype: Callable[[str], np.dt
         The netCDF library did not store a result as it was told to.
     """
     with new_file(path, path) as file:
-        write_head(file, head, table, dtype, history)
-        for name in table.data_vars:
+        write_head(file, contents)
+        for name in contents.later:
             # the first value that is written makes room for all
             file[name][(-1,) * file[name].ndim or ...] = 0
     offsets, lengths = {}, {}
     with h5py.File(path, locking=False) as file:  # the run holds a lock of its own; some network folders have none
-        for name in table.data_vars:
+        for name, kind in contents.later.items():
             stored = file[name]
             offset, length = stored.id.get_offset(), stored.id.get_storage_size()
-            if offset is None or length != stored.size * dtype(name).itemsize or not stored.dtype.isnative:
+            if offset is None or length != stored.size * kind.itemsize or not stored.dtype.isnative:
                 raise RuntimeError(f"{name} is not stored as one run of its values")
             offsets[name], lengths[name] = offset, length
     return Layout(offsets, lengths, path.stat().st_size)

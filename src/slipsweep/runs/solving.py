@@ -18,10 +18,13 @@ from slipsweep.grid.tables import Table
 #: Called with a number of cells just solved, from any thread.
 Progress: TypeAlias = Callable[[int], None]
 
-#: What solves chunks, given with their numbers: yields each with its number, in any order.
-#: A chunk's results are let go of before the next is asked for, but for one: whose memory may be
-#: used for those of the next but one.
-Solved: TypeAlias = Callable[[AnyPlan, Mapping[int, Chunk], Progress | None], Iterator[tuple[int, Table]]]
+#: What becomes of a chunk where it is solved: called with its plan, number and place and its results.
+Deliver: TypeAlias = Callable[[AnyPlan, int, Chunk, Table], Any]
+
+#: What solves chunks of a plan, given with their numbers: yields each with its number, in any order; or what came of
+#: it, where a `Deliver` is given last.  A chunk's results are let go of before the next is asked for, but for one:
+#: whose memory may be used for those of the next but one.
+Solved: TypeAlias = Callable[..., Iterator[tuple[int, Any]]]
 
 #: Resident memory of a run beside its chunks, with the compiler: a run of 10^9 cells peaked at
 #: 469 MB, of which 96 MB were its chunks.

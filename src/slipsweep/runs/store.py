@@ -1,43 +1,37 @@
 """A sweep computed and written chunk by chunk.
 
-Each value has its place in the file before any is known: once the empty file is on the disk a chunk is written
-without a change to anything but its own bytes (`slipsweep.runs.placed`).  A run that is killed leaves a file that can
-be read and gone on with (`slipsweep.runs.parts`), and no value is written twice.
-
-Nothing is compressed.  (On a grid of 20 million cells that wrote 2.1 GB/s; zlib on the two flag variables
-1.7 GB/s for 16 % of the bytes; zlib on everything 0.1 GB/s for 58 %.)
+A run that is killed leaves what it has finished on record (`slipsweep.runs.parts`) where it belongs
+(`slipsweep.runs.targets`), so that another goes on from there and no value is written twice.
 """
 
-import hashlib
 import math
 import shutil
 import time
-from collections import deque
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xxhash
-from numpy.typing import NDArray
-
 from slipsweep.errors import InputError, RunError
-from slipsweep.files.names import open_netcdf
-from slipsweep.files.netcdf import TooLarge, history_of, rounded
-from slipsweep.files.outputs import appear, check_outputs, sync, writing
-from slipsweep.files.results import open_result
+from slipsweep.files import zarr_store
+from slipsweep.files.netcdf import TooLarge, history_of
+from slipsweep.files.outputs import CHUNKS, FILE, ZARR, check_outputs, writing
+from slipsweep.files.zarr_store import Place, names_store
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.chunks import Chunk, chunk_lengths, grid_chunks, places
+from slipsweep.grid.chunks import Chunk, chunk_lengths, grid_chunks
 from slipsweep.grid.resources import available_memory, grid_text, size_text
-from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tables import Table
 from slipsweep.grid.tally import Tally
 from slipsweep.runs import parts
 from slipsweep.runs.jobs import Job
-from slipsweep.runs.placed import PlacedFile, file_checksum, make_file, runs_of
 from slipsweep.runs.solving import Progress, Solved, chunk_memory, default_cells, solve_here
+from slipsweep.runs.stored import attributes, nbytes, stored_chunks
+from slipsweep.runs.targets import Delivered, Delivery, Target, counts
+from slipsweep.runs.targets.onefile import OneFile
+from slipsweep.runs.targets.splitfiles import SplitFiles
+from slipsweep.runs.targets.zarrstore import ZarrStore, check_address
 
 #: Seconds after which what is written is brought to the disk itself.
 _SYNC_SECONDS = 1.0
@@ -47,7 +41,7 @@ _SYNC_SECONDS = 1.0
 class Report:
     """What `run` did."""
 
-    path: Path
+    path: Place
     chunk_cells: int
     seconds: float
     nbytes: int
@@ -57,18 +51,19 @@ class Report:
 
 def run(
     job: Job,
-    path: Path,
+    path: Place,
     *,
     command: str,
     overwrite: bool = False,
     resume: bool = False,
     split: bool = False,
+    shared: bool = False,
     chunk_cells: int | None = None,
     shared_cells: int | None = None,
     progress: Progress | None = None,
     solved: Solved = solve_here,
 ) -> Report:
-    """Solve a plan and write its results as netCDF, complete or not at all.
+    """Solve a plan and write its results, complete or not at all.
 
     Finished chunks of a run that failed or was killed are kept beside the output
     (`slipsweep.runs.parts`).
@@ -76,8 +71,8 @@ def run(
     Parameters
     ----------
     job : Job
-    path : Path
-        The file to write, or the folder (`split`).
+    path : Path or str
+        The file to write, or the folder (`split`), or a Zarr store: a folder, or the address of one.
     command : str
         The command as typed, for the file's `history`.
     overwrite : bool
@@ -87,6 +82,8 @@ def run(
         sweep is left as it is.
     split : bool
         Write a folder with a netCDF file for each chunk.
+    shared : bool
+        Those who solve chunks reach the output: they write it themselves, if it is split or a store.
     chunk_cells : int, optional
         Most cells to solve and write at a time; two such chunks are in memory.  By default
         `solving.default_cells`, or what an interrupted run had.
@@ -114,8 +111,9 @@ def run(
     """
     check_output(job, path, overwrite=overwrite or resume, split=split)
     plan = job.plan  # what it refuses, it refuses before there is a folder
-    identity = parts.identity(job.asked, split)
-    with parts.opened(path) as work:
+    with parts.opened(_local(path)) as work:
+        target = _target(job, path, work, split=split, shared=shared)
+        identity = parts.identity(job.asked, target.identity)
         if not overwrite:
             work.read()
         if work.finished and not (resume or overwrite):
@@ -123,59 +121,80 @@ def run(
                 f"{path}: {work.path.name} holds {len(work.finished)} finished chunks of an interrupted run; "
                 "go on with --resume, or start anew with --overwrite"
             )
-        if resume and not work.finished and path.exists():
-            return _found(job, path, _complete(job, path, identity, split))
+        if resume and not work.finished and target.is_complete():
+            return _found(job, path, _complete(job, path, identity))
         if resume and work.finished and work.manifest is not None:
             _check_same(work, identity, chunk_cells)
-            manifest, data = work.manifest, work.data(split)
-            if work.complete and path.exists() and (not data.exists() or data.samefile(path)):
+            manifest = work.manifest
+            if work.complete and target.has_appeared():
                 # killed between giving the output its name and clearing the folder away
                 work.done = True
                 return _found(job, path, manifest.chunk_cells)
         else:
             work.clear()
             cells = min(filter(None, (chunk_cells, shared_cells)), default=default_cells(plan))
-            manifest = parts.Manifest(identity, cells, overwrite, history_of(command))
+            lengths = chunk_lengths(plan.sizes, cells, plan.together)
+            manifest = parts.Manifest(identity, cells, overwrite, history_of(command), dict(plan.sizes), lengths)
         # once more: a run that was writing it may have ended before this one got hold of the lock
-        check_outputs([path], manifest.overwrite, reads=job.files, folder=split)
-        return _carry_out(job, path, work, manifest, progress, solved)
+        check_output(job, path, overwrite=manifest.overwrite or (resume and bool(work.finished)), split=split)
+        return _carry_out(job, path, work, target, manifest, progress, solved)
+
+
+def _target(job: Job, path: Place, work: parts.Folder, *, split: bool, shared: bool) -> Target:
+    if names_store(path):
+        return ZarrStore(job, path, work, shared)
+    assert isinstance(path, Path)
+    return SplitFiles(job, path, work, shared) if split else OneFile(job, path, work)
 
 
 def _carry_out(
-    job: Job, path: Path, work: parts.Folder, manifest: parts.Manifest, progress: Progress | None, solved: Solved
+    job: Job,
+    path: Place,
+    work: parts.Folder,
+    target: Target,
+    manifest: parts.Manifest,
+    progress: Progress | None,
+    solved: Solved,
 ) -> Report:
     """Solve and write what is missing, and give the output its name."""
-    plan, split, chunk_cells = job.plan, bool(manifest.identity["--split"]), manifest.chunk_cells
-    data = work.data(split)
-    _check_size(job, path, chunk_cells, _nbytes(data))
+    plan, chunk_cells = job.plan, manifest.chunk_cells
+    _check_size(job, path, chunk_cells, target.nbytes)
     started = time.perf_counter()
     tally = Tally(plan.cells)
     cut = dict(enumerate(grid_chunks(plan.sizes, chunk_cells, plan.together)))
     try:
-        with closing((_Files if split else _OneFile)(job, data, manifest)) as target:
-            _ready(work, target, cut, tally, progress)
+        with closing(target):
+            _ready(job, work, target, manifest, cut, tally, progress)
             missing = {number: chunk for number, chunk in cut.items() if number not in work.finished}
-            _write_chunks(work, target, cut, _named(job, solved(plan, missing, progress)), tally)
-            target.check(len(cut))
+            delivery = Delivery(target.writer, {name: job.dtype(name) for name in plan.names}, job.dims)
+            found = solved(plan, missing, progress, *([delivery] if target.shared else []))
+
+            def deliver(number: int, table: Table) -> Delivered:
+                return delivery(plan, number, cut[number], table)
+
+            _write_chunks(work, target, _named(job, found), deliver, tally)
+            with writing(path):
+                work.check()
+                target.finish(work.finished)
         with writing(path):
             work.close()
-            appear(data, path, manifest.overwrite)
+            target.appear(manifest.overwrite)
     except TooLarge as large:
         work.clear()  # no --resume could finish it
         raise InputError(f"{job.source}: {large}") from None
     except MemoryError:
         error = RunError(f"{path}: out of memory at a chunk of {_chunk_text(plan, chunk_cells)}")
-        raise _noted(error, work, data, len(cut)) from None
+        raise _noted(error, work, target, len(cut)) from None
     except BaseException as error:
         if isinstance(error, RunError):
             work.check()  # what came of that is not worth telling
-        _noted(error, work, data, len(cut))
+        _noted(error, work, target, len(cut))
         raise
     work.done = True
-    return Report(path, chunk_cells, time.perf_counter() - started, _nbytes(path), tally)
+    return Report(path, chunk_cells, time.perf_counter() - started, nbytes(path), tally)
 
 
-def _complete(job: Job, path: Path, identity: Mapping[str, Any], split: bool) -> int:
+def _complete(job: Job, path: Place, identity: Mapping[str, Any]) -> int:
     """The size of the chunks of an output that is complete.
 
     Raises
@@ -185,13 +204,11 @@ def _complete(job: Job, path: Path, identity: Mapping[str, Any], split: bool) ->
     """
     stored = None
     try:
-        with open_result(path / _chunk_name(0) if split else path) as file:
-            stored = parts.read_stamp(file.attrs, identity)
+        stored = parts.read_stamp(attributes(path), identity)
         difference = "it was not made by slipsweep run or limit" if stored is None else stored.difference(identity)
-        if stored is not None and difference is None and split:
-            chunks = len(list(grid_chunks(job.plan.sizes, stored.chunk_cells, job.plan.together)))
-            there = len(list(path.iterdir()))
-            difference = None if there == chunks else f"it has {there} files of {chunks}"
+        if stored is not None and difference is None and stored.identity.get("--split"):
+            there = len(list(Path(path).iterdir()))
+            difference = None if there == stored.chunks else f"it has {there} files of {stored.chunks}"
     except InputError as error:
         difference = str(error).removeprefix(f"{path}: ")
     if stored is None or difference is not None:
@@ -199,79 +216,43 @@ def _complete(job: Job, path: Path, identity: Mapping[str, Any], split: bool) ->
             f"{path}: exists already, and is not the complete result of this very sweep ({difference}); give "
             "--overwrite to replace it, or another name with -o"
         )
-    return stored.chunk_cells or default_cells(job.plan)
+    return stored.chunk_cells
 
 
-def _found(job: Job, path: Path, chunk_cells: int) -> Report:
+def _found(job: Job, path: Place, chunk_cells: int) -> Report:
     """The report of an output that is complete already."""
     tally = Tally(job.plan.cells)
     for chunk, arrays in stored_chunks(job.plan, path, chunk_cells):
-        _count(tally, job.plan, chunk, arrays)
-    return Report(path, chunk_cells, 0.0, _nbytes(path), tally, found=True)
+        tally.merge(counts(job.plan, job.dims, chunk, arrays))
+    return Report(path, chunk_cells, 0.0, nbytes(path), tally, found=True)
 
 
-def check_output(job: Job, path: Path, *, overwrite: bool, split: bool) -> None:
+def check_output(job: Job, path: Place, *, overwrite: bool, split: bool) -> None:
     """Refuse an output that cannot be, before anything is computed for it."""
-    check_outputs([path], overwrite, reads=job.files, folder=split, work=parts.Folder(path).path)
-
-
-def stored_chunks(plan: AnyPlan, path: Path, chunk_cells: int) -> Iterator[tuple[Chunk, dict[str, NDArray[Any]]]]:
-    """Read a result as it was written: chunks, and the arrays of their results."""
-    sizes = {name: result.sizes for name, result in plan.empty().data_vars.items()}
-    cut = grid_chunks(plan.sizes, chunk_cells, plan.together)
-    if path.is_dir():
-        for number, chunk in enumerate(cut):
-            with _opened(path / _chunk_name(number)) as file:
-                yield chunk, {name: np.asarray(file[name][...]) for name in sizes}
+    if job.compression and not (split or names_store(path)):
+        raise InputError(
+            f"output.compression = {job.compression}: {path} is one netCDF file, whose values have their places before "
+            "they are known, for --resume; give --split, or a name in .zarr"
+        )
+    if names_store(path):
+        zarr_store.check_package(str(path))
+        if split:
+            raise InputError(f"--split: {path} is a store, which has an object for each chunk; leave --split away")
+    if isinstance(path, str):
+        check_address(path, overwrite)
         return
-    with _opened(path) as file:
-        for chunk in cut:
-            yield (
-                chunk,
-                {
-                    name: np.asarray(file[name][tuple(places(chunk, own).values()) or ...])
-                    for name, own in sizes.items()
-                },
-            )
+    kind = ZARR if names_store(path) else CHUNKS if split else FILE
+    check_outputs([path], overwrite, reads=job.files, kind=kind, work=parts.Folder(path).path)
 
 
-def stored_table(plan: AnyPlan, path: Path, chunk_cells: int, names: Collection[str]) -> Table:
-    """Read some results of a plan that were written as `run` told."""
-    table = plan.empty()
-    found = {
-        name: replace(one, values=np.empty(one.values.shape, one.values.dtype))
-        for name, one in table.data_vars.items()
-        if name in names
-    }
-    for chunk, arrays in stored_chunks(plan, path, chunk_cells) if found else ():
-        for name, one in found.items():
-            one.values[tuple(places(chunk, one.sizes).values())] = arrays[name]
-    return Table(table.coords, found, table.attrs)
+def _local(path: Place) -> Path:
+    """The name here of an output; that of a store at an address is where the work folder lies."""
+    return path if isinstance(path, Path) else Path(path.rstrip("/").rpartition("/")[2])
 
 
-def _opened(path: Path) -> Any:
-    file = open_netcdf(path)
-    file.set_auto_maskandscale(False)
-    return file
-
-
-def _named(job: Job, found: Iterator[tuple[int, Table]]) -> Iterator[tuple[int, Table]]:
+def _named(job: Job, found: Iterator[Any]) -> Iterator[Any]:
     with job.named():
         yield from found
-
-
-def _count(tally: Tally, plan: AnyPlan, chunk: Chunk, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Count a chunk, but for what other chunks along a dimension that a result lacks have as well."""
-    whole = plan.empty().data_vars
-    tally.merge(
-        plan.tally(
-            {
-                name: values
-                for name, values in arrays.items()
-                if not any(part.start for dim, part in chunk.items() if dim not in whole[name].dims)
-            }
-        )
-    )
 
 
 def _check_same(work: parts.Folder, identity: Mapping[str, Any], chunk_cells: int | None) -> None:
@@ -286,81 +267,80 @@ def _check_same(work: parts.Folder, identity: Mapping[str, Any], chunk_cells: in
         )
 
 
-def _noted(error: BaseException, work: parts.Folder, data: Path, chunks: int) -> BaseException:
+def _noted(error: BaseException, work: parts.Folder, target: Target, chunks: int) -> BaseException:
     """Tell with an error how much of the run is kept."""
-    if work.finished and work.is_there() and data.exists():
+    if work.finished and work.is_there() and target.is_there():
         error.add_note(f"{len(work.finished)} of {chunks} chunks are kept; go on with --resume")
     return error
 
 
 def _ready(
+    job: Job,
     work: parts.Folder,
-    target: "_OneFile | _Files",
+    target: Target,
+    manifest: parts.Manifest,
     cut: Mapping[int, Chunk],
     tally: Tally,
     progress: Progress | None,
 ) -> None:
     """Take over the finished chunks that are as they were written, or begin with none."""
     kept = {}
-    if work.finished and target.open():
+    if work.finished and target.open(manifest):
         for number in sorted(work.finished.keys() & cut.keys()):
             arrays = target.find(number, cut[number], work.finished[number])
             if arrays is not None:
                 kept[number] = work.finished[number]
-                _count(tally, target.job.plan, cut[number], arrays)
+                tally.merge(counts(job.plan, job.dims, cut[number], arrays))
                 if progress is not None:
-                    progress(target.job.plan.part(cut[number]).cells)
+                    progress(job.plan.part(cut[number]).cells)
     with writing(work.output):
         if kept:
             work.keep(kept)
         else:
             target.close()
             work.clear()
-            target.create()
-            work.begin(target.manifest)
+            target.create(manifest)
+            work.begin(manifest)
 
 
 def _write_chunks(
     work: parts.Folder,
-    target: "_OneFile | _Files",
-    cut: Mapping[int, Chunk],
-    found: Iterator[tuple[int, Table]],
+    target: Target,
+    found: Iterator[tuple[int, Table | Delivered]],
+    deliver: Callable[[int, Table], Delivered],
     tally: Tally,
 ) -> None:
-    """Write chunks and put them on record, each while the next is being solved.
+    """Put chunks on record that are written, and write the others, each while the next is being solved.
 
-    Beside the writing cells are counted, and what is written is brought to the disk itself.
+    Beside it what is written is brought to the disk itself.
     """
     pending: Future[None] | None = None
     syncing: Future[None] | None = None
     synced = time.monotonic()
 
-    def write(number: int, table: Table) -> None:
+    def take(number: int, one: Table | Delivered) -> None:
         nonlocal syncing, synced
         with writing(work.output):
-            arrays = {
-                name: rounded(name, result.values, target.job.dtype(name)) for name, result in table.data_vars.items()
-            }
-            counted = counter.submit(_count, tally, target.job.plan, cut[number], arrays)
             work.check()
-            work.add(number, target.write(number, cut[number], table, arrays))
+            done = one if isinstance(one, Delivered) else deliver(number, one)
+            work.add(number, done.digest)
+            tally.merge(done.tally)
             if time.monotonic() - synced >= _SYNC_SECONDS:
                 if syncing is not None:
                     syncing.result()
                 syncing, synced = syncer.submit(bring), time.monotonic()
-            counted.result()
 
     def bring() -> None:
         target.sync()
         work.sync()
 
     # leaving them waits, for the writer first: a chunk that is being written is finished
-    with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as counter, ThreadPoolExecutor(1) as writer:
-        for number, table in found:
+    with ThreadPoolExecutor(1) as syncer, ThreadPoolExecutor(1) as writer:
+        for number, one in found:
             if pending is not None:
                 pending.result()
-            pending = writer.submit(write, number, table)
-            del table
+            pending = writer.submit(take, number, one)
+            del one
         if pending is not None:
             pending.result()
         with writing(work.output):
@@ -369,165 +349,13 @@ def _write_chunks(
             bring()
 
 
-class _OneFile:
-    """All chunks in one netCDF file, each in its place."""
-
-    def __init__(self, job: Job, data: Path, manifest: parts.Manifest) -> None:
-        self.job, self.data, self.manifest = job, data, manifest
-        self.table = job.plan.empty()
-        self.file: PlacedFile | None = None
-
-    def close(self) -> None:
-        """Close the file, if it is open."""
-        if self.file is not None:
-            self.file.close()
-            self.file = None
-
-    def create(self) -> None:
-        """Make the file, with all but the chunks in it."""
-        head = replace(self.job.head, labels=self.job.labels, run=parts.stamp(self.manifest))
-        layout = make_file(self.data, head, self.table, self.job.dtype, self.manifest.history)
-        self.manifest.layout, self.manifest.head = layout, file_checksum(self.data, layout)
-        sync(self.data)
-        self.file = PlacedFile(self.data, layout)
-
-    def open(self) -> bool:
-        """Open the file of an earlier run; whether all but its chunks is as it was made."""
-        layout = self.manifest.layout
-        if layout is None:
-            return False
-        try:
-            # what the system refuses (rights, a disk that does not answer) is no damage: chunks are not thrown away
-            self.file = PlacedFile(self.data, layout)
-        except FileNotFoundError:
-            return False
-        # what was cut off is zeros: the chunks that are whole can be read
-        self.file.restore_size()
-        return file_checksum(self.data, layout) == self.manifest.head
-
-    def find(self, number: int, chunk: Chunk, digest: str) -> dict[str, NDArray[Any]] | None:
-        """Return the values of a chunk, as they are stored, or None if they are not those on record."""
-        assert self.file is not None
-        arrays = {}
-        for name, result in self.table.data_vars.items():
-            shape = [part.stop - part.start for part in places(chunk, result.sizes).values()]
-            try:
-                values = self.file.read(name, runs_of(chunk, result.sizes), self.job.dtype(name))
-            except OSError:  # a sector that cannot be read; that the file can was seen when it was opened
-                return None
-            arrays[name] = values.reshape(shape)
-        return arrays if parts.checksum(arrays) == digest else None
-
-    def write(self, number: int, chunk: Chunk, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Write a chunk, with its values as they are to be stored; return what is to go on record."""
-        assert self.file is not None
-        for name, result in self.table.data_vars.items():
-            self.file.write(name, runs_of(chunk, result.sizes), arrays[name])
-        return parts.checksum(arrays)
-
-    def check(self, chunks: int) -> None:
-        """Refuse to take another file for the one that was written (RunError)."""
-        assert self.file is not None
-        if not self.file.has_name(self.data):
-            raise _removed(self.data)
-
-    def sync(self) -> None:
-        """Have all that is written on the disk itself."""
-        sync(self.data)
-
-
-class _Files:
-    """A folder with a netCDF file for each chunk, complete by itself."""
-
-    def __init__(self, job: Job, data: Path, manifest: parts.Manifest) -> None:
-        self.job, self.data, self.manifest = job, data, manifest
-        self.unsynced: deque[Path] = deque()
-
-    def close(self) -> None:
-        """Every file is closed when it is written."""
-
-    def create(self) -> None:
-        """Make the folder."""
-        self.data.mkdir()
-
-    def open(self) -> bool:
-        """Whether there is a folder of an earlier run."""
-        return self.data.is_dir()
-
-    def find(self, number: int, chunk: Chunk, digest: str) -> dict[str, NDArray[Any]] | None:
-        """Return the values of a chunk, as they are stored, or None if its file is not that on record."""
-        try:
-            with self._name(number).open("rb") as content:
-                if hashlib.file_digest(content, xxhash.xxh3_128).hexdigest() != digest:
-                    return None
-        except PermissionError:
-            raise  # no damage
-        except OSError:
-            return None
-        with _opened(self._name(number)) as file:
-            return {name: np.asarray(file[name][...]) for name in self.job.plan.names}
-
-    def write(self, number: int, chunk: Chunk, table: Table, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Write a chunk, with its values as they are to be stored; return what is to go on record."""
-        coords = dict(table.coords)
-        labels = self.job.labels
-        if "case" in chunk:
-            # files are put together by the coordinates of their dimensions, which rows of [[cases]] lack
-            rows = np.arange(chunk["case"].start, chunk["case"].stop, dtype=np.int32) + 1
-            coords["case"] = Variable(("case",), rows, {"long_name": "row of [[cases]]", "units": "1"})
-            labels = labels[chunk["case"]]
-        path = self._name(number)
-        temporary = path.with_suffix(".tmp")
-        head = replace(self.job.head, labels=labels, run=parts.stamp(self.manifest))
-        layout = make_file(temporary, head, replace(table, coords=coords), self.job.dtype, self.manifest.history)
-        file = PlacedFile(temporary, layout)
-        try:
-            for name, values in arrays.items():
-                file.write(name, ([0], values.size), values)
-        finally:
-            file.close()
-        temporary.replace(path)
-        self.unsynced.append(path)
-        return file_checksum(path, layout, arrays)
-
-    def check(self, chunks: int) -> None:
-        """Refuse to take the folder for whole where a file is missing (RunError)."""
-        for number in range(chunks):
-            if not self._name(number).exists():
-                raise _removed(self._name(number))
-
-    def sync(self) -> None:
-        """Have all that is written on the disk itself."""
-        while self.unsynced:
-            sync(self.unsynced.popleft())
-        sync(self.data)
-
-    def _name(self, number: int) -> Path:
-        return self.data / _chunk_name(number)
-
-
-def _chunk_name(number: int) -> str:
-    return f"chunk-{number:06}.nc"
-
-
-def _removed(path: Path) -> RunError:
-    return RunError(f"{path}: was removed during the run; start again")
-
-
-def _nbytes(path: Path) -> int:
-    """Bytes that a file, or the files of a folder, take on the disk."""
-    if path.is_dir():
-        return sum(entry.stat().st_size for entry in path.iterdir())
-    return path.stat().st_size if path.exists() else 0
-
-
-def _check_size(job: Job, path: Path, chunk_cells: int, written: int) -> None:
+def _check_size(job: Job, path: Place, chunk_cells: int, written: int) -> None:
     """Refuse a grid whose file cannot fit on the disk, or whose chunks cannot fit in memory."""
     plan = job.plan
     results = plan.empty().data_vars
     nbytes = sum(result.values.size * job.dtype(name).itemsize for name, result in results.items())
-    free = shutil.disk_usage(path.parent).free
-    if nbytes > free + written:
+    free = shutil.disk_usage(path.parent).free if isinstance(path, Path) else math.inf
+    if isinstance(path, Path) and nbytes > free + written and not job.compression:
         raise InputError(
             f"{job.source}: a grid of {math.prod(plan.sizes.values()):.3g} cells makes {size_text(nbytes)}, but "
             f"{path.parent} has {size_text(free)} free: take coarser axes, fewer output.variables, "

@@ -16,7 +16,7 @@ from slipsweep.model.options import MODELS, Mendez
 from slipsweep.model.parameters import check_finite, check_single, shown
 from slipsweep.model.variables import CALIBRATION, CALIBRATION_SERIES, HISTORY, PARAMETERS
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
-from slipsweep.studies.findings import findings, model_table, uncertainty_table
+from slipsweep.studies.findings import findings, misfits, model_table, uncertainty_table
 from slipsweep.studies.fitting import SOUGHT, Fit, Line, Profile, Solution, Whitening
 from slipsweep.studies.forward import COLUMN, Forward
 from slipsweep.studies.friction import noise_of, onset_acceleration, slides_of, threshold_of
@@ -96,6 +96,7 @@ def calibration_table(
     )
     starts = _starts(fit)
     solution = fit.solve(starts)
+    fit = solution.fit
     summary = _summary(fit, solution)
     episodes: list[tuple[float, float]] = []
     if summary["continuous_pulses"].item() == 0:
@@ -104,6 +105,7 @@ def calibration_table(
     if episodes:
         fit = _without(fit, episodes)
         solution = fit.solve([solution.parameters, *starts])
+        fit = solution.fit
         summary = _summary(fit, solution)
     if not np.isfinite(solution.errors[1:]).any():
         solution = _with_friction(fit, solution)
@@ -112,7 +114,7 @@ def calibration_table(
     if (better := profile.better(solution.parameters)) is not None:
         # the search was caught where Üy does not matter, beside where it does
         other = replace(fit, use=_kept(fit), noise={}, given_noise=dict(fit.noise)).solve([better], near=True)
-        if other.squares() < solution.squares() and np.isfinite(other.errors[1:]).all():
+        if other.cost() < solution.cost() and np.isfinite(other.errors[1:]).all():
             solution, fit = other, other.fit
             profile = solution.profile()
     if not np.isfinite(solution.errors[0]):
@@ -121,7 +123,21 @@ def calibration_table(
         solution = replace(solution, parameters=np.array([same.max(), *solution.parameters[1:]]))
     summary = _summary(fit, solution)
     own = _cycles(fit, solution) if cycles else []
-    return _table(fit, solution, profile, summary, own, episodes)
+    return _table(fit, solution, profile, summary, own, episodes, _drifting(fit, solution, starts))
+
+
+def _drifting(fit: Fit, solution: Solution, starts: Sequence[Floats]) -> list[str]:
+    """Channels of which a drift, that was not asked for, would explain a misfit."""
+    known = {one.name for one in fit.lines}
+    found = []
+    for name in fit.test.responses if misfits(fit, solution) else ():
+        if f"drift of {name}" in known:
+            continue
+        lines = [*fit.lines, *(one for one in _lines(fit.test, (), [name]) if one.name not in known)]
+        other = Fit(fit.test, fit.motion, fit.forward, _kept(fit), lines, fit.table_lines, scans=False).solve(starts)
+        if not misfits(other.fit, other):
+            found.append(name)
+    return found
 
 
 def _with_friction(fit: Fit, solution: Solution) -> Solution:
@@ -156,7 +172,7 @@ def _with_friction(fit: Fit, solution: Solution) -> Solution:
             scans=False,
         ).solve([start])  # fmt: skip
         alive = bool(np.isfinite(other.errors[1:]).all())
-        if alive and other.squares() < best.squares() + (_SAME_SQUARE if best is solution else 0.0):
+        if alive and other.cost() < best.cost() + (_SAME_SQUARE if best is solution else 0.0):
             best = other
     return best
 
@@ -437,6 +453,7 @@ def _table(
     summary: Table,
     cycles: Sequence[Cycle],
     episodes: Sequence[tuple[float, float]],
+    drifting: Sequence[str],
 ) -> Table:
     """All that was found, as a table."""
     test = fit.test
@@ -444,6 +461,10 @@ def _table(
     added = _added(fit, solution)
     lost = ~np.isfinite(solution.errors)
     intervals = np.array([profile.interval(at, SQUARE) for at in range(3)])
+    # the profile may be lower beside what was found: both are possible
+    intervals = np.column_stack(
+        [np.minimum(intervals[:, 0], solution.parameters), np.maximum(intervals[:, 1], solution.parameters)]
+    )
     intervals = np.maximum(intervals, 0.0)  # nothing physical lies below
     intervals[1:][lost[1:]] = np.nan
     time = Variable(("time",), test.times, {"units": "s", "long_name": "time"})
@@ -510,7 +531,7 @@ def _table(
         )
     for name in ("permanent_displacement", "stick_slip_pulses", "continuous_pulses", "validity"):
         data[name] = summary[name]
-    notes = findings(fit, solution, summary, intervals, episodes)
+    notes = findings(fit, solution, summary, intervals, episodes, drifting)
     attrs = {
         "title": "Calibration of a sliding block from a test on a shaking table",
         **test.attrs,

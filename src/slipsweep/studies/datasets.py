@@ -21,6 +21,7 @@ from slipsweep.model.options import MODELS, Model, Solver
 from slipsweep.model.parameters import computed, shown
 from slipsweep.model.variables import PARAMETERS, RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies.history import history_table
 from slipsweep.studies.limits import AMPLITUDE_STEPS, plan_limits
@@ -30,19 +31,23 @@ Values = float | Sequence[float] | np.ndarray | xr.DataArray
 
 
 def sweep(
-    theta: Values,
-    mu_s: Values,
+    theta: Values | None = None,
+    mu_s: Values | None = None,
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
-    excitation: Waveform | Record | str = "sine",
+    excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     solver: Solver | str = "auto",
     displacement_amplitude: Values | None = None,
     scale: Values | None = None,
+    pgv: Values | None = None,
+    arias_intensity: Values | None = None,
     time_scale: Values | None = None,
     polarity: int | Sequence[int] | str | None = None,
+    azimuth: Values | None = None,
     yield_acceleration: Values | None = None,
+    yield_coefficient: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
@@ -64,11 +69,12 @@ def sweep(
     mu_s : float, array or DataArray
         Static friction coefficient, > 0.
     amplitude : float, array or DataArray
-        Peak ground acceleration A, m/s², ≥ 0; a record is scaled to it.
+        Peak ground acceleration A, m/s², ≥ 0; a record, or every motion of a suite, is scaled to it.
     frequency : float, array or DataArray
         Excitation frequency, Hz, > 0; not with a record.
-    excitation : Sine, Cosine, Triangle, Square, Harmonics, Record or str
-        What the plane does; "sine", "cosine", "triangle" and "square" stand for ten cycles without ramps.
+    excitation : Sine, Cosine, Triangle, Square, Harmonics, Record, Suite or str
+        What the plane does; "sine", "cosine", "triangle" and "square" stand for ten cycles without ramps.  What is said
+        of a record below holds for each motion of a suite.
     model : Mendez, Newmark or str
         The paper's friction law, or the classical rigid block; "mendez", "newmark".
     solver : Cycle, Step or str
@@ -78,13 +84,21 @@ def sweep(
         coordinate, but where d and `frequency` span a grid: there it is a result to ask for.
     scale : float, array or DataArray
         With a record: factor on its acceleration, > 0, instead of `amplitude`; by default 1.
+    pgv, arias_intensity : float, array or DataArray
+        With a record, instead of `amplitude`: peak ground velocity or Arias intensity (m/s) that it is scaled to, after
+        `time_scale` has stretched it.
     time_scale : float, array or DataArray
         With a record: factor on its time, > 0; 2 makes it last twice as long.
     polarity : {1, -1}, list of these, or "both"
         With a record: 1 takes its positive accelerations for those that move the block downslope, -1
         its negative ones.
+    azimuth : float, array or DataArray
+        With a suite of pairs of components, of which it is needed: the direction of sliding, degrees from the first
+        component towards the second, 0 to 360.
     yield_acceleration : float, array or DataArray, optional
         Üy, m/s²; by default Coulomb's, g tan(φs − θ).
+    yield_coefficient : float, array or DataArray, optional
+        ky = Üy/g of Newmark's block, in place of `theta`, `mu_s` and `yield_acceleration`.
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under a
         record every pulse has from its own peak.
@@ -96,7 +110,8 @@ def sweep(
         with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  Under a record
         `permanent_displacement`, `peak_relative_velocity`, `number_of_slips` (that begin at rest),
         `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension of
-        the paper's harmonic motion) and `validity`, these by default, and `newmark_displacement`.
+        the paper's harmonic motion) and `validity`, these by default, `newmark_displacement`, and `motion_factor`, by
+        which the strength asked for multiplies the recorded acceleration (under a suite by default, too).
     chunks : int, tuple, dict or "auto", optional
         Chunks as dask takes them; the result is then lazy.  Frequency is best left whole.
     progress : callable, optional
@@ -105,13 +120,16 @@ def sweep(
     Returns
     -------
     Dataset
-        Dimensions theta, mu_s, amplitude, frequency, then others.  The parameters of
-        Eqs. 7-11 do not vary with frequency and have no such dimension.
+        Dimensions theta, mu_s, amplitude, frequency, then others, `motion` last.  The parameters of
+        Eqs. 7-11 do not vary with frequency and have no such dimension.  A suite has its labels as `motion`, and the
+        file and the intensity measures of each motion, as it was recorded, as coordinates along it (``motion_pga``
+        and others: `slipsweep.motion.intensity`).
 
     Raises
     ------
     InputError
-        A value that no physics allows, an unknown option, a grid that memory cannot hold.
+        A value that no physics allows, an unknown option, a grid that memory cannot hold.  A result that double
+        precision does not hold (of inputs beyond 1e40, say) is refused when it is computed: with `chunks`, later.
     """
     given = _inputs(locals())
     plan = plan_sweep(**_plain(given), excitation=excitation, model=model, solver=solver, variables=variables)
@@ -153,20 +171,23 @@ def friction_parameters(
 
 
 def simulate(
-    theta: float,
-    mu_s: float,
+    theta: float | None = None,
+    mu_s: float | None = None,
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
-    excitation: Waveform | Record | str = "sine",
+    excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     times: Sequence[float] | np.ndarray | None = None,
     points_per_cycle: int | None = None,
     displacement_amplitude: float | None = None,
     scale: float | None = None,
+    pgv: float | None = None,
+    arias_intensity: float | None = None,
     time_scale: float | None = None,
     polarity: int | None = None,
     yield_acceleration: float | None = None,
+    yield_coefficient: float | None = None,
     decay_rate: float | None = None,
     delta_mu: float | None = None,
     minimum_friction: float | None = None,
@@ -177,7 +198,8 @@ def simulate(
     Parameters
     ----------
     theta, mu_s, amplitude, frequency : float
-        One case; these and the remaining parameters as in `slipsweep.sweep`.
+        One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite one motion is taken:
+        ``excitation=suite["label"]``, of a pair ``suite["label"].rotated(azimuth)``.
     times : array, optional
         Times to sample, s, increasing, and not negative under a waveform; by default `points_per_cycle` a
         cycle, from 0 to the end of the shaking, or the times of a record's samples; and on until the block has
@@ -190,7 +212,7 @@ def simulate(
     -------
     Dataset
         Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²),
-        `friction_coefficient` (what Eq. 1 gives for the two), `relative_velocity` (m/s)
+        `friction_coefficient` (what Eq. 1 gives for the two; not with `yield_coefficient`), `relative_velocity` (m/s)
         and `relative_displacement` (m); and the results of `sweep` for the case.  Where the plane's acceleration
         jumps, as at the end of a record, the values are those after the jump.  NaN where
         the case has no value (`validity`).
@@ -213,15 +235,17 @@ def simulate(
 
 def limit_amplitude(
     displacement: Values,
-    theta: Values,
-    mu_s: Values,
+    theta: Values | None = None,
+    mu_s: Values | None = None,
     frequency: Values | None = None,
     *,
-    excitation: Waveform | Record | str = "sine",
+    excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     time_scale: Values | None = None,
     polarity: int | Sequence[int] | str | None = None,
+    azimuth: Values | None = None,
     yield_acceleration: Values | None = None,
+    yield_coefficient: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
@@ -297,7 +321,7 @@ def sample(
     frequency: Values | None = None,
     *,
     uncertain: Mapping[str, Any],
-    excitation: Waveform | Record | str = "sine",
+    excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     solver: Solver | str = "auto",
     samples: int = 4096,
@@ -306,11 +330,16 @@ def sample(
     quantiles: float | Sequence[float] | np.ndarray = (0.05, 0.5, 0.95),
     thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
     correlation: Sequence[tuple[str, str, float]] = (),
+    sensitivity: bool = False,
     displacement_amplitude: Values | None = None,
     scale: Values | None = None,
+    pgv: Values | None = None,
+    arias_intensity: Values | None = None,
     time_scale: Values | None = None,
     polarity: int | Sequence[int] | str | None = None,
+    azimuth: Values | None = None,
     yield_acceleration: Values | None = None,
+    yield_coefficient: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
@@ -348,6 +377,9 @@ def sample(
         Increasing displacements, m or with a unit ("50mm"), ≥ 0.
     correlation : list of (str, str, float)
         Pairs of drawn parameters and the correlation of their normal scores (a Gaussian copula).
+    sensitivity : bool
+        Compute Sobol indices of the displacement, too: from ``samples * (k + 2)`` further runs a grid point, of k
+        inputs.
     progress : callable, optional
         Called with the number of samples just solved, from any thread.
 
@@ -365,6 +397,12 @@ def sample(
           all samples, how many slide in which mode, have which flag, and have no value.  They do not
           depend on the frequency (of a record: the time scale) and have no such dimension (but with
           `displacement_amplitude`).  Under a record there is no `mode_share`.
+        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the
+          variance of the displacement that an input makes alone, and with all that depends on it.
+          `first_order_interval` and `total_interval` are their 95 % intervals (dimension `bound`), by a bootstrap.
+          Inputs that are correlated count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
+          `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).  They lack the
+          frequency as shares do.
 
         How the inputs were drawn is in the attributes.
 
@@ -373,7 +411,8 @@ def sample(
     InputError
         As `sweep`; a distribution that scipy.stats does not know, or draws that no physics allows.
     """
-    from slipsweep.studies.uncertainty import check_sampling, plan_samples
+    from slipsweep.studies.sampling import check_sampling
+    from slipsweep.studies.uncertainty import plan_samples
 
     given = _inputs(locals())
     sampling = check_sampling(
@@ -384,6 +423,7 @@ def sample(
         quantiles=quantiles,
         thresholds=thresholds,
         correlation=correlation,
+        sensitivity=sensitivity,
         g=MODELS.of(model).g,
     )
     plan = plan_samples(
@@ -497,7 +537,7 @@ def _chunk_lengths(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int
     try:
         normal: tuple[tuple[int, ...], ...] = normalize_chunks(asked, tuple(sizes.values()), dtype=np.dtype("f8"))
     except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError) as error:
-        raise InputError(f"chunks = {shown(chunks)}: {error}") from None
+        raise InputError(f"chunks = {shown(chunks)}: {' '.join(str(error).split())}") from None
     for lengths, size in zip(normal, sizes.values(), strict=True):
         if sum(lengths) != size or not all(isinstance(length, Integral) and length > 0 for length in lengths):
             raise InputError(

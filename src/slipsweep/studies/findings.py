@@ -12,6 +12,7 @@ from slipsweep.model.variables import HISTORY, PARAMETERS, Validity
 from slipsweep.motion.shaking import RESPONSES, TABLE
 from slipsweep.studies.fitting import SOUGHT, Fit, Solution
 from slipsweep.studies.forward import COLUMN, Forward
+from slipsweep.studies.friction import noise_of
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +34,12 @@ _MOST_CORRELATION = 0.9998
 #: Standard errors by which residuals must drift for it to be told.
 _DRIFTS = 5.0
 
+#: Part of the table's largest acceleration beyond which it moves.
+_MOVES = 0.1
+
+#: How many times the noise, and which part of the largest value, a misfit must be to be told.
+_WORSE, _MISSES = 1.5, 0.01
+
 #: Part of the largest value that a drift or an offset must reach: noise of the table adds up to less.
 _TELLS = 0.05
 
@@ -43,8 +50,9 @@ def findings(
     summary: Table,
     intervals: Floats,
     episodes: Sequence[tuple[float, float]],
+    drifting: Sequence[str] = (),
 ) -> list[str]:
-    """What must be said of a calibration, a sentence or two each."""
+    """What must be said of a calibration, a sentence or two each; `drifting` are channels whose drift explains it."""
     said = []
     flags = Validity(int(summary["validity"].item()))
     lost = [at for at in range(3) if not np.isfinite(solution.errors[at])]
@@ -72,8 +80,55 @@ def findings(
     said += _not_apart(fit, solution, intervals, lost)
     if flags & Validity.NOT_RECOUPLED:
         said.append("The computed block still slides when the next slide begins (flag not_recoupled).")
-    said += _drifting(fit, solution)
+    if not _moves(fit, 0):
+        said += _drifting(fit, solution, drifting)
+    return [*_misfit(fit, solution, drifting), *said]
+
+
+def _moves(fit: Fit, end: int) -> bool:
+    """Whether the table moves already as the record begins (0), or still as it ends (-1)."""
+    smooth = fit.motion.acceleration
+    return abs(float(smooth[end])) > max(_MOVES * float(np.abs(smooth).max()), 3.0 * fit.motion.noise)
+
+
+def _misfit(fit: Fit, solution: Solution, drifting: Sequence[str]) -> list[str]:
+    """Why the results may not be relied on: the block does not do what is computed."""
+    said = []
+    if _moves(fit, 0):
+        said.append(
+            f"The table moves as the record begins, at {float(fit.motion.acceleration[0]):.3g} m/s2. The block is "
+            "taken to be at rest there. If it slides, the results are wrong: let the record begin where both are at "
+            "rest."
+        )
+    if worse := misfits(fit, solution):
+        said.append(
+            "The misfit is larger than the noise of the sensors: "
+            f"{', '.join(f'{name} {times:.2g} times' for name, times in worse.items())}. The block did not move as the "
+            "model has it, or a sensor drifts: look at the figure (-o FIGURE.png) before the results are used."
+        )
+        said += [
+            f"With a drift of {name} taken out, the misfit is that of the sensors' noise: give drift = {name!r}."
+            for name in drifting
+        ]
     return said
+
+
+def misfits(fit: Fit, solution: Solution) -> dict[str, float]:
+    """Channels whose misfit is larger than their noise, as neighbouring samples scatter, and how many times."""
+    history = fit.computed(solution.parameters, solution.wrong)
+    rows = [int(fit.use[name].sum()) for name in fit.channels]
+    added = np.zeros(sum(rows))
+    for value, line in zip(solution.nuisances[fit.motion.shapes.shape[1] :], fit.lines, strict=True):
+        added = added + value * fit.of_line(line)
+    found = {}
+    for name, lines in zip(fit.channels, np.split(added, np.cumsum(rows)[:-1]), strict=True):
+        values, use = fit.test.channels[name], fit.use[name]
+        rest = (values - history[:, COLUMN[name]])[use] - lines * fit.noise[name]
+        misfit = float(np.sqrt(np.mean(rest**2))) if rest.size else 0.0
+        noise = max(noise_of(values[use]), fit.least_noise(name))
+        if misfit > _WORSE * noise and misfit > _MISSES * float(np.nanmax(np.abs(values))):
+            found[name] = misfit / noise
+    return found
 
 
 def _not_apart(fit: Fit, solution: Solution, intervals: Floats, lost: Sequence[int]) -> list[str]:
@@ -153,15 +208,15 @@ def _remedy(fit: Fit, solution: Solution, places: Sequence[int]) -> str:
     )
 
 
-def _drifting(fit: Fit, solution: Solution) -> list[str]:
-    """Channels whose residuals have an offset or a drift that was not asked for."""
+def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
+    """Channels whose residuals have an offset or a drift that was not asked for, but for those that are told of."""
     said = []
     lines = {one.name for one in fit.lines}
     history = fit.computed(solution.parameters, solution.wrong)
     since = fit.test.times - fit.test.times[0]
     table = np.interp(fit.test.times, fit.motion.times, fit.motion.acceleration)
     for name in fit.channels:
-        if f"drift of {name}" in lines:
+        if f"drift of {name}" in lines or name in told:
             continue
         use = fit.use[name]
         # at rest a sensor shows its own offset; in motion the model may be wrong as well
@@ -187,7 +242,8 @@ def _drifting(fit: Fit, solution: Solution) -> list[str]:
                 f"What is measured less computed of {name} is {float(np.mean(rest[use])):.3g} {HISTORY[name]['units']} "
                 f"on average: if its sensor has an offset, give offset = {name!r}."
             )
-    if TABLE not in lines and not fit.table_lines and abs(float(np.mean(table))) > 0.02 * float(np.abs(table).max()):
+    at_rest = not (_moves(fit, 0) or _moves(fit, -1))  # a cycle cut in two has an average of its own
+    if at_rest and not fit.table_lines and abs(float(np.mean(table))) > 0.02 * float(np.abs(table).max()):
         said.append(
             f"The table's acceleration is {float(np.mean(table)):.3g} m/s2 on average: if its sensor has an offset, "
             f"give offset = {TABLE!r}."

@@ -12,10 +12,11 @@ out, wherever the jumps of the computed motion lie, until that changes no more.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
 
 from slipsweep.motion.shaking import TABLE, ShakingTest
@@ -246,7 +247,8 @@ class Fit:
 
         def all_of(part: Floats) -> Floats:
             whole = start.copy()
-            whole[free] = part
+            # what is as good as at its bound is there
+            whole[free] = np.where(part - self.least[free] < 1e-9 * self.scale[free], self.least[free], part)
             return whole
 
         found = least_squares(
@@ -297,6 +299,23 @@ class Fit:
         parameters = min(starts, key=self.rough)
         if not near:
             parameters = self._robust(parameters, wrong)
+        solution = self._settled(parameters, wrong, shapes)
+        if not self.scans:
+            return solution
+        elsewhere = self.scanned(solution.parameters, solution.wrong, self.effects(solution.shapes))
+        if elsewhere is solution.parameters:
+            return solution
+        # other samples lie beside its jumps: what is better is not known before it has settled, with the same noise
+        alone = replace(self, use=dict(all_samples), noise={}, given_noise=dict(self.noise), scans=False)
+        other = alone._settled(elsewhere, solution.wrong)
+        if other.cost() > solution.cost() - _BETTER:
+            return solution
+        free = replace(self, use=all_samples, noise=dict(self.noise), scans=False)
+        return free._settled(other.parameters, other.wrong)
+
+    def _settled(self, parameters: Floats, wrong: Floats, shapes: Sequence[Floats] | None = None) -> "Solution":
+        """The least squares near a start; each round leaves out the samples beside the jumps of the one before."""
+        all_samples = dict(self.use)
         for turn in range(_MOST_ROUNDS if shapes is None else _FEW_ROUNDS):
             before = parameters
             if "block_acceleration" in self.use:
@@ -306,8 +325,6 @@ class Fit:
             self._take_noise(parameters, wrong, now)
             effects = self.effects(now)
             parameters = self.search(parameters, wrong, effects)
-            if turn == 1 and self.scans:
-                parameters = self.scanned(parameters, wrong, effects)
             solution = Solution.of(self, parameters, wrong, now)
             errors = solution.errors
             if turn and np.all(np.abs(parameters - before) <= _SETTLED * np.where(errors > 0.0, errors, np.inf)):
@@ -421,6 +438,10 @@ class Solution:
         effects = self.fit.effects(self.shapes)
         return float(np.sum(Whitening.of(effects)(self.fit.residuals(self.parameters, self.wrong, effects)) ** 2))
 
+    def cost(self) -> float:
+        """The same, every sample that is left out counted as what is to be expected of it: but for a constant."""
+        return self.squares() - sum(float(one.sum()) for one in self.fit.use.values())
+
     def profile(self) -> Profile:
         """How the sum of squares depends on Üy."""
         fit, wrong, effects = self.fit, self.wrong, self.fit.effects(self.shapes)
@@ -440,7 +461,7 @@ class Solution:
                     rest = whiten(fit.residuals(tried, wrong, effects))
                     step = np.linalg.lstsq(slopes, rest, rcond=1e-6)[0]
                     tried[1:] = np.clip(tried[1:] + step, fit.least[1:], 30.0 * fit.scale[1:])
-                squares[at] = float(np.sum(whiten(fit.residuals(tried, wrong, effects)) ** 2))
+                squares[at] = self._above(tried, effects)
                 others[at] = tried[1:]
                 errors[at] = np.sqrt(np.diag(covariance_of(slopes, fit.scale[1:], (0, 1))))
                 if squares[at] - squares[middle] > _FAR:
@@ -449,6 +470,25 @@ class Solution:
                     squares[rest_of], others[rest_of], errors[rest_of] = np.inf, tried[1:], 0.0
                     break
         return Profile(onsets, squares - squares.min(), others, np.nan_to_num(errors, posinf=0.0))
+
+    def _above(self, tried: Floats, effects: Floats) -> float:
+        """How much larger the sum of squares is for other parameters, on the samples beside no jump of either.
+
+        A sample on the other side of a jump would decide between them, and may be one that chance put there.
+        """
+        fit, clear = self.fit, np.ones(effects.shape[0], dtype=bool)
+        if "block_acceleration" in fit.use:
+            beside = fit.beside(fit.jumps(tried, self.wrong)).astype(np.float64)
+            parts = {"block_acceleration": beside}
+            clear = fit.stacked(lambda name: parts.get(name, np.zeros(beside.size))) == 0.0
+        inside = effects[clear]
+        root = cho_factor(np.eye(effects.shape[1]) + inside.T @ inside)
+        found = []
+        for parameters in (tried, self.parameters):
+            rest = fit.residuals(parameters, self.wrong, effects)[clear]
+            along = inside.T @ rest
+            found.append(float(rest @ rest - along @ cho_solve(root, along)))
+        return found[0] - found[1]
 
     @classmethod
     def of(cls, fit: Fit, parameters: Floats, wrong: Floats, shapes: Sequence[Floats]) -> "Solution":

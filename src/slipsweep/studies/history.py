@@ -21,6 +21,8 @@ from slipsweep.model.parameters import MOST_POINTS, check_numbers, check_whole, 
 from slipsweep.model.variables import HISTORY, VALUELESS, SlidingMode
 from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
+from slipsweep.motion.waveforms import Waveform
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +46,10 @@ def history_table(
 ) -> Table:
     """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
     problem = check_problem(excitation, model, "cycle")
+    if isinstance(problem.excitation, Suite):
+        label = problem.excitation.labels[0]
+        of = ".rotated(azimuth)" if problem.excitation.has_pairs else ""
+        raise InputError(f"excitation: simulate takes one motion of a Suite, such as suite[{label!r}]{of}")
     if points_per_cycle is not None and isinstance(problem.excitation, Record):
         raise InputError("points_per_cycle: not allowed with a Record, whose samples are the points; give times")
     plan = plan_sweep(**given, excitation=problem.excitation, model=problem.model)
@@ -122,15 +128,18 @@ class _History:
     def columns(self, phases: Floats) -> dict[str, Variable]:
         """The variables of a history."""
         table, unit = self.sampled(phases), self.unit
+        # Eq. 1 needs θ and μs
+        known = {name: at for at, name in enumerate(HISTORY)}
+        if "mu_s" not in self.inputs:
+            del known["friction_coefficient"]
         with np.errstate(over="ignore"):
             table[:, 3] *= unit
             table[:, 4] *= unit * unit
         if not self._valueless:
-            moved = {name: table[:, at] for at, name in enumerate(HISTORY)}
+            moved = {name: table[:, at] for name, at in known.items()}
             check_served(self.problem.model.g, self.inputs, moved, np.zeros(len(table), np.int16))
         return {
-            name: Variable(("time",), np.ascontiguousarray(column), attributes)
-            for (name, attributes), column in zip(HISTORY.items(), table.T, strict=True)
+            name: Variable(("time",), np.ascontiguousarray(table[:, at]), HISTORY[name]) for name, at in known.items()
         }
 
     def points(self, points_per_cycle: int) -> Floats:
@@ -140,6 +149,7 @@ class _History:
             step = float(motion.times[-1] - motion.times[0]) / (motion.times.size - 1)
             _check_memory(motion.times.size + _POINTS_BEYOND)
             return _to_the_end(motion.times, step, max(_POINTS_BEYOND, motion.times.size), self._runs_on())
+        assert isinstance(motion, Waveform)
         step, shaken = 2.0 * math.pi / points_per_cycle, points_per_cycle * motion.cycles
         _check_memory(shaken + _CYCLES_BEYOND * points_per_cycle)
         return _to_the_end(
@@ -149,10 +159,11 @@ class _History:
     def _runs_on(self) -> float:
         """How long the block slides on after the shaking."""
         motion = self.problem.excitation
+        assert not isinstance(motion, Suite)
         slides = isinstance(motion, Record) or self.summary["sliding_mode"].item() == SlidingMode.STICK_SLIP
         if not slides or self._valueless:
             return 0.0
-        end = motion.times[-1] if isinstance(motion, Record) else 2.0 * math.pi * motion.cycles
+        end = 2.0 * math.pi * motion.cycles if isinstance(motion, Waveform) else motion.times[-1]
         ground, block, _, velocity, _ = self.sampled(np.array([end]))[0]
         # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
         with np.errstate(divide="ignore", over="ignore"):

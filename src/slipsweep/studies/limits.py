@@ -37,6 +37,7 @@ from slipsweep.model.variables import (
 )
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 
 Floats = NDArray[np.float64]
 
@@ -111,6 +112,7 @@ def plan_limits(
         # a scan serves a block for all that is asked of it
         cost=plan.cost * (max(1.0, steps / math.prod(plan.sizes[dims[axis]] for axis in scaling)) + _COST),
         together=tuple(dims[axis] for axis in scaling),
+        memory=plan.memory,
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
         is_ordinary=ordinary(task.problem, {**coords, "amplitude": Variable((), np.array(highest))}),
@@ -127,7 +129,7 @@ def _groups(inputs: Mapping[str, Floats], dimensions: int) -> tuple[list[int], l
 
 def _codes(problem: Problem) -> tuple[str, ...]:
     """Results that tell in which mode a block slides, or how many pulses of a record it slides in."""
-    return tuple(RECORD_COUNTS) if isinstance(problem.excitation, Record) else ("sliding_mode",)
+    return tuple(RECORD_COUNTS) if isinstance(problem.excitation, (Record, Suite)) else ("sliding_mode",)
 
 
 def solve(maximum_amplitude: float, steps: int, asked: Request) -> Arrays:
@@ -240,7 +242,9 @@ def _at(
 
 def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_amplitude: float, steps: int) -> Floats:
     """Amplitudes to try for `count` blocks, increasing along each row; both sides of every change of mode are there."""
-    wanted = ("yield_acceleration", "limiting_acceleration")
+    # Newmark's block has no limit, and may have no θ and μs that one would follow from
+    limited = ("limiting_acceleration",) if not isinstance(problem.model, Newmark) else ()
+    wanted = ("yield_acceleration", *limited)
     known = engine.friction_parameters(Request(problem, (count, 1), {**blocks, "amplitude": np.zeros((1, 1))}, wanted))
     yields = known["yield_acceleration"]
     # without a yield acceleration there is no value at any amplitude
@@ -251,7 +255,7 @@ def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_am
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
     if isinstance(problem.excitation, Record):
-        thresholds = [yields] if isinstance(problem.model, Newmark) else [yields, known["limiting_acceleration"]]
+        thresholds = [known[name] for name in wanted]
         changes = _pulse_changes(problem.excitation, float(blocks["polarity"].item()), np.hstack(thresholds))
     else:
         changes = _mode_changes(problem, blocks, amplitudes)

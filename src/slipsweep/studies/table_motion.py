@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 
 DEGREE = 3
 
+#: Splines with a kink at various places, and how likely each is.
+_Kink = list[tuple[float, BSpline]]
+
 #: Samples a coefficient that are tried.
 _SPACINGS = (48, 32, 24, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2)
 
@@ -31,6 +34,9 @@ MOST_SHAPES = 150
 
 #: Standard deviations of the noise with which the shaking has begun, and half samples before it where a kink may lie.
 _MOVES, _KINK_SAMPLES = 5.0, 24
+
+#: Ways in which a motion may be wrong as the place of a kink is not known.
+_KINK_WAYS = 4
 
 #: Noise, in parts of the largest acceleration, below which a record is taken as it is.
 LITTLE_NOISE = 1e-3
@@ -93,7 +99,7 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
         score = size * np.log(float(np.sum(rest**2)) / size) + 2.0 * number * size / (size - number - 1.0)
         if score < best:
             best, chosen = score, knots
-    chosen = _with_kinks(times, acceleration, chosen)
+    chosen, kinks = _with_kinks(times, acceleration, chosen)
     coefficients, rest = _fitted(times, acceleration, chosen)
     noise = float(np.sqrt(np.sum(rest**2) / (size - coefficients.size)))
     fine = np.unique(_points(np.unique(chosen), _POINTS))
@@ -102,7 +108,9 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     design = BSpline.design_matrix(times, coarse, DEGREE)
     root = cholesky((design.T @ design).toarray(), lower=True)
     shapes = noise * solve_triangular(root, BSpline.design_matrix(fine, coarse, DEGREE).toarray().T, lower=True).T
-    return TableMotion(fine, np.asarray(BSpline(chosen, coefficients, DEGREE)(fine)), shapes, noise, coefficients.size)
+    average, ways = _of_kinks(kinks, fine)
+    smooth = np.asarray(BSpline(chosen, coefficients, DEGREE)(fine)) + average
+    return TableMotion(fine, smooth, np.column_stack([shapes, ways]), noise, coefficients.size)
 
 
 def _fitted(times: Floats, acceleration: Floats, knots: Floats) -> tuple[Floats, Floats]:
@@ -112,28 +120,52 @@ def _fitted(times: Floats, acceleration: Floats, knots: Floats) -> tuple[Floats,
     return found, acceleration - design @ found
 
 
-def _with_kinks(times: Floats, acceleration: Floats, knots: Floats) -> Floats:
-    """A kink where the shaking begins, and one where it ends, if the record asks for them, as a sine does."""
+def _with_kinks(times: Floats, acceleration: Floats, knots: Floats) -> tuple[Floats, list[_Kink]]:
+    """A kink where the shaking begins, and one where it ends, if the record asks for them, as a sine does.
+
+    Beyond it the table is at rest, which one polynomial says if the record does not ask for more.
+    """
     size = times.size
     moving = np.flatnonzero(np.abs(acceleration) > _MOVES * noise_of(acceleration))
     if not moving.size:
-        return knots
+        return knots, []
 
-    def score(tried: Floats) -> float:
+    def fitted(tried: Floats) -> tuple[float, BSpline]:
         found, rest = _fitted(times, acceleration, tried)
-        return size * float(np.log(np.sum(rest**2) / size)) + 2.0 * found.size * size / (size - found.size - 1.0)
+        score = size * float(np.log(np.sum(rest**2) / size)) + 2.0 * found.size * size / (size - found.size - 1.0)
+        return score, BSpline(tried, found, DEGREE)
 
-    for edge, steps in ((moving[0], -np.arange(_KINK_SAMPLES)), (moving[-1], np.arange(_KINK_SAMPLES))):
-        places = edge + 0.5 * steps
+    def kinked(place: float, end: int, rests: bool) -> Floats:
+        at = float(np.interp(place, np.arange(size), times))
+        beyond = (knots < at) & (knots > times[0]) if end == 0 else (knots > at) & (knots < times[-1])
+        return np.sort(np.concatenate([knots[~(beyond & rests)], np.repeat(at, DEGREE)]))
+
+    kinks: list[_Kink] = []
+    for end, steps in ((0, -np.arange(_KINK_SAMPLES)), (-1, np.arange(_KINK_SAMPLES))):
+        places = moving[end] + 0.5 * steps
         places = places[(places > 2) & (places < size - 3)]
-        tried = [
-            np.sort(np.concatenate([knots, np.repeat(np.interp(place, np.arange(size), times), DEGREE)]))
-            for place in places
-        ]
-        best = min(tried, key=score, default=knots)
-        if score(best) < score(knots):
-            knots = best
-    return knots
+        tried = [fitted(kinked(place, end, rests)) for rests in (False, True) for place in places]
+        best = min(tried, key=lambda one: one[0], default=None)
+        if best is None or best[0] >= fitted(knots)[0]:
+            continue
+        knots = best[1].t
+        kinks.append([(float(np.exp(0.5 * (best[0] - score))), spline) for score, spline in tried])
+    return knots, kinks
+
+
+def _of_kinks(kinks: list[_Kink], fine: Floats) -> tuple[Floats, Floats]:
+    """What is wrong as the places of kinks are not known: on average, and ways of one standard deviation each."""
+    average, ways = np.zeros(fine.size), [np.zeros((fine.size, 0))]
+    for kink in kinks:
+        likely = np.array([weight for weight, _ in kink])
+        best = max(kink, key=lambda one: one[0])[1](fine)
+        likely /= likely.sum()
+        apart = np.column_stack([spline(fine) - best for _, spline in kink])
+        middle = apart @ likely
+        average += middle
+        left, sizes, _ = np.linalg.svd((apart - middle[:, None]) * np.sqrt(likely), full_matrices=False)
+        ways.append((left * sizes)[:, :_KINK_WAYS])
+    return average, np.column_stack(ways)
 
 
 def _points(bounds: Floats, parts: int) -> Floats:

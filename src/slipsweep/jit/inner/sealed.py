@@ -14,6 +14,7 @@ from numba import njit
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, JitEngine
 from numba.core.compiler import Compiler
 
+from slipsweep.jit.inner.asked_once import asked_once
 from slipsweep.jit.inner.need import need
 from slipsweep.jit.interrupts import heard_later
 
@@ -25,7 +26,7 @@ need(
 )
 need(JITCPUCodegen, _engine=None)
 need(JitEngine, finalize_object="self")
-need(Compiler, __init__="self typingctx targetctx library args return_type flags locals")
+need(Compiler, __init__="self typingctx targetctx library args return_type flags locals", compile_extra="self func")
 
 
 class _Library(JITCodeLibrary):
@@ -45,6 +46,10 @@ class _Compiler(Compiler):
         library = _Library(targetctx.codegen(), "kernel")
         library.enable_object_caching()
         super().__init__(typingctx, targetctx, library, *arguments)
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        with asked_once():
+            return super().compile_extra(func)
 
 
 def _hear_signals_later(engine: Any) -> None:

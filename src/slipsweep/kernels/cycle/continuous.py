@@ -18,7 +18,7 @@ from slipsweep.kernels.block import (
     relative_acceleration_root,
 )
 from slipsweep.kernels.cycle.eq4 import eq4_integrals, lag_integrals
-from slipsweep.kernels.cycle.legs import SLIVER, next_break
+from slipsweep.kernels.cycle.legs import inside, next_break
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.kernels.pulse import (
     beginning,
@@ -34,7 +34,7 @@ def zeros_of_relative_acceleration(block: Block, end: float, zeros: np.ndarray) 
     x = math.copysign(0.0, end)
     for _ in range(zeros.size):
         target = next_break(block, x, end)
-        inner = x + SLIVER * (target - x)
+        inner = inside(x, target)
         if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):
             zeros[count] = relative_acceleration_root(block, inner, target)
             if math.isnan(zeros[count]):

@@ -3,6 +3,7 @@
 docs/numerics.md#slope-and-inflection
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +22,15 @@ from slipsweep.kernels.pulse import (
     VELOCITY,
 )
 
-#: Signs at the start of a leg are read this fraction of the leg inside it.
-SLIVER = 1e-10
+#: Signs at the start of a leg are read this fraction of the leg inside it, but no closer to the start than this
+#: fraction of that: where a leg ends at a turn of E, the sign just behind is known only beyond rounding.
+_SLIVER, _ROUNDING = 1e-10, 4.5e-16
+
+#: Rows of the state of a block beyond those that all solvers share: the crest of the pulse; from which Üg on the next
+#: onset is known (t1 of a block at rest), and that; the Üg that a rise has come to, at which the leg on hand ends,
+#: whether b follows Eq. 4 on it, and from there on.
+CREST, ONSET_FROM, ONSET, LEG_AT, LEG_END, LEG_FOLLOWS, NEXT_FOLLOWS = range(STATE_ROWS, STATE_ROWS + 7)
+STATE_SIZE = STATE_ROWS + 7
 
 #: More legs than any rise has: five breaks, and a stop and an onset between each.
 MOST_LEGS = 32
@@ -49,7 +57,7 @@ LEG_COLUMNS = 8
 @scalar
 def room_of(legs: int) -> Room:
     """Room, with a log of so many legs; made in kernels, where the compiler knows that nothing else lies there."""
-    return Room(np.zeros(STATE_ROWS), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
+    return Room(np.zeros(STATE_SIZE), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
 
 
 @in_lanes
@@ -62,10 +70,17 @@ def log_leg(legs: np.ndarray, kind: int, piece: int, tau: float, start: float, e
         legs[row, 5], legs[row, 6], legs[row, 7] = state[HELD], state[VELOCITY], state[DISPLACEMENT]
 
 
+@in_lanes
+def inside(x: float, end: float) -> float:
+    """Where on the way from x to end the signs of a leg from x on are read, which is not at x itself."""
+    way = end - x
+    return x + math.copysign(min(max(_SLIVER * abs(way), _ROUNDING * abs(x)), abs(way)), way)
+
+
 @scalar
 def next_break(block: Block, x: float, end: float) -> float:
     """Where, on the way from x to end, one of E, dE/dx and D first ceases to be monotone."""
-    inner = x + SLIVER * (end - x)
+    inner = inside(x, end)
     if 0.0 < inner < inflection(block):
         end = min(inflection(block), end)
     before = slope_and_curvature(block, inner)[0]

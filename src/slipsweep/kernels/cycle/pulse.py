@@ -1,6 +1,7 @@
 """A pulse from event to event: `rise`, `hold` and `follow` along one piece, and the train of all pulses.
 
-State arrays have the rows of `slipsweep.kernels.pulse`, (STATE_ROWS,); tables of pieces are (pieces, columns).
+State arrays have the rows of `slipsweep.kernels.pulse` and those of `cycle.legs`, (STATE_SIZE,); tables of pieces
+are (pieces, columns).
 docs/numerics.md#onset-and-switch, docs/numerics.md#stop and docs/numerics.md#trains-of-pulses
 """
 
@@ -24,7 +25,23 @@ from slipsweep.kernels.block import (
     starting_acceleration,
 )
 from slipsweep.kernels.cycle.eq4 import eq4_integrals
-from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, HOLD, MOST_LEGS, SLIVER, Room, log_leg, next_break
+from slipsweep.kernels.cycle.legs import (
+    ATTENUATE,
+    CREST,
+    FOLLOW,
+    HOLD,
+    LEG_AT,
+    LEG_END,
+    LEG_FOLLOWS,
+    MOST_LEGS,
+    NEXT_FOLLOWS,
+    ONSET,
+    ONSET_FROM,
+    Room,
+    inside,
+    log_leg,
+    next_break,
+)
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import held_gain, held_integrals, offset_at, phase_at, plane
 from slipsweep.kernels.pulse import (
@@ -53,7 +70,7 @@ def onset(block: Block, x: float, top: float) -> float:
         if x >= top:
             break
         end = next_break(block, x, top)
-        inner = x + SLIVER * (end - x)
+        inner = inside(x, end)
         if relative_acceleration(block, inner) > 0.0:
             return x
         if relative_acceleration(block, end) > 0.0:
@@ -71,7 +88,7 @@ def rising_leg(block: Block, x: float, top: float, b: float, follows: bool) -> t
     end, crosses = top, False
     if block.rise != NEWMARK:
         end = next_break(block, x, top)
-        inner = x + SLIVER * (end - x)
+        inner = inside(x, end)
         eq4, slope = response_and_slope(block, inner)
         if block.rise != LITERAL:
             follows = slope > 0.0 and (follows or eq4 >= b)
@@ -194,6 +211,8 @@ def rise(block: Block, pieces: np.ndarray, legs: np.ndarray, p: int, tau: float,
 
     Goes from event to event: the block stays with the plane (stick), holds b, or follows
     Eq. 4; each leg ends where that changes, where E or D turns, or where V turns or vanishes.
+    Onset and legs depend on x alone, and are looked for up to the pulse's crest: a rise in many
+    pieces, that of a record, looks for them once.
     """
     amplitude, literal = block.amplitude, block.rise == LITERAL
     top, finish = amplitude * pieces[p, LAST], pieces[p, FINISH]
@@ -201,7 +220,10 @@ def rise(block: Block, pieces: np.ndarray, legs: np.ndarray, p: int, tau: float,
         if state[SLIDES] == 0.0:
             began = top
             if top > block.yield_acceleration:
-                began = onset(block, max(x, block.yield_acceleration), top)
+                least = max(x, block.yield_acceleration)
+                if not state[ONSET_FROM] <= least <= state[ONSET]:
+                    state[ONSET_FROM], state[ONSET] = least, onset(block, least, state[CREST])
+                began = state[ONSET]
             if began >= top:
                 break
             if began > x:
@@ -210,18 +232,24 @@ def rise(block: Block, pieces: np.ndarray, legs: np.ndarray, p: int, tau: float,
             beyond = began > max(x, block.yield_acceleration)
             b = began if beyond else min(starting_acceleration(block, began), began)
             begin_slide(b, phase_at(pieces, p, tau), state)
-            x, state[FOLLOWS] = began, 1.0 if literal else 0.0
-        end, follows, follows_on = rising_leg(block, x, top, state[HELD], state[FOLLOWS] > 0.0)
+            x, state[FOLLOWS], state[LEG_END] = began, 1.0 if literal else 0.0, -math.inf
+        if not (x == state[LEG_AT] and x < state[LEG_END]):
+            end, follows, follows_on = rising_leg(block, x, state[CREST], state[HELD], state[FOLLOWS] > 0.0)
+            state[LEG_END], state[LEG_FOLLOWS] = end, 1.0 if follows else 0.0
+            state[NEXT_FOLLOWS] = 1.0 if follows_on else 0.0
+        end, follows = min(state[LEG_END], top), state[LEG_FOLLOWS] > 0.0
         tau_end = finish if end >= top else max(tau, offset_at(pieces, p, amplitude, end))
         if follows:
             tau = follow(block, pieces, legs, p, tau, tau_end, state)
         else:
             tau = hold(block, pieces, legs, p, tau, tau_end, state)
         if state[SLIDES] == 0.0 and tau < tau_end:
-            x = plane(pieces, p, amplitude, tau)
+            # where b follows Eq. 4 to the stop, D < 0 up to the end of the leg: no slide begins before
+            x, tau = (end, tau_end) if follows else (plane(pieces, p, amplitude, tau), tau)
             continue
         x, tau = end, tau_end
-        state[FOLLOWS] = 1.0 if follows_on else 0.0
+        state[FOLLOWS] = state[NEXT_FOLLOWS] if end == state[LEG_END] else state[LEG_FOLLOWS]
+        state[LEG_AT] = x
         if follows:
             state[HELD] = response(block, x)
         if x >= top:
@@ -236,15 +264,15 @@ def note_attenuation(legs: np.ndarray, start: float, end: float, state: np.ndarr
     log_leg(legs, ATTENUATE, 0, 0.0, start, end, state)
 
 
-pulse = pulse_of(rise, hold, note_attenuation)
+_pulse = pulse_of(rise, hold, note_attenuation)
 
 
 @scalar
-def follow_pulse(
-    block: Block, options: Options, wave: Wave, room: Room, k: int, following: int, velocity: float
-) -> Pulse:
-    """A pulse of a train (see `train`)."""
-    return pulse(block, options, wave, room.legs, k, following, velocity, room.state)
+def pulse(block: Block, options: Options, wave: Wave, room: Room, k: int, following: int, velocity: float) -> Pulse:
+    """A pulse from Üg = Üy in stretch k to that in the `following` one, entered with a velocity."""
+    state = room.state
+    state[CREST], state[LEG_END], state[ONSET] = block.amplitude * wave.height[k], -math.inf, -math.inf
+    return _pulse(block, options, wave, room.legs, k, following, velocity, state)
 
 
-train = train_of(follow_pulse)
+train = train_of(pulse)

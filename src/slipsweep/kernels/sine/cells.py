@@ -36,6 +36,7 @@ from slipsweep.kernels.sine.lanes import (
     YIELD_GOVERNS,
     W,
 )
+from slipsweep.kernels.sine.newmark import solve_newmark
 from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
 from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_cells
 from slipsweep.model.equations import STUCK
@@ -118,16 +119,16 @@ def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
 
 @in_lanes
 def store_lane(
-    lanes: np.ndarray, lane: int, kind: int, options: Options, blocks: np.ndarray, motion: np.ndarray,
-    codes: np.ndarray, j: int,
+    lanes: np.ndarray, lane: int, kind: int, options: Options, blocks: np.ndarray, moved: np.ndarray,
+    peak: np.ndarray, validity: np.ndarray, j: int,
 ) -> None:  # fmt: skip
     """Store the result of a lane that has converged as that of cell j; else the cell remains to be solved."""
     solved = lanes[CONVERGED + lane] > 0.0
-    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if (kind == YIELD_GOVERNS) & (options.rise != NEWMARK) else 0)
-    motion[0, j] = lanes[W + lane]
+    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if kind == YIELD_GOVERNS else 0)
+    moved[j] = lanes[W + lane]
     if options.wants_peak:
-        motion[1, j] = lanes[PEAK + lane]
-    codes[1, j] = settled_in_cycles(codes[1, j] | flags, lanes[W + lane]) if solved else codes[1, j]
+        peak[j] = lanes[PEAK + lane]
+    validity[j] = settled_in_cycles(validity[j] | flags, lanes[W + lane]) if solved else validity[j]
     blocks[KIND + j] = kind if solved else OTHER
 
 
@@ -135,6 +136,7 @@ def store_lane(
 def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
     """Solve the cells of a tile, which has `count` runs, that are of one kind."""
     blocks, lanes, runs, where = room.blocks, room.lanes, room.runs, room.where
+    moved, peak, validity = motion[0], motion[1], codes[1]
     used = 0
     for run in range(count):
         if blocks[KIND + runs[run]] == kind:
@@ -149,9 +151,9 @@ def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.n
         first, last = runs[run], runs[run + 1]
         if blocks[KIND + first] == kind:
             # by slices, which numba knows to begin at 0: then this is a loop in SIMD
-            found, cells, moved, coded = lanes[lane:], blocks[first:], motion[:, first:last], codes[:, first:last]
+            found, cells, w, v, flags = lanes[lane:], blocks[first:], moved[first:], peak[first:], validity[first:]
             for j in range(last - first):
-                store_lane(found, j, kind, options, cells, moved, coded, j)
+                store_lane(found, j, kind, options, cells, w, v, flags, j)
             if kind == STICKS:
                 for j in range(last - first):
                     where[lane + j] = first + j
@@ -161,7 +163,7 @@ def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.n
         for first in range(0, used, STRIP):
             lane_carried(min(used - first, STRIP), options, lanes[first:])
         for lane in range(used):
-            store_lane(lanes, lane, kind, options, blocks, motion, codes, where[lane])
+            store_lane(lanes, lane, kind, options, blocks, moved, peak, validity, where[lane])
 
 
 @scalar
@@ -174,6 +176,9 @@ def solve_cells(
     """
     blocks = room.blocks
     fill_up(count, 7, cells)
+    if options.rise == NEWMARK:
+        solve_newmark(cells, count, options, motion, codes)
+        return 0
     sort_cells(cells, whole_lanes(count), options, blocks)
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])

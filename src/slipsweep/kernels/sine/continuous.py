@@ -32,7 +32,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.cycle.continuous import continuous as continuous_of_any_wave
 from slipsweep.kernels.cycle.eq4 import NODES, PANEL_BOUNDS, WEIGHTS
-from slipsweep.kernels.cycle.legs import MOST_LEGS, SLIVER, next_break
+from slipsweep.kernels.cycle.legs import MOST_LEGS, inside, next_break
 from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
     CARRIED,
@@ -112,7 +112,7 @@ def continuous_peaks(block: Block, side: float, half_gain: float, after: float) 
     x, end = 0.0, side * block.amplitude
     for _ in range(MOST_LEGS):
         target = next_break(block, x, end)
-        inner = x + SLIVER * (target - x)
+        inner = inside(x, target)
         if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):
             zero = abs(relative_acceleration_root(block, inner, target))
             gained = eq4_integrals(block, -HALF_PI, phase(block, zero), side)[0]

@@ -15,7 +15,6 @@ from slipsweep.kernels.block import (
     LANE_ROWS,
     MONOTONE,
     MU_S,
-    NEWMARK,
     STRIP,
     TAN_THETA,
     TILE,
@@ -58,7 +57,6 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
     kind = sticks_or_follows if gentle else OTHER
     kind = YIELD_GOVERNS if (at_start < start) & (at_end <= start) else kind
     kind = kind if smooth else OTHER
-    kind = YIELD_GOVERNS if options.rise == NEWMARK else kind
     kind = kind if mode == STICK_SLIP else OTHER
     # where the peak velocity is wanted, D has to be concave (`lane_turn`)
     early = gentle & (start <= SHORT_SINE * end) & (convex | (not options.wants_peak))
@@ -73,16 +71,8 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
     Neighbours are mostly alike, and what none of them needs is left out: λ and t1 of those that stay,
     E of those that do not stick and slip (7 against 9 ns a cell of a design chart).
     """
-    g, slides, sticks, newmark = options.g, 0, 0, options.rise == NEWMARK
-    for j in range(STRIP if newmark else 0):
-        # with the constant, LLVM leaves out what Newmark's block has no need of (a fifth of its time)
-        cell = cell_of(cells, j)
-        yield_acceleration, _, _, _, _, mode, validity = interface_of(cell, NEWMARK, g)
-        blocks[AMPLITUDE + j], blocks[YIELD + j] = cell.amplitude, yield_acceleration
-        blocks[MODE + j], blocks[VALIDITY + j] = mode, validity
-        blocks[KIND + j] = STAYS
-        slides += 1 if mode > STUCK else 0
-    for j in range(0 if newmark else STRIP):
+    g, slides, sticks = options.g, 0, 0
+    for j in range(STRIP):
         cell = cell_of(cells, j)
         yield_acceleration, _, _, minimum_friction, delta_mu, mode, validity = interface_of(cell, options.rise, g)
         blocks[AMPLITUDE + j], blocks[YIELD + j] = cell.amplitude, yield_acceleration
@@ -94,7 +84,7 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
         sticks += 1 if mode == STICK_SLIP else 0
     if slides == 0:
         return
-    for j in range(0 if newmark else STRIP):
+    for j in range(STRIP):
         least = blocks[_LEAST_FRICTION + j]
         blocks[DECAY + j] = decay_rate_of(cell_of(cells, j), blocks[DELTA_MU + j], least, g) / g
     for j in range(STRIP):

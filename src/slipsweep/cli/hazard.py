@@ -1,0 +1,148 @@
+"""`slipsweep hazard`: the mean annual rate at which a displacement is exceeded."""
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from slipsweep.cli.common import FIGURES, Overwrite, Quiet, check_ending, write_figure
+from slipsweep.errors import InputError
+
+if TYPE_CHECKING:
+    from slipsweep.grid.tables import Table
+
+EXAMPLE = "Example: slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 0.3 -o hazard.png"
+
+#: Values as near as this, of the largest on the axis, are the same: single precision keeps seven digits.
+_SAME = 1e-7
+
+
+def hazard(
+    file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A result under a suite, with an axis amplitude.")],
+    curve: Annotated[
+        Path,
+        typer.Option(metavar="HAZARD.csv", help='Hazard curve: columns "PGA (g)" and "annual rate", from low to high.'),
+    ],
+    displacement: Annotated[
+        list[str],
+        typer.Option("--displacement", "-d", metavar="LENGTH", help="To exceed: 50mm, 2in, 0.05 (m). Repeat."),
+    ],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Take one value of another axis: mu_s=0.4 (default: all of them)."),
+    ] = None,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write .png, .svg or .pdf; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compute the mean annual rate of exceeding a displacement, from a hazard curve and the fragility of a suite."""
+    paths = output or []
+    for path in paths:
+        check_ending(path, FIGURES)
+    from slipsweep.files import outputs, results
+
+    outputs.check_outputs(paths, overwrite, reads=[file, curve])
+    from slipsweep.model.parameters import check_values
+    from slipsweep.model.units import quantity
+    from slipsweep.studies.hazard import hazard_table, read_hazard_curve
+
+    with results.result_file(file) as opened:
+        table = results.read_table(opened, ("permanent_displacement", "validity"))
+    if "g" not in table.attrs:
+        raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
+    g = float(table.attrs["g"])
+    lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
+    check_values("displacement", lengths, "--displacement")
+    given = read_hazard_curve(curve, g)
+    table = _cut(table, at or [])
+    rates = hazard_table(table, given, thresholds=lengths)
+    if paths:
+        from slipsweep.charts import hazard_figures
+
+        figure = hazard_figures.hazard_chart(table, rates, given, _points(rates))
+        for path in paths:
+            write_figure(figure, path, overwrite)
+    if not quiet:
+        _summarize(rates, g)
+        for path in paths:
+            typer.echo(path)
+
+
+def _cut(table: "Table", given: list[str]) -> "Table":
+    """The result at one value of each axis that is named."""
+    import numpy as np
+
+    from slipsweep.model.units import quantity
+
+    where: dict[str, int] = {}
+    axes = [dim for dim in table["permanent_displacement"].dims if dim not in ("amplitude", "motion")]
+    for text in given:
+        name, _, value = text.partition("=")
+        name = name.strip()
+        if name not in axes or not value:
+            raise InputError(f"--at {text}: must be NAME=VALUE, of {', '.join(axes) or 'no axis: there is none'}")
+        if name in where:
+            raise InputError(f"--at {text}: {name} is given twice")
+        if name in table and table[name].values.dtype.kind in "iuf":
+            values = table[name].values
+            wanted = quantity(f"--at {name}", value, name, float(table.attrs["g"]))
+            near = np.flatnonzero(np.abs(values - wanted) <= _SAME * np.abs(values).max())
+        else:
+            labels = table["label"].values if "label" in table else np.arange(1, table.sizes[name] + 1)
+            values = np.array([str(one) for one in labels])
+            near = np.flatnonzero(values == value.strip())
+        if near.size != 1:
+            there = ", ".join(f"{one:.6g}" if isinstance(one, float) else str(one) for one in values[:20].tolist())
+            raise InputError(f"--at {text}: must be one of the values of {name}: {there}")
+        where[name] = int(near[0])
+    return table.pick(where)
+
+
+def _points(rates: "Table") -> list[str]:
+    """What each grid point is called, in the order of the rates."""
+    grid = rates["valueless_share"].sizes
+
+    def names(dim: str) -> Iterator[str]:
+        for i in range(grid[dim]):
+            label: Any = i + 1
+            if dim in rates:
+                label = rates[dim].values[i]
+            elif "label" in rates and rates["label"].dims == (dim,):
+                label = rates["label"].values[i]
+            yield f"{dim} = {label:.6g}" if getattr(label, "dtype", None) is not None else f"{dim} = {label}"
+
+    return [", ".join(parts) for parts in itertools.product(*(names(dim) for dim in grid))]
+
+
+def _summarize(rates: "Table", g: float) -> None:
+    import numpy as np
+
+    attrs = rates.attrs
+    typer.echo(f"P(u > d | PGA): share over {attrs['suite_dimensions'].replace(' ', ' and ')}")
+    for text, name in (("amplitudes of the result", "amplitude_range"), ("hazard curve", "hazard_curve_range")):
+        low, high = attrs[name]
+        typer.echo(f"{text:<25}{low:.6g} to {high:.6g} m/s2 ({low / g:.4g} to {high / g:.4g} g)")
+    typer.echo("above the amplitudes P is held; below them it is taken as 0; below the hazard curve nothing is counted")
+    thresholds = rates["threshold"].values
+    columns = [rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate", "omitted_rate")]
+    shares = rates["valueless_share"].values.reshape(-1)
+    for number, point in enumerate(_points(rates)):
+        if point:
+            typer.echo(point)
+        if shares[number] > 0.0:
+            typer.echo(f"  no value: up to {shares[number]:.1%} of the motions at an amplitude; they are not counted")
+        if np.isnan(columns[0][number]).any():
+            typer.echo("  no annual rate: fewer than two amplitudes have a value")
+            continue
+        typer.echo(f"  {'d (m)':<12}{'annual rate':>12}{'period (years)':>16}{'held above':>12}{'left out below':>16}")
+        for d, rate, held, omitted in zip(thresholds, *(one[number] for one in columns), strict=True):
+            if rate > 0.0:
+                left = "not known" if np.isnan(omitted) else f"<= {omitted / rate:.2%}"
+                typer.echo(f"  {d:<12.6g}{rate:>12.4g}{1.0 / rate:>16.4g}{held / rate:>12.2%}{left:>16}")
+            else:
+                typer.echo(f"  {d:<12.6g}{0:>12}  exceeded by no motion at any amplitude of the result")

@@ -1,0 +1,134 @@
+"""Recorded motions in files of results: written with them, and read back to repeat a run when their files are gone.
+
+One record lies along a dimension of its own, its samples; of a suite the samples of one record follow on those of the
+other, and what is said of each lies along a second dimension, how many samples it has among that.  It is all of the
+suite in every file, also where a file has a part of the results.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.grid.tables import Variable
+from slipsweep.model.variables import RECORD_SAMPLES
+from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Pair, Suite
+
+#: Dimension of the samples of records, and of the records of a suite.
+RECORD_DIM, SUITE_DIM = "record_sample", "record"
+
+#: What is written of each record of a suite, beside how it was read.
+_LABEL, _COUNT, _COMPONENT = "record_label", "record_count", "record_component"
+
+#: How a record was read: a name in its attributes, and that of the variable.
+_READING = {
+    "record": "record_file",
+    "record_format": "record_format",
+    "record_units": "record_units",
+    "record_channel": "record_channel",
+    "record_sha256": "record_sha256",
+    "baseline": "record_baseline",
+}
+
+_ABOUT: dict[str, dict[str, Any]] = {
+    _LABEL: {"long_name": "label of the motion of a record"},
+    _COUNT: {"units": "1", "long_name": f"number of samples of a record, which follow one another along {RECORD_DIM}"},
+    _COMPONENT: {"units": "1", "long_name": "horizontal component of the motion, 1 at azimuth 0 and 2 at 90 degrees"},
+    "record_file": {"long_name": "file of a record"},
+    "record_format": {"long_name": "format of the file of a record"},
+    "record_units": {"long_name": "unit of the file of a record"},
+    "record_channel": {"long_name": "channel of the file of a record"},
+    "record_sha256": {"long_name": "SHA-256 of the file of a record"},
+    "record_baseline": {"long_name": "what was taken off a record"},
+}
+
+
+def embedded(motion: Record | Suite) -> dict[str, Variable]:
+    """The variables that hold a record or a suite."""
+    records = motion.components if isinstance(motion, Suite) else (motion,)
+    samples = {
+        "record_time": np.concatenate([one.times for one in records]),
+        "record_acceleration": np.concatenate([one.acceleration for one in records]),
+    }
+    found = {name: Variable((RECORD_DIM,), samples[name], about) for name, about in RECORD_SAMPLES.items()}
+    if isinstance(motion, Record):
+        return found
+    each = 2 if motion.has_pairs else 1
+    columns: dict[str, NDArray[Any]] = {
+        _LABEL: np.repeat(np.array(motion.labels, dtype=object), each),
+        _COUNT: np.array([one.times.size for one in records], np.int32),
+    }
+    if motion.has_pairs:
+        columns[_COMPONENT] = np.tile(np.array([1, 2], np.int8), len(motion))
+    for key, name in _READING.items():
+        texts = [one.attrs.get(key, "") for one in records]
+        if any(texts):
+            columns[name] = np.array(texts, dtype=object)
+    return found | {name: Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
+
+
+def read_embedded(file: Any, path: Path) -> Record | Suite | None:
+    """The motion that a file of results holds, if it holds one.
+
+    Parameters
+    ----------
+    file : ResultFile
+    path : Path
+        What the file is called in errors.
+
+    Raises
+    ------
+    InputError
+        What is there is no motion: another program has changed it.
+    """
+    if any(name not in file for name in RECORD_SAMPLES):
+        return None
+    times, acceleration = (file[name].read_floats({}) for name in RECORD_SAMPLES)
+    about = {key: str(text) for key, text in file.attrs.items() if key == "baseline" or key.startswith("record")}
+    name = about.get("record", str(path))
+    try:
+        if _COUNT not in file:
+            return Record(times, acceleration, name, about)
+        return _suite(file, times, acceleration)
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
+
+
+def _suite(file: Any, times: NDArray[Any], acceleration: NDArray[Any]) -> Suite:
+    counts = file[_COUNT].read_codes({}, -1)
+    columns: dict[str, list[str]] = {
+        key: [str(text) for text in file[one].read({}).data]
+        for key, one in ({"label": _LABEL} | _READING).items()
+        if one in file and file[one].is_text
+    }
+    ends = np.cumsum(counts)
+    whole = counts.ndim == 1 and counts.size and (counts > 0).all() and ends[-1] == times.size
+    if not whole or any(len(texts) != counts.size for texts in columns.values()) or "label" not in columns:
+        raise InputError(f"{_COUNT}, {_LABEL}: are not those of the {times.size} samples of its records")
+    labels = columns.pop("label")
+    records = []
+    for at, (end, count) in enumerate(zip(ends, counts, strict=True)):
+        own = slice(end - count, end)
+        attrs = {key: texts[at] for key, texts in columns.items() if texts[at]}
+        records.append(Record(times[own], acceleration[own], attrs.get("record", labels[at]), attrs))
+    name = str(file.attrs.get("suite", "suite"))
+    if _COMPONENT not in file:
+        return Suite(tuple(records), tuple(labels), name)
+    if counts.size % 2:
+        raise InputError(f"{_COMPONENT}: {counts.size} components: must be two of each motion")
+    pairs = tuple(Pair(*records[at : at + 2]) for at in range(0, len(records), 2))
+    return Suite(pairs, tuple(labels[::2]), name)
+
+
+def samples_of(motion: Record | Suite) -> Mapping[str, NDArray[Any]]:
+    """The numbers, and the labels, by which two runs know that their motions are the same."""
+    if isinstance(motion, Record):
+        return {"times": motion.times, "acceleration": motion.acceleration}
+    found = embedded(motion)
+    names = [name for name in (*RECORD_SAMPLES, _COUNT, _COMPONENT) if name in found]
+    labels = np.frombuffer("\0".join(motion.labels).encode(), np.uint8)
+    return {name: found[name].values for name in names} | {"labels": labels}

@@ -1,0 +1,457 @@
+"""Suites of recorded motions: read together, told apart by labels, of any length and sampling."""
+
+import glob
+import math
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.model.parameters import check_list, check_single, shown
+from slipsweep.model.suggest import did_you_mean
+from slipsweep.model.variables import INTENSITY_MEASURES, MOTION_COORDINATES
+from slipsweep.motion.intensity import intensity_measures
+from slipsweep.motion.reading import Reading
+from slipsweep.motion.records import Record, read_record
+
+Floats = NDArray[np.float64]
+
+#: Files whose damage is told with its reason; of all others there is the name.
+_MOST_REASONS = 20
+
+#: Letters of what a suite may be called after the entries that name its files.
+_LONGEST_NAME = 120
+
+#: Samples of the two components of a pair are at one time if they are nearer than this part of an interval.
+_SAME_TIME = 1e-6
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two horizontal components of one motion, at right angles.
+
+    A component that ends before the other is continued with zeros: its ground is at rest then.
+
+    Attributes
+    ----------
+    first, second : Record
+        The components at azimuths 0 and 90 degrees, on the same samples.
+
+    Raises
+    ------
+    InputError
+        They are not sampled at the same times.
+    """
+
+    first: Record
+    second: Record
+
+    def __post_init__(self) -> None:
+        for name in ("first", "second"):
+            if not isinstance(getattr(self, name), Record):
+                raise InputError(f"{name} = {shown(getattr(self, name))}: must be a Record, one component of a motion")
+        one, other = self.first, self.second
+        count = min(one.times.size, other.times.size)
+        apart = np.abs(one.times[:count] - other.times[:count]).max()
+        if apart > _SAME_TIME * np.diff(one.times[:count]).min():
+            raise InputError(f"{one.name}, {other.name}: the components of a pair must be sampled at the same times")
+        times = one.times if one.times.size > count else other.times
+        for name in ("first", "second"):
+            own: Record = getattr(self, name)
+            filled = np.concatenate([own.acceleration, np.zeros(times.size - own.times.size)])
+            object.__setattr__(self, name, Record(times, filled, own.name, own.attrs))
+
+    @property
+    def name(self) -> str:
+        """What the pair is called in messages."""
+        return f"{self.first.name}, {self.second.name}"
+
+    @property
+    def times(self) -> Floats:
+        """Times of the samples, s."""
+        return self.first.times
+
+    @property
+    def attrs(self) -> dict[str, str]:
+        """How the components were read: what they have in common once, else one after the other."""
+        own = [self.first.attrs, self.second.attrs]
+        names = dict.fromkeys([*own[0], *own[1]])
+        values = {name: dict.fromkeys(one.get(name, "") for one in own) for name in names}
+        return {name: " ".join(found) for name, found in values.items()}
+
+    def rotated(self, azimuth: float) -> Record:
+        """The component at an azimuth, degrees from the first towards the second, exact between samples as at them."""
+        degrees = check_single("azimuth", azimuth)
+        cosine, sine = _cosine(degrees), _cosine(degrees - 90.0)
+        with np.errstate(over="ignore"):  # what is not finite then is refused
+            acceleration = cosine * self.first.acceleration + sine * self.second.acceleration
+        return Record(self.times, acceleration, f"{self.name} at {degrees:g} degrees", self.attrs)
+
+
+def _cosine(degrees: float) -> float:
+    """cos, exact at the quarters of a turn."""
+    quarter, rest = divmod(degrees, 90.0)
+    if rest == 0.0:
+        return (1.0, 0.0, -1.0, 0.0)[int(quarter) % 4]
+    return math.cos(math.radians(degrees))
+
+
+Motion: TypeAlias = Record | Pair
+
+
+@dataclass(frozen=True, repr=False)
+class Suite:
+    """Recorded motions that shake the same blocks: the dimension `motion` of results.
+
+    ``suite["label"]``, ``suite[0]`` is one of them, ``suite[2:5]`` and ``suite[["a", "b"]]`` are suites of some.
+
+    Attributes
+    ----------
+    motions : tuple of Record or of Pair
+        Of any length and sampling.  A suite of pairs wants an `azimuth`.
+    labels : tuple of str
+        What tells them apart in results, each another; by default the stems of the records' names.
+    name : str
+        What the suite is called in results.
+
+    Raises
+    ------
+    InputError
+        No motion, records among pairs, or labels that are not as many and all different.
+    """
+
+    motions: tuple[Motion, ...]
+    labels: tuple[str, ...] = ()
+    name: str = "suite"
+
+    def __post_init__(self) -> None:
+        motions = tuple(self.motions) if isinstance(self.motions, Sequence) else (self.motions,)
+        for at, motion in enumerate(motions, 1):
+            if not isinstance(motion, (Record, Pair)):
+                raise InputError(f"motions[{at}] = {shown(motion)}: must be a Record or a Pair")
+        if not motions:
+            raise InputError("motions = []: must hold one motion at least")
+        if len({type(motion) for motion in motions}) > 1:
+            raise InputError("motions: must be all Records, or all Pairs")
+        labels = tuple(check_list("labels", self.labels, "texts")) or _labels([_path_of(one) for one in motions])
+        for label in labels:
+            if not isinstance(label, str) or not label.strip() or not label.isprintable():
+                raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
+        twice = [label for label, count in Counter(labels).items() if count > 1]
+        if twice or len(labels) != len(motions):
+            wrong = f"{shown(twice[0])} is there twice" if twice else f"{len(labels)} for {len(motions)} motions"
+            raise InputError(f"labels: {wrong}: must be one for each motion, and all different")
+        if not isinstance(self.name, str):
+            raise InputError(f"name = {shown(self.name)}: must be a text")
+        object.__setattr__(self, "motions", motions)
+        object.__setattr__(self, "labels", labels)
+
+    def __repr__(self) -> str:
+        shown_labels = self.labels if len(self.labels) <= 6 else (*self.labels[:3], "...", *self.labels[-2:])
+        what = f"{'pair' if self.has_pairs else 'motion'}{'s' if len(self) > 1 else ''}"
+        return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(shown_labels)})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _received, (self.motions, self.labels, self.name)
+
+    def __len__(self) -> int:
+        return len(self.motions)
+
+    def __iter__(self) -> Iterator[Motion]:
+        return iter(self.motions)
+
+    def __getitem__(self, which: Any) -> Any:
+        if isinstance(which, slice):
+            return self.only(self.labels[which])
+        if isinstance(which, (list, tuple)):
+            return self.only([one if isinstance(one, str) else self.labels[one] for one in which])
+        return self.motions[self.index(which) if isinstance(which, str) else which]
+
+    def index(self, label: str) -> int:
+        """The place of a motion (InputError: there is none of that label)."""
+        try:
+            return self._places[label]
+        except KeyError:
+            raise InputError(f"motion = {shown(label)}: not in the suite; {did_you_mean(label, self.labels)}") from None
+
+    def only(self, labels: Sequence[str]) -> "Suite":
+        """The suite of some of the motions."""
+        return Suite(tuple(self.motions[self.index(label)] for label in labels), tuple(labels), self.name)
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {label: at for at, label in enumerate(self.labels)}
+
+    @property
+    def has_pairs(self) -> bool:
+        """Whether the motions are pairs of components."""
+        return isinstance(self.motions[0], Pair)
+
+    @property
+    def components(self) -> tuple[Record, ...]:
+        """All records: the motions, or the components of one after the other."""
+        return tuple(
+            one for motion in self for one in ((motion.first, motion.second) if isinstance(motion, Pair) else (motion,))
+        )
+
+    @cached_property
+    def duplicates(self) -> tuple[tuple[str, ...], ...]:
+        """Labels of motions that have the same samples, such as one file under two names."""
+        alike: dict[bytes, list[str]] = {}
+        for label, motion in zip(self.labels, self, strict=True):
+            own = (motion.first, motion.second) if isinstance(motion, Pair) else (motion,)
+            samples = b"".join(part.acceleration.tobytes() + part.times.tobytes() for part in own)
+            alike.setdefault(samples, []).append(label)
+        return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
+
+    @cached_property
+    def measures(self) -> dict[str, NDArray[Any]]:
+        """`variables.MOTION_COORDINATES` of every motion; of pairs without the intensity, which the azimuth makes."""
+        found: dict[str, NDArray[Any]] = {
+            "motion_file": np.array([motion.attrs.get("record", "") for motion in self]),
+            "motion_sha256": np.array([motion.attrs.get("record_sha256", "") for motion in self]),
+            "motion_samples": np.array([motion.times.size for motion in self], np.int32),
+            "motion_interval": np.array(
+                [float(motion.times[-1] - motion.times[0]) / (motion.times.size - 1) for motion in self]
+            ),
+        }
+        if not self.has_pairs:
+            found |= self.intensities(np.zeros(len(self)))
+        return {name: found[name] for name in MOTION_COORDINATES if name in found}
+
+    def intensities(self, azimuth: Floats) -> dict[str, Floats]:
+        """Intensity measures of every motion (along the last dimension) at its azimuths."""
+        found = {f"motion_{name}": np.empty(azimuth.shape) for name in INTENSITY_MEASURES}
+        for place in np.ndindex(azimuth.shape):
+            for name, value in intensity_measures(self.record(place[-1], float(azimuth[place]))).items():
+                found[f"motion_{name}"][place] = value
+        return found
+
+    def record(self, at: int, azimuth: float) -> Record:
+        """The motion at a place, of a pair the component at an azimuth."""
+        motion = self.motions[at]
+        return motion.rotated(azimuth) if isinstance(motion, Pair) else motion
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """What results say of the suite: how many motions, and how they were read where all were read alike."""
+        about: dict[str, Any] = {"suite": self.name, "motions": len(self)}
+        for name in ("record_format", "record_units", "baseline"):
+            values = {one.attrs.get(name) for one in self.components}
+            if len(values) == 1 and None not in values:
+                about[name] = values.pop()
+        if self.duplicates:
+            about["duplicate_motions"] = "; ".join(", ".join(labels) for labels in self.duplicates)
+        return about
+
+
+#: The last suites that other processes have sent: with every chunk comes the same again, and the tables of pieces that
+#: are made of a record are found by which object it is.
+_RECEIVED: deque[Suite] = deque(maxlen=4)
+
+
+def _received(motions: tuple[Motion, ...], labels: tuple[str, ...], name: str) -> Suite:
+    """A suite that was pickled: the one that came before, if it is the same."""
+    suite = Suite(motions, labels, name)
+    for known in tuple(_RECEIVED):
+        if known == suite:
+            return known
+    _RECEIVED.append(suite)
+    return suite
+
+
+def read_suite(
+    paths: Any,
+    *,
+    pairs: Sequence[str] | None = None,
+    units: str | None = None,
+    baseline: str = "none",
+    format: str = "auto",
+    channel: int | None = None,
+) -> Suite:
+    """Read a suite of recorded motions.
+
+    Parameters
+    ----------
+    paths : str, Path, Record, Pair, or list of these
+        A folder (all files in it, but for hidden ones; folders in it are not looked into), a pattern such as
+        ``"motions/*.AT2"`` (``**`` is any folder), or a list of files, folders, patterns, Records and pairs.  An entry
+        that is itself a list of two files (or Records) is a pair of horizontal components.  Files of a folder or a
+        pattern are in the order of their names; one that several entries name is one motion.
+    pairs : (str, str), optional
+        Two endings of the files' stems, such as ``("_NS", "_EW")``: files that differ in these alone are the two
+        components of one motion, the first ending's at azimuth 0 and the second's at 90 degrees.
+    units, baseline, format, channel
+        As `read_record`, for every file.
+
+    Returns
+    -------
+    Suite
+        Labelled by the stems of the files, and by more of their paths where stems are alike.
+
+    Raises
+    ------
+    InputError
+        Any file cannot be read, or is no record: all of them are named.  A pattern that fits no file, a folder
+        without one, or a component without the other.
+    """
+    return suite_in(Path(), paths, pairs, Reading(units, baseline, format, channel))  # type: ignore[arg-type]
+
+
+def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
+    """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
+    options = reading.options
+    sources = _sources(paths, folder)
+    if pairs is not None:
+        sources = _paired(sources, pairs)
+    files = [one for source in sources for one in (source if isinstance(source, tuple) else (source,))]
+    records, reasons = {}, {}
+    for file in files:
+        if isinstance(file, Path) and file not in records:
+            try:
+                records[file] = read_record(file, **options)
+            except InputError as error:
+                reasons[file] = str(error).removeprefix(f"{file}: ")
+    if reasons:
+        raise _unreadable(reasons, len({*files}))
+
+    def read(file: "Path | Record") -> Record:
+        return file if isinstance(file, Record) else records[file]
+
+    motions = tuple(
+        source if isinstance(source, Pair) else Pair(*map(read, source)) if isinstance(source, tuple) else read(source)
+        for source in sources
+    )
+    named = [source[0] if isinstance(source, tuple) else source for source in sources]
+    stems = [one if isinstance(one, Path) else _path_of(one) for one in named]
+    if pairs is not None:
+        stems = [stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem) for stem in stems]
+    entries = [paths] if isinstance(paths, (str, Path)) else paths
+    is_named = isinstance(entries, Sequence) and all(isinstance(one, (str, Path)) for one in entries)
+    text = ", ".join(map(str, entries)) if is_named else ""
+    return Suite(motions, _labels(stems), _printable(text) if 0 < len(text) <= _LONGEST_NAME else "suite")
+
+
+_Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, ...]
+
+
+def _sources(given: Any, folder: Path) -> list[_Source]:
+    """What entries name, each file once: files, records, pairs of either."""
+    key = "paths"
+    if isinstance(given, (str, Path, Record, Pair)):
+        given = [given]
+    if isinstance(given, Suite):
+        return list(given.motions)
+    if not isinstance(given, (Sequence, Iterator)) or isinstance(given, (bytes, Mapping)):
+        raise InputError(f"{key} = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
+    found: list[_Source] = []
+    for entry in given:
+        if isinstance(entry, (Record, Pair)):
+            found.append(entry)
+        elif isinstance(entry, (list, tuple)):
+            if len(entry) != 2 or not all(isinstance(part, (str, Path, Record)) for part in entry):
+                raise InputError(f"{key}: {shown(entry)}: must be two files, the components of one motion")
+            found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
+        elif isinstance(entry, (str, Path)):
+            found += [file for file in _matching(folder, entry, key) if file not in found]
+        else:
+            raise InputError(f"{key}: {shown(entry)}: must be a file, a folder, a pattern or a Record")
+    if not found:
+        raise InputError(f"{key} = []: must name one motion at least")
+    return found
+
+
+def _matching(folder: Path, entry: str | Path, key: str) -> list[Path]:
+    """The files that an entry names."""
+    if not str(entry).strip():
+        raise InputError(f"{key}: {shown(entry)}: must be a file, a folder or a pattern")
+    path = folder / entry
+    try:
+        if path.is_dir():
+            files = sorted(one for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
+            if not files:
+                raise InputError(f"{key}: {_printable(str(entry))}: a folder without files")
+            return files
+        if path.exists() or not glob.has_magic(str(entry)):
+            return [path]
+        found = (folder / one for one in glob.iglob(str(entry), root_dir=folder, recursive=True))
+        files = sorted(one for one in found if one.is_file())
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise InputError(f"{key}: {_printable(str(entry))}: cannot be read: {reason}") from None
+    if not files:
+        raise InputError(f"{key}: {_printable(str(entry))}: no file fits this pattern")
+    return files
+
+
+def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]:
+    """Files put together two by two."""
+    endings = check_list("pairs", endings, "two endings of names, such as ('_NS', '_EW')")
+    if len(endings) != 2 or not all(isinstance(one, str) and one for one in endings):
+        raise InputError(f"pairs = {shown(endings)}: must be two endings of names, such as ('_NS', '_EW')")
+    if endings[0] == endings[1]:
+        raise InputError(f"pairs = {shown(endings)}: must be two different endings")
+    components: dict[Path, dict[str, Path]] = {}
+    alone = []
+    for one in sources:
+        ending = next((end for end in endings if isinstance(one, Path) and one.stem.endswith(end)), None)
+        if not isinstance(one, Path) or ending is None:
+            alone.append(one)
+            continue
+        components.setdefault(one.with_name(one.stem.removesuffix(ending) + one.suffix), {})[ending] = one
+    alone += [one for both in components.values() if len(both) < 2 for one in both.values()]
+    if alone:
+        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in alone)
+        raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
+    return [(both[endings[0]], both[endings[1]]) for both in components.values()]
+
+
+def _unreadable(reasons: Mapping[Path, str], count: int) -> InputError:
+    """One error for all files that cannot be read: their names, and what is wrong with each as its notes."""
+    names = ", ".join(_printable(path.name) for path in reasons)
+    error = InputError(f"{len(reasons)} of {count} files cannot be read: {names}")
+    for path, reason in list(reasons.items())[:_MOST_REASONS]:
+        error.add_note(f"{_printable(str(path))}: {reason}")
+    if len(reasons) > _MOST_REASONS:
+        error.add_note(f"... and {len(reasons) - _MOST_REASONS} more")
+    return error
+
+
+def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
+    """The stems of files; more of the path of those whose stems are alike, and a number where that does not help."""
+    stems = Counter(path.stem for path in paths)
+    ways = Counter(path.as_posix() for path in paths)
+    parents = [path.parent.parts for path in paths]
+    shared = 0
+    while parents and all(len(one) > shared and one[shared] == parents[0][shared] for one in parents):
+        shared += 1
+    labels: list[str] = []
+    taken = {path.stem for path in paths if stems[path.stem] == 1}
+    for path in paths:
+        label = path.stem
+        if stems[label] > 1:
+            label = "/".join(path.parts[shared:]) if ways[path.as_posix()] == 1 else path.stem
+        label, number = _printable(label).strip() or "motion", 1
+        unique = label
+        while (stems[path.stem] > 1 and unique in taken) or unique in labels:
+            number += 1
+            unique = f"{label} ({number})"
+        labels.append(unique)
+    return tuple(labels)
+
+
+def _path_of(motion: Motion) -> Path:
+    """The file that a motion may have been read from, a pair's first component: its name."""
+    return Path((motion.first if isinstance(motion, Pair) else motion).name)
+
+
+def _printable(text: str) -> str:
+    """A name as it can be printed, and written as UTF-8."""
+    text = text.encode(errors="backslashreplace").decode()
+    return text if text.isprintable() else repr(text)[1:-1]

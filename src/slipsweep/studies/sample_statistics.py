@@ -1,0 +1,125 @@
+"""Statistics of the displacement at every grid point: quantiles, mean, probabilities, shares of modes and flags."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.grid import threads
+from slipsweep.grid.tables import Variable
+from slipsweep.model.parameters import number_text
+from slipsweep.model.variables import STATISTIC_COORDINATES, SlidingMode, Validity
+from slipsweep.studies.sampling import Sampling
+
+Floats = NDArray[np.float64]
+
+#: Statistics and the dimensions that they have beside those of the grid.
+_STATISTICS: dict[str, tuple[str, ...]] = {
+    "displacement_quantile": ("quantile",),
+    "mean_displacement": (),
+    "exceedance_probability": ("threshold",),
+    "mode_share": ("mode",),
+    "flag_share": ("flag",),
+    "valueless_share": (),
+}
+
+#: Those that depend on the frequency even where the samples do not.
+_BY_FREQUENCY = ("displacement_quantile", "mean_displacement", "exceedance_probability")
+
+
+class SampleStatistics:
+    """Statistics of samples: what `SamplePlan` makes of runs (`uncertainty.Study`).
+
+    Parameters
+    ----------
+    sampling : Sampling
+    recorded : bool
+        Whether a record shakes the block: then there is no sliding mode.
+    """
+
+    by_frequency = _BY_FREQUENCY
+
+    # sorting and counting are part of what a sample takes
+    work = 0
+    memory = 0
+
+    def __init__(self, sampling: Sampling, recorded: bool) -> None:
+        self._sampling, self._recorded = sampling, recorded
+        self.runs = sampling.samples
+        self.draws: Mapping[str, Floats] = sampling.draws()
+        self.results: Mapping[str, tuple[str, ...]] = {
+            name: dims for name, dims in _STATISTICS.items() if not (recorded and name == "mode_share")
+        }
+
+    @property
+    def coords(self) -> dict[str, Variable]:
+        """Quantiles, thresholds, modes and flags."""
+        values: dict[str, NDArray[Any]] = {
+            "quantile": self._sampling.quantiles,
+            "threshold": self._sampling.thresholds,
+            "mode": np.array([int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING], np.int8),
+            "flag": np.array([int(flag) for flag in Validity], np.int16),
+        }
+        own = {dim for dims in self.results.values() for dim in dims}
+        return {dim: Variable((dim,), one, STATISTIC_COORDINATES[dim]) for dim, one in values.items() if dim in own}
+
+    def reduce(self, solved: Mapping[str, NDArray[Any]], frequency: Floats) -> dict[str, NDArray[Any]]:
+        """Statistics of the samples of each cell (rows), for each of its frequencies (columns)."""
+        samples = self.runs
+        rows_of = {name: values.reshape(-1, samples) for name, values in solved.items()}
+        displacement, flags, modes = (
+            rows_of["permanent_displacement"],
+            rows_of["validity"],
+            rows_of.get("sliding_mode"),
+        )
+        rows, squares = frequency.shape[0], frequency**2
+        quantiles, thresholds = self._sampling.quantiles, self._sampling.thresholds
+        found = {
+            "displacement_quantile": np.full((*squares.shape, quantiles.size), np.nan),
+            "mean_displacement": np.full(squares.shape, np.nan),
+            "exceedance_probability": np.full((*squares.shape, thresholds.size), np.nan),
+            **({} if modes is None else {"mode_share": np.empty((rows, 3))}),
+            "flag_share": np.empty((rows, len(Validity))),
+            "valueless_share": np.empty(rows),
+        }
+        codes = 1 + sum(Validity)
+        bits = (np.arange(codes)[:, None] & np.array([*Validity]) != 0).astype(np.float64)
+
+        def work(first: int, last: int) -> None:
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused below
+                for row in range(first, last):
+                    values = displacement[row]
+                    values.sort()  # NaN goes last
+                    count = int(np.searchsorted(values, np.nan))
+                    if modes is not None:
+                        found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
+                    found["flag_share"][row] = np.bincount(flags[row], minlength=codes) @ bits / samples
+                    found["valueless_share"][row] = (samples - count) / samples
+                    if not count:
+                        continue
+                    there, square = values[:count], squares[row][:, None]
+                    found["displacement_quantile"][row] = _quantiles(there, quantiles) / square
+                    found["mean_displacement"][row] = there.mean() / squares[row]
+                    above = count - np.searchsorted(there, thresholds * square, side="right")
+                    found["exceedance_probability"][row] = above / count
+
+        # sorting and counting take about an eighth of what solving takes
+        threads.spread(rows, work, max(samples // 8, 1))
+        for name in ("displacement_quantile", "mean_displacement"):
+            there = found["valueless_share"][:, None] < 1.0
+            wrong = (~np.isfinite(found[name].reshape(*squares.shape, -1)).all(axis=-1)) & there
+            if wrong.any():
+                worst = number_text(float(frequency[wrong].flat[0]))
+                clock = "1 / time_scale" if self._recorded else "frequency"
+                raise InputError(f"{clock} = {worst}: {name} is then no finite number; must be nearer to 1")
+        return found
+
+
+def _quantiles(ordered: Floats, wanted: Floats) -> Floats:
+    """Quantiles of sorted values, linear between them (numpy's default)."""
+    place = wanted * (ordered.size - 1)
+    below = np.floor(place).astype(np.intp)
+    above = np.minimum(below + 1, ordered.size - 1)
+    return np.asarray(ordered[below] + (place - below) * (ordered[above] - ordered[below]))

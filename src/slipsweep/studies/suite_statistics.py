@@ -1,0 +1,137 @@
+"""Statistics of the displacement over the motions of a suite, at every other grid point."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.parameters import check_list, shown
+from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, Validity
+from slipsweep.studies.sampling import check_quantiles, check_thresholds
+
+Floats = NDArray[np.float64]
+
+TITLE = "Statistics of the permanent displacement over a suite of motions"
+
+#: What makes up a suite, of the dimensions that a result has.
+_SUITE = ("motion", "polarity")
+
+#: Flags under which a motion has no value.
+REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
+
+
+def suite_table(table: Table, *, thresholds: Any, quantiles: Any, zero: Any, over: Any) -> Table:
+    """What `slipsweep.suite_statistics` returns, of a table that holds `permanent_displacement` and `validity`."""
+    for name in ("permanent_displacement", "validity"):
+        if name not in table.data_vars:
+            raise InputError(f"result: {name}: missing: must be there, of all motions")
+    displacement = table["permanent_displacement"]
+    g = float(table.attrs.get("g", np.nan))
+    dims = _suite_dims(displacement, over)
+    grid = {dim: size for dim, size in displacement.sizes.items() if dim not in dims}
+    order = (*grid, *dims)
+    shape = (*grid.values(), -1)
+    values = displacement.values.transpose([displacement.dims.index(dim) for dim in order]).reshape(shape)
+    codes = np.broadcast_to(_spread(table["validity"], order), [displacement.sizes[dim] for dim in order]).reshape(
+        shape
+    )
+    limits, wanted = check_thresholds("thresholds", thresholds, g), check_quantiles("quantiles", quantiles)
+    least = check_thresholds("zero", zero, g)
+    if least.size > 1:
+        raise InputError(f"zero = {shown(zero)}: must be one displacement")
+    found = _statistics(np.asarray(values, np.float64), codes, limits, wanted, float(least[0]))
+    own = {
+        "displacement_quantile": "quantile",
+        "exceedance_probability": "threshold",
+        "valueless_flag_count": "flag",
+    }
+    names = " ".join((flag.name or "").lower() for flag in REASONS)
+    bits = np.array([int(flag) for flag in REASONS], np.int16)
+    flag = {**STATISTIC_COORDINATES["flag"], "flag_values": bits.tolist(), "flag_meanings": names}
+    coords = {
+        **{name: one for name, one in table.coords.items() if not {*dims, *own.values()} & {*one.dims, name}},
+        "quantile": Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"]),
+        "threshold": Variable(("threshold",), limits, STATISTIC_COORDINATES["threshold"]),
+        "flag": Variable(("flag",), bits, flag),
+    }
+    results = {
+        name: Variable((*grid, *([own[name]] if name in own else [])), found[name], about)
+        for name, about in SUITE_STATISTICS.items()
+    }
+    attrs = {**table.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
+    return Table(coords, results, attrs)
+
+
+def _suite_dims(displacement: Variable, over: Any) -> tuple[str, ...]:
+    """The dimensions that the statistics are taken over."""
+    there = displacement.dims
+    if "motion" not in there:
+        raise InputError(
+            f"result: dimensions {', '.join(there) or 'none'}: must have motion, as a result of a suite has"
+        )
+    if over is None:
+        return tuple(dim for dim in _SUITE if dim in there)
+    dims: Sequence[Any] = [over] if isinstance(over, str) else check_list("over", over, "dimensions")
+    for dim in dims:
+        if dim not in there:
+            raise InputError(f"over = {shown(dim)}: must be a dimension of the result: {', '.join(there)}")
+    if "motion" not in dims:
+        raise InputError(f"over = {shown(over)}: must have motion among them")
+    return tuple(dict.fromkeys(dims))
+
+
+def _spread(variable: Variable, dims: Sequence[str]) -> NDArray[Any]:
+    """Values along `dims`, of length 1 where the variable does not have one."""
+    values = variable.values
+    if values.dtype.kind == "f":  # codes that a file's reader has made numbers with NaN of
+        values = np.nan_to_num(values)
+    there = [dim for dim in dims if dim in variable.dims]
+    ordered = values.transpose([variable.dims.index(dim) for dim in there])
+    return ordered.astype(np.int64).reshape([variable.sizes.get(dim, 1) for dim in dims])
+
+
+def _statistics(
+    values: Floats, codes: NDArray[Any], thresholds: Floats, quantiles: Floats, zero: float
+) -> dict[str, Any]:
+    """Statistics along the last axis."""
+    total = values.shape[-1]
+    missing = np.isnan(values)
+    reasons = np.stack([np.count_nonzero(missing & (codes & int(flag) != 0), axis=-1) for flag in REASONS], axis=-1)
+    ordered = np.sort(values, axis=-1)  # NaN goes last
+    count = total - np.count_nonzero(missing, axis=-1)
+    zeros = np.count_nonzero(ordered <= zero, axis=-1)
+    slid = count - zeros
+    with np.errstate(invalid="ignore", divide="ignore"):
+        logs = np.log(np.where(ordered > zero, ordered, 1.0))
+        mean = logs.sum(axis=-1) / np.where(slid > 0, slid, np.nan)
+        squares = np.where(ordered > zero, logs - mean[..., None], 0.0) ** 2
+        scatter = np.sqrt(squares.sum(axis=-1) / np.where(slid > 1, slid - 1, np.nan))
+        valued = np.where(count > 0, count, np.nan)
+        exceeding = [np.count_nonzero(ordered > one, axis=-1) / valued for one in thresholds]
+    return {
+        "value_count": count.astype(np.int32),
+        "valueless_count": (total - count).astype(np.int32),
+        "valueless_flag_count": reasons.astype(np.int32),
+        "valueless_share": (total - count) / total,
+        "zero_probability": zeros / valued,
+        "nonzero_median": _quantiles(ordered, zeros, slid, np.array([0.5]))[..., 0],
+        "nonzero_geometric_mean": np.exp(mean),
+        "log_standard_deviation": scatter,
+        "displacement_quantile": _quantiles(ordered, np.zeros_like(count), count, quantiles),
+        "exceedance_probability": np.stack(exceeding, axis=-1),
+    }
+
+
+def _quantiles(ordered: Floats, first: NDArray[Any], count: NDArray[Any], wanted: Floats) -> Floats:
+    """Quantiles of `count` values that begin at `first`, linear between them (numpy's default); NaN of none."""
+    most = ordered.shape[-1] - 1
+    place = wanted * np.maximum(count - 1, 0)[..., None]
+    below = np.floor(place).astype(np.intp)
+    last = np.maximum(first + count - 1, 0)[..., None]
+    at = np.minimum(first[..., None] + below, most)
+    low = np.take_along_axis(ordered, at, axis=-1)
+    high = np.take_along_axis(ordered, np.minimum(at + 1, np.maximum(last, 0)), axis=-1)
+    return np.asarray(np.where(count[..., None] > 0, low + (place - below) * (high - low), np.nan))

@@ -1,0 +1,165 @@
+"""Intensity measures: closed forms, the same whatever the sampling of the same straight lines, and eqsig's."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slipsweep import Record
+from slipsweep.motion.intensity import intensity_measures, strength_factor
+
+#: Measures of the straight lines themselves: all but the mean period, which the definition has of the samples.
+EXACT = ("pga", "pgv", "pgd", "arias_intensity", "cav", "significant_duration")
+G = 9.80665
+
+
+def noise(seed: int = 1, count: int = 400) -> Record:
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(0.001, 0.02, count))
+    return Record(times, random.normal(size=count) * np.hanning(count))
+
+
+def resampled(record: Record, parts: int) -> Record:
+    """The same straight lines, with more samples on them."""
+    places = np.arange((record.times.size - 1) * parts + 1) / parts
+    times = np.interp(places, np.arange(record.times.size), record.times)
+    return Record(times, np.interp(times, record.times, record.acceleration))
+
+
+def sine(amplitude: float, frequency: float, cycles: int, samples: int = 2000) -> Record:
+    times = np.arange(cycles * samples + 1) / (samples * frequency)
+    return Record(times, amplitude * np.sin(2.0 * np.pi * frequency * times))
+
+
+def test_a_sine() -> None:
+    amplitude, frequency, cycles = 3.0, 2.0, 40
+    duration, omega = cycles / frequency, 2.0 * math.pi * frequency
+    found = intensity_measures(sine(amplitude, frequency, cycles))
+    expected = {
+        "pga": amplitude,
+        # v = A/ω (1 - cos ωt), which never changes its sign: d is A/ω t at the end of each cycle
+        "pgv": 2.0 * amplitude / omega,
+        "pgd": amplitude / omega * duration,
+        "arias_intensity": math.pi / (2.0 * G) * amplitude**2 * duration / 2.0,
+        "cav": 2.0 * amplitude / math.pi * duration,
+        "significant_duration": 0.9 * duration,
+        "mean_period": 1.0 / frequency,
+    }
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=2e-6 if name != "mean_period" else 2e-3), name
+
+
+def test_two_sines_have_the_mean_period_of_their_powers() -> None:
+    times: Any = np.arange(8000) * 0.005  # whole periods of both
+
+    def of_power(amplitude: float, frequency: float) -> Any:
+        return amplitude * np.sin(2.0 * np.pi * frequency * times + 0.3)
+
+    values = of_power(2.0, 1.0) + of_power(1.0, 5.0)
+    for more in (0.0, of_power(3.0, 0.1) + of_power(3.0, 40.0)):  # outside of the range
+        found = intensity_measures(Record(times, values + more))
+        assert found["mean_period"] == pytest.approx((4.0 / 1.0 + 1.0 / 5.0) / 5.0, rel=1e-3)
+
+
+def test_straight_lines_by_hand() -> None:
+    """Up to 1 and down to -1: every number by hand."""
+    found = intensity_measures(Record(np.array([10.0, 11.0, 13.0]), np.array([0.0, 1.0, -1.0])))
+    assert found["pga"] == 1.0
+    assert found["pgv"] == pytest.approx(0.5 + 0.5, rel=1e-15)  # where the acceleration passes zero
+    # 1/6 to t = 1, then v = 1/2 + τ - τ²/2 > 0 up to τ = 2
+    assert found["pgd"] == pytest.approx(1.0 / 6.0 + 1.0 + 2.0 - 8.0 / 6.0, rel=1e-15)
+    assert found["arias_intensity"] == pytest.approx(math.pi / (2.0 * G) * 1.0, rel=1e-15)
+    assert found["cav"] == pytest.approx(0.5 + 1.0, rel=1e-15)
+    # of ∫ = 1: t³/3 = 0.05, and symmetrically at the end
+    assert found["significant_duration"] == pytest.approx(3.0 - 0.15 ** (1 / 3) - (1.0 - 0.85 ** (1 / 3)), rel=1e-14)
+
+
+def test_a_constant_acceleration() -> None:
+    """Where the cubic of the energy degenerates."""
+    for last in (2.0, 2.0 + 1e-13, 2.0 + 1e-5):
+        found = intensity_measures(Record(np.array([0.0, 10.0]), np.array([2.0, last])))
+        assert found["significant_duration"] == pytest.approx(9.0, rel=1e-5)
+        assert found["pgd"] == pytest.approx(100.0, rel=1e-5)
+        assert found["cav"] == pytest.approx(20.0, rel=1e-5)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10**6), st.integers(2, 7))
+def test_more_samples_on_the_same_lines_change_nothing(seed: int, parts: int) -> None:
+    record = noise(seed)
+    one, other = intensity_measures(record), intensity_measures(resampled(record, parts))
+    for name in EXACT:
+        assert other[name] == pytest.approx(one[name], rel=1e-11), name
+
+
+def test_scaled_and_stretched() -> None:
+    """Factors on acceleration and time go through every measure as dimensions say."""
+    record = noise()
+    one = intensity_measures(record)
+    factor, stretch = 3.0, 2.0
+    other = intensity_measures(Record(record.times * stretch, record.acceleration * factor))
+    powers = {
+        "pga": (1, 0), "pgv": (1, 1), "pgd": (1, 2), "arias_intensity": (2, 1), "cav": (1, 1),
+        "significant_duration": (0, 1),
+    }  # fmt: skip
+    for name, (own, of_time) in powers.items():
+        assert other[name] == pytest.approx(one[name] * factor**own * stretch**of_time, rel=1e-12), name
+
+
+@pytest.mark.parametrize("strength", ["scale", "amplitude", "pgv", "arias_intensity"])
+@pytest.mark.parametrize("time_scale", [1.0, 2.5])
+def test_a_strength_is_that_of_the_motion_that_shakes(strength: str, time_scale: float) -> None:
+    record = noise()
+    given_ = {strength: np.array([0.7]), "time_scale": np.array([time_scale])}
+    factor = float(strength_factor(record, given_)[0])
+    shaken = intensity_measures(Record(record.times * time_scale, record.acceleration * factor))
+    if strength == "scale":
+        assert factor == 0.7
+    else:
+        assert shaken["pga" if strength == "amplitude" else strength] == pytest.approx(0.7, rel=1e-13)
+
+
+def test_nothing_moves() -> None:
+    found = intensity_measures(Record(np.arange(4.0), np.zeros(4)))
+    assert {name for name, value in found.items() if value != 0.0} == {"mean_period"}
+    assert math.isnan(found["mean_period"])
+
+
+@pytest.mark.parametrize("peak", [1e-150, 1e150])
+@pytest.mark.parametrize("interval", [1e-6, 0.01, 10.0])
+def test_odd_numbers_give_numbers(peak: float, interval: float) -> None:
+    record = noise(3, 1000)
+    values = record.acceleration / record.peak * peak
+    found = intensity_measures(Record.sampled(values, interval))
+    assert found["significant_duration"] == pytest.approx(
+        intensity_measures(Record.sampled(values / peak, interval))["significant_duration"], rel=1e-12
+    )
+    assert all(value >= 0.0 for name, value in found.items() if name != "mean_period")
+    # every frequency that samples 10 s apart resolve is below 0.25 Hz
+    assert math.isnan(found["mean_period"]) == (interval == 10.0)
+
+
+def test_as_eqsig_has_them() -> None:
+    """On the motions that pySLAMMER ships; eqsig's trapezoids have the straight lines sampled 16 times as finely."""
+    eqsig, pyslammer = pytest.importorskip("eqsig"), pytest.importorskip("pyslammer")
+    for name, motion in pyslammer.sample_ground_motions().items():
+        record = Record.sampled(np.asarray(motion.accel) * G, motion.dt)
+        fine = resampled(record, 16)
+        signal = eqsig.AccSignal(fine.acceleration, motion.dt / 16)
+        signal.generate_displacement_and_velocity_series()
+        expected = {
+            "pga": signal.pga,
+            "pgv": signal.pgv,
+            "pgd": signal.pgd,
+            "arias_intensity": eqsig.im.calc_arias_intensity(signal)[-1] * 9.81 / G,
+            "cav": eqsig.im.calc_cav(signal)[-1],
+            "significant_duration": eqsig.im.calc_sig_dur(signal),
+        }
+        found = intensity_measures(record)
+        for measure, value in expected.items():
+            # eqsig's duration is from one sample to another
+            near = {"abs": motion.dt / 8} if measure == "significant_duration" else {"rel": 3e-4}
+            assert found[measure] == pytest.approx(value, **near), f"{name}: {measure}"

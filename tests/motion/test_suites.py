@@ -1,0 +1,235 @@
+"""Suites: what is read of folders, patterns and lists, how motions are told apart, pairs of components."""
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite
+from slipsweep.motion import cutting
+from slipsweep.motion.intensity import intensity_measures
+
+HEADER = "time (s),acceleration (m/s2)\n"
+
+
+def write(path: Path, values: Any = (0.0, 1.0, -2.0, 0.5), interval: float = 0.1) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(HEADER + "".join(f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values)))
+    return path
+
+
+def noise(seed: int, count: int = 50, interval: float = 0.01) -> Record:
+    return Record.sampled(np.random.default_rng(seed).normal(size=count), interval, f"noise{seed}.csv")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for at, name in enumerate(("c.csv", "a.csv", "b.csv"), 1):
+        write(tmp_path / "motions" / name, np.arange(at + 3) % 3 - 1.0, 0.01 * at)
+    return tmp_path / "motions"
+
+
+def test_a_folder_a_pattern_and_a_list_are_one_suite(folder: Path) -> None:
+    suites = [
+        read_suite(folder),
+        read_suite(str(folder)),
+        read_suite(f"{folder}/*.csv"),
+        read_suite(f"{folder.parent}/**/*.csv"),
+        read_suite([folder / f"{name}.csv" for name in "abc"]),
+        read_suite([folder / "a.csv", f"{folder}/[bc].csv", folder]),  # each file once
+        read_suite(read_record(folder / f"{name}.csv") for name in "abc"),
+    ]
+    for suite in suites:
+        assert suite.labels == ("a", "b", "c")
+        assert suite.motions == suites[0].motions
+        assert [motion.times.size for motion in suite] == [5, 6, 4]
+    np.testing.assert_array_equal(suites[0]["b"].acceleration, read_record(folder / "b.csv").acceleration)
+
+
+def test_options_of_reading_are_those_of_every_file(folder: Path) -> None:
+    suite = read_suite(folder, baseline="mean")
+    for motion in suite:
+        assert isinstance(motion, Record)
+        assert motion.attrs["baseline"] == "mean"
+        assert motion.acceleration.mean() == pytest.approx(0.0, abs=1e-15)
+    with pytest.raises(InputError, match="baseline = 'cubic'"):
+        read_suite(folder, baseline="cubic")
+
+
+def test_all_damaged_files_are_named_at_once(folder: Path) -> None:
+    (folder / "damaged.AT2").write_text("NPTS= 3, DT= 0.01\n1 2\n")
+    (folder / "notes.txt").write_text("what is in this folder\n")
+    (folder / "b.csv").write_text(f"{HEADER}0,1\n0.1,zero\n")
+    with pytest.raises(InputError, match=r"^3 of 5 files cannot be read: b\.csv, damaged\.AT2, notes\.txt") as caught:
+        read_suite(folder)
+    b, damaged, notes = caught.value.__notes__
+    assert b == f"{folder / 'b.csv'}: line 3: '0.1,zero': must be a time and an acceleration"
+    assert damaged.startswith(f"{folder / 'damaged.AT2'}: 2 accelerations, where its header says 3")
+    assert notes.startswith(f"{folder / 'notes.txt'}: ")
+
+
+def test_stems_that_are_alike_are_told_apart(tmp_path: Path) -> None:
+    paths = [write(tmp_path / name) for name in ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c.csv")]
+    assert read_suite(paths).labels == ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c")
+    assert Suite((noise(1), noise(1), noise(2))).labels == ("noise1", "noise1 (2)", "noise2")
+
+
+def test_motions_that_are_the_same_are_told(folder: Path) -> None:
+    (folder / "d.csv").write_text((folder / "b.csv").read_text() + "\n")  # another file, the same motion
+    suite = read_suite(folder)
+    assert suite.duplicates == (("b", "d"),)
+    assert suite.attrs["duplicate_motions"] == "b, d"
+    assert "duplicate_motions" not in suite[["a", "b"]].attrs
+
+
+def test_a_suite_is_compared_by_what_is_in_it(folder: Path) -> None:
+    one, other = read_suite(folder), read_suite(folder)
+    assert one == other
+    assert hash(one) == hash(other)
+    sent = pickle.loads(pickle.dumps(one))
+    assert sent == one
+    # a worker gets it with every chunk, and makes the tables of its records once
+    assert pickle.loads(pickle.dumps(one)).motions[0] is sent.motions[0]
+    assert one != one[:2]
+    assert one[:2] == one[["a", "b"]] == one[[0, 1]]
+    changed = read_record(folder / "a.csv").corrected("mean")
+    assert one != Suite((changed, *one.motions[1:]), one.labels, one.name)
+    assert repr(one[:2]) == f"Suite({str(folder)!r}: 2 motions: a, b)"
+    assert "8 motions: 0, 1, 2, ..., 6, 7" in repr(Suite((noise(1),) * 8, tuple("01234567")))
+
+
+def test_measures_along_the_motions(folder: Path) -> None:
+    suite = read_suite(folder)
+    found = suite.measures
+    assert found["motion_file"].tolist() == ["a.csv", "b.csv", "c.csv"]
+    assert found["motion_samples"].tolist() == [5, 6, 4]
+    np.testing.assert_allclose(found["motion_interval"], [0.02, 0.03, 0.01], rtol=1e-14)
+    for at, motion in enumerate(suite):
+        assert isinstance(motion, Record)
+        for name, value in intensity_measures(motion).items():
+            assert found[f"motion_{name}"][at] == value
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ((), r"motions = \[\]: must hold one motion"),
+        ((noise(1), "b"), r"motions\[2\] = 'b': must be a Record"),
+        ((noise(1), Pair(noise(1), noise(2))), "all Records, or all Pairs"),
+    ],
+)
+def test_what_is_no_suite(given: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Suite(given)
+
+
+@pytest.mark.parametrize("labels", [("a",), ("a", "a"), ("a", ""), ("a", "\n"), ("a", 2), ("a", "b", "c")])
+def test_labels_are_one_for_each_and_all_different(labels: Any) -> None:
+    with pytest.raises(InputError, match=r"^labels: "):
+        Suite((noise(1), noise(2)), labels)
+
+
+@pytest.mark.parametrize(
+    ("paths", "words"),
+    [
+        ("none/*.csv", r"none/\*\.csv: no file fits this pattern"),
+        ("none.csv", r"1 of 1 files cannot be read: none\.csv"),
+        ([], r"paths = \[\]: must name one motion at least"),
+        (3, "paths = 3: must be a folder"),
+        ([3], "paths: 3: must be a file"),
+        ([("a.csv", "b.csv", "c.csv")], "must be two files"),
+        ("empty", "a folder without files"),
+        ("\0", "cannot be read"),
+        (["a.csv", ""], "paths: '': must be a file"),
+    ],
+)
+def test_paths_that_name_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, paths: Any, words: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=words):
+        read_suite(paths)
+
+
+def test_an_unknown_label_is_told() -> None:
+    with pytest.raises(InputError, match=r"motion = 'noise3': not in the suite; did you mean \"noise"):
+        Suite((noise(1), noise(2)))["noise3"]
+
+
+# ----------------------------------------------------------------------------------------- pairs
+
+
+def test_a_rotation_is_exact_at_the_quarters_and_straight_between_samples() -> None:
+    first, second = noise(1), noise(2)
+    pair = Pair(first, second)
+    for azimuth, expected in (
+        (0.0, first.acceleration), (90.0, second.acceleration), (180.0, -first.acceleration),
+        (270.0, -second.acceleration), (360.0, first.acceleration),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(pair.rotated(azimuth).acceleration, expected)
+    # what stands at right angles has the rest of the energy
+    whole = sum(intensity_measures(one)["arias_intensity"] for one in (first, second))
+    for azimuth in (10.0, 33.3, 77.0):
+        both = (pair.rotated(azimuth), pair.rotated(azimuth + 90.0))
+        assert sum(intensity_measures(one)["arias_intensity"] for one in both) == pytest.approx(whole, rel=1e-13)
+        assert both[0] == Pair(first, second).rotated(azimuth)
+
+
+def test_the_shorter_component_is_continued_with_zeros() -> None:
+    first, second = noise(1, 50), noise(2, 40)
+    pair = Pair(first, second)
+    np.testing.assert_array_equal(pair.rotated(90.0).acceleration, [*second.acceleration, *np.zeros(10)])
+    np.testing.assert_array_equal(Pair(second, first).rotated(90.0).times, first.times)
+    with pytest.raises(InputError, match=r"noise1\.csv, noise2\.csv: .* sampled at the same times"):
+        Pair(first, noise(2, 50, 0.02))
+
+
+def test_pairs_by_the_endings_of_their_names(tmp_path: Path) -> None:
+    for name in ("one_NS", "one_EW", "two_NS", "two_EW"):
+        write(tmp_path / f"{name}.csv", np.random.default_rng(len(name)).normal(size=5) + ("two" in name))
+    suite = read_suite(tmp_path, pairs=("_NS", "_EW"))
+    assert suite.labels == ("one", "two")
+    assert suite.has_pairs
+    assert suite["two"] == Pair(read_record(tmp_path / "two_NS.csv"), read_record(tmp_path / "two_EW.csv"))
+    listed = read_suite([[tmp_path / f"{name}_NS.csv", tmp_path / f"{name}_EW.csv"] for name in ("one", "two")])
+    assert listed.motions == suite.motions
+    assert suite.measures["motion_file"].tolist() == ["one_NS.csv one_EW.csv", "two_NS.csv two_EW.csv"]
+    write(tmp_path / "three_NS.csv")
+    write(tmp_path / "vertical.csv")
+    with pytest.raises(InputError, match=r"without the other component: vertical\.csv, three_NS\.csv"):
+        read_suite(tmp_path, pairs=("_NS", "_EW"))
+
+
+@pytest.mark.parametrize("pairs", ["_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)])
+def test_endings_that_are_none(tmp_path: Path, pairs: Any) -> None:
+    write(tmp_path / "a_NS.csv")
+    with pytest.raises(InputError, match=r"^pairs = "):
+        read_suite(tmp_path, pairs=pairs)
+
+
+# ---------------------------------------------------------------------------------------- tables
+
+
+def test_tables_of_a_whole_suite_are_kept_but_no_more_than_memory_has_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cutting, "_TABLES", {})
+    made = []
+    cut = cutting._record_cut
+
+    def counted(record: Record, polarity: float) -> Any:
+        made.append(record.name)
+        return cut(record, polarity)
+
+    monkeypatch.setattr(cutting, "_record_cut", counted)
+    suite = Suite(tuple(noise(seed) for seed in range(12)))
+    for _ in range(3):
+        for motion in suite.components:
+            cutting.wave_of_record(motion, 1.0)
+    assert len(made) == 12
+    monkeypatch.setattr(cutting, "MOST_TABLES", 50_000)
+    for motion in suite.components:
+        cutting.wave_of_record(motion, -1.0)
+    assert sum(wave.pieces.nbytes for _, wave in cutting._TABLES.values()) <= 50_000
+    # what nobody has any more is not kept
+    del suite, motion
+    assert not cutting._TABLES

@@ -1,0 +1,205 @@
+"""The displacement hazard: closed forms, what lies outside of the amplitudes, curves that are refused, the command."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from slipsweep import HazardCurve, InputError, Newmark, RunError, Validity, displacement_hazard
+from slipsweep.model.options import MODELS
+from slipsweep.studies.hazard import exceedance_rates, read_hazard_curve
+from tests.studies.test_suite_statistics import suite_result
+from tests.support.commands import command
+
+CURVE = "# a site\nPGA (g); annual rate (1/yr); note\n0.1; 0.01; a\n\n0.4; 0.0005; b\n1.6; 0.00001; c\n"
+
+ATTRIBUTES = {"source": "slipsweep test", **MODELS.attributes(Newmark())}
+
+
+def curve_of(amplitude: list[float], rate: list[float]) -> HazardCurve:
+    return HazardCurve(np.array(amplitude), np.array(rate))
+
+
+def power_law(k0: float, k: float, points: int = 12) -> HazardCurve:
+    amplitude = np.geomspace(1e-4, 1e4, points)
+    return HazardCurve(amplitude, k0 * amplitude**-k)
+
+
+@pytest.mark.parametrize("k", [0.5, 1.0, 2.5, 4.0])
+@pytest.mark.parametrize(("median", "beta"), [(0.3, 0.3), (2.0, 0.6), (5.0, 0.9)])
+def test_the_closed_form_of_a_power_law_and_a_lognormal_fragility(k: float, median: float, beta: float) -> None:
+    """λ = k0 θ^-k exp(k² β² / 2) (Cornell 1996); as an array and as a function."""
+    k0 = 3e-4
+    expected = k0 * median**-k * math.exp(0.5 * (k * beta) ** 2)
+    amplitude = median * np.exp(beta * np.linspace(-12.0, 12.0, 2401))
+
+    def fragility(a: Any) -> Any:
+        return norm.cdf(np.log(a / median) / beta)
+
+    for given in (fragility, fragility(amplitude)):
+        found = exceedance_rates(power_law(k0, k), amplitude, given)
+        assert float(found.rate) == pytest.approx(expected, rel=1e-3)
+        assert float(found.omitted) < 1e-9 * expected
+
+
+def test_a_step_is_the_curve_itself() -> None:
+    """A fragility of 0 and then 1 gives the rate of what it jumps at, wherever points of the curve lie."""
+    curve = curve_of([1.0, 2.0, 8.0], [0.1, 0.01, 0.001])
+    found = exceedance_rates(curve, [1.0, 4.0 * (1 - 1e-12), 4.0, 8.0], [0.0, 0.0, 1.0, 1.0])
+    assert float(found.rate) == pytest.approx(math.sqrt(0.01 * 0.001), rel=1e-9)  # straight in logarithms: 4² = 2 · 8
+    assert float(found.held) == pytest.approx(0.001, rel=1e-12)
+    assert float(found.omitted) == 0.0
+
+
+def test_what_lies_outside_is_told() -> None:
+    """The probability is held above and taken as 0 below, also where the curve ends first."""
+    curve = curve_of([1.0, 10.0], [0.1, 0.001])
+    found = exceedance_rates(curve, [2.0, 5.0], [[0.25, 0.0], [0.25, 0.5]])
+    rate = [0.1 * a**-2.0 for a in (2.0, 5.0)]
+    np.testing.assert_allclose(found.rate[0], 0.25 * rate[0], rtol=1e-12)
+    np.testing.assert_allclose(found.held, [0.25 * rate[1], 0.5 * rate[1]], rtol=1e-12)
+    np.testing.assert_allclose(found.omitted, [0.25 * (0.1 - rate[0]), 0.0], rtol=1e-12)
+    wider = exceedance_rates(curve, [0.5, 20.0], [[0.5, 0.0], [0.5, 0.0]])
+    np.testing.assert_allclose(wider.rate, [0.05, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(wider.held, [0.0005, 0.0], rtol=1e-12)
+    np.testing.assert_array_equal(wider.omitted, [np.nan, 0.0])
+    with pytest.raises(InputError, match=r"reaches from 1 to 10 m/s2, .* from 20 to 30 m/s2: they must overlap"):
+        exceedance_rates(curve, [20.0, 30.0], [0.1, 0.2])
+
+
+def test_against_quadrature() -> None:
+    """Straight lines of the fragility over a curve with a kink between, by a fine sum."""
+    curve = curve_of([0.5, 3.0, 12.0], [0.02, 0.003, 0.00005])
+    amplitude, chance = np.array([1.0, 2.0, 6.0, 9.0]), np.array([0.0, 0.3, 0.2, 0.9])
+    fine = np.geomspace(1.0, 9.0, 400_001)
+    rates, chances = curve.rate_at(fine), np.interp(np.log(fine), np.log(amplitude), chance)
+    expected = np.sum(0.5 * (chances[1:] + chances[:-1]) * -np.diff(rates)) + 0.9 * rates[-1]
+    assert float(exceedance_rates(curve, amplitude, chance).rate) == pytest.approx(expected, rel=1e-9)
+
+
+# -------------------------------------------------------------------------------- of a suite
+
+
+def test_of_a_suite_by_hand() -> None:
+    """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
+    nan, unstable = np.nan, int(Validity.STATICALLY_UNSTABLE)
+    u = np.array([[0.0, 0.0, 0.0], [nan, 0.2, 0.0], [nan, nan, nan], [0.3, 0.2, 0.5]])
+    values = np.stack([u, np.full_like(u, nan)])
+    flags = np.where(np.isnan(values), unstable, 0)
+    result = suite_result(values, flags, ("mu_s", "amplitude", "motion")).assign_coords(amplitude=[0.0, 1.0, 2.0, 4.0])
+    curve = curve_of([0.5, 8.0], [0.4, 0.4 / 256])  # 0.1 a⁻²
+    expected = exceedance_rates(curve, [1.0, 4.0], [[0.5, 0.0], [1.0, 1.0 / 3.0]])
+    for given in (result, result.isel(amplitude=[2, 0, 3, 1]), result.transpose("motion", "amplitude", "mu_s")):
+        found = displacement_hazard(given, curve, ["100mm", 0.4])
+        assert found.annual_rate.dims == ("mu_s", "threshold")
+        np.testing.assert_allclose(found.annual_rate, np.array([expected.rate, [nan, nan]]), rtol=1e-12)
+        np.testing.assert_allclose(found.held_rate[0], expected.held, rtol=1e-12)
+        np.testing.assert_allclose(found.omitted_rate[0], expected.omitted, rtol=1e-12)
+        assert found.valueless_share.values.tolist() == [1.0, 1.0]
+    assert found.annual_rate.attrs["units"] == "year-1"
+    with pytest.raises(RunError, match="the model gives no value under any motion"):
+        displacement_hazard(result.isel(mu_s=[1]), curve)
+    for one in (result.isel(amplitude=1), result.rename(amplitude="pgv")):
+        with pytest.raises(InputError, match="amplitude: must be a dimension of two peak ground accelerations or more"):
+            displacement_hazard(one, curve)
+
+
+# ------------------------------------------------------------------------------------ curves
+
+
+def test_a_curve_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "hazard.csv"
+    path.write_text(CURVE)
+    curve = read_hazard_curve(path, 9.81)
+    np.testing.assert_allclose(curve.amplitude, [0.981, 3.924, 15.696], rtol=1e-15)
+    assert curve.rate.tolist() == [0.01, 0.0005, 0.00001]
+    assert float(curve.rate_at(np.array([1.962]))[0]) == pytest.approx(math.sqrt(0.01 * 0.0005), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "has no line of names"),
+        ("PGA, annual rate\n1,2\n", "line 1: column 'PGA': must give its unit in brackets"),
+        ("PGA (mm), annual rate\n1,2\n", 'unit = "mm": must be a unit that converts to m s-2'),
+        ("PGA (g), what\n1,2\n", "line 1: no column annual rate"),
+        ("PGA (g), annual probability\n1,2\n", "must be an annual rate, -ln(1 - p)"),
+        ("PGA (g), rate (1/month)\n1,2\n", "must be a rate per year"),
+        ("PGA (g), PGA (m/s2), annual rate\n1,2,3\n", "line 1: two columns are PGA: must be one"),
+        ("PGA (g), annual rate\n0.1,0.02\n0.2\n", "line 3: 1 cells, where 2 columns are named"),
+        ("PGA (g), annual rate\n0.1,x\n", "line 2: annual rate = 'x': must be a number"),
+        ("PGA (g), annual rate\n0.1,0.02\n", "1 amplitudes and 1 rates: must be as many of each, 2 at least"),
+        ("PGA (m/s2), annual rate\n1,0.02\n1,0.01\n", "amplitude of point 2 = 1: must be greater than 1"),
+        ("PGA (m/s2), annual rate\n1,0.02\n2,0.02\n", "rate of point 2 = 0.02: must be less than 0.02"),
+        ("PGA (m/s2), annual rate\n1,0.02\n2,0\n", "rate of point 2 = 0: must be a number > 0"),
+        ("PGA (m/s2), annual rate\nnan,0.02\n2,0.01\n", "amplitude of point 1 = nan: must be a number > 0"),
+    ],
+)
+def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "hazard.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        read_hazard_curve(path, 9.81)
+    assert message in str(refused.value)
+    assert str(path) in str(refused.value)
+
+
+# ------------------------------------------------------------------------------- the command
+
+
+def test_the_command(tmp_path: Path) -> None:
+    """It prints the rates that the function gives, and draws them."""
+    rng = np.random.default_rng(3)
+    amplitude = np.geomspace(0.5, 10.0, 6)
+    u = amplitude[:, None] ** 2 * 0.01 * rng.lognormal(0.0, 0.6, (2, 1, 9)) * [[[1.0]], [[0.5]]]
+    u[:, :2] = 0.0
+    u[0, 5, :3] = np.nan
+    flags = np.where(np.isnan(u), int(Validity.UPLIFT), 0)
+    result = suite_result(u, flags, ("mu_s", "amplitude", "motion")).assign_coords(amplitude=amplitude, mu_s=[0.3, 0.4])
+    result.attrs |= ATTRIBUTES
+    result.to_netcdf(tmp_path / "a.nc")
+    (tmp_path / "hazard.csv").write_text(CURVE)
+    run = ("hazard", "a.nc", "--curve", "hazard.csv", "-d", "0.2", "-d", "50mm", "-d", "90")
+    done = command(tmp_path, *run, "-o", "h.svg", "-o", "h.png")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = displacement_hazard(result, tmp_path / "hazard.csv", [0.05, 0.2, 90.0])
+    rows = [line.split() for line in done.stdout.splitlines() if line.startswith("  ") and line.split()[0] != "d"]
+    assert [row[:2] for row in rows if row[0] != "no"] == [
+        [f"{d:g}", f"{rate:.4g}"]
+        for point in found.annual_rate.values
+        for d, rate in zip([0.05, 0.2, 90], point, strict=True)
+    ]
+    assert "no value: up to 33.3% of the motions at an amplitude" in done.stdout
+    assert done.stdout.count("exceeded by no motion at any amplitude") == 2
+    assert "mu_s = 0.3\n" in done.stdout
+    assert (tmp_path / "h.svg").read_text().count("mu_s = 0.4") == 1
+    cut = command(tmp_path, *run, "--at", "mu_s=0.4", "-o", "c.png")
+    assert (cut.returncode, cut.stdout.count("annual rate")) == (0, 1)
+    assert f"{found.annual_rate.values[1, 0]:.4g}" in cut.stdout
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--at", "mu_s=0.45"), "--at mu_s=0.45: must be one of the values of mu_s: 1, 2"),
+        (("--at", "theta=5"), "--at theta=5: must be NAME=VALUE, of mu_s"),
+        (("--at", "mu_s=1", "--at", "mu_s=2"), "--at mu_s=2: mu_s is given twice"),
+        (("-d", "5 s"), '--displacement = "5 s": must be a number'),
+        (("-d", "-1"), "--displacement = -1: must be"),
+        (("-o", "h.csv"), "h.csv: the name must end in one of .png, .svg, .pdf"),
+        (("-o", "h.png", "-d", "8"), "no displacement that is asked for is exceeded"),
+    ],
+)
+def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], message: str) -> None:
+    result = suite_result(np.full((2, 3, 4), 0.1), np.zeros((2, 3, 4)), ("mu_s", "amplitude", "motion"))
+    result.attrs |= ATTRIBUTES
+    result.to_netcdf(tmp_path / "a.nc")
+    (tmp_path / "hazard.csv").write_text(CURVE)
+    asked = () if "-d" in given else ("-d", "1cm")
+    done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", *asked, *given)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert not (tmp_path / "h.png").exists()

@@ -1,0 +1,422 @@
+"""Sobol indices: closed forms, scipy, what physics leaves no doubt about; what has none; files, commands, charts."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import slipsweep
+from slipsweep.cli import main
+from slipsweep.errors import InputError
+from slipsweep.files.results import read_contents
+from slipsweep.model.variables import SensitivityStatus
+from slipsweep.studies.sampling import MOST_SAMPLES, Sampling, check_sampling
+from slipsweep.studies.sensitivity import RESAMPLES, Sensitivity
+
+G = 9.81
+FACTOR: dict[str, Any] = {"distribution": "lognorm", "s": 0.3, "kind": "factor"}
+
+#: Uniform from -π to π.
+ANGLE: dict[str, Any] = {"distribution": "uniform", "loc": -np.pi, "scale": 2 * np.pi}
+
+NO_FREQUENCY = np.empty((0, 0))
+
+
+def sampling_of(uncertain: dict[str, Any], **options: Any) -> Sampling:
+    settings: dict[str, Any] = {
+        "samples": 4096, "method": "sobol", "seed": 0, "quantiles": 0.5, "thresholds": 0.1, "correlation": (), "g": G,
+        "sensitivity": True,
+    }  # fmt: skip
+    return check_sampling(uncertain, **{**settings, **options})
+
+
+def ishigami(draws: Any) -> np.ndarray:
+    """Ishigami's and Homma's function of three angles, with a = 7 and b = 0.1."""
+    first, second, third = (draws[name] for name in ("theta", "mu_s", "amplitude"))
+    return np.asarray(np.sin(first) + 7.0 * np.sin(second) ** 2 + 0.1 * third**4 * np.sin(first))
+
+
+def closed_form() -> tuple[np.ndarray, np.ndarray]:
+    """Its first-order and total indices."""
+    alone = np.array([0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2, 7.0**2 / 8, 0.0])
+    both = 0.1**2 * np.pi**8 * 8 / 225
+    variance = alone.sum() + both
+    return alone / variance, (alone + np.array([both, 0.0, both])) / variance
+
+
+def reduced(study: Sensitivity, values: np.ndarray) -> dict[str, np.ndarray]:
+    """What the study makes of one grid point's runs."""
+    found = study.reduce({"permanent_displacement": values}, NO_FREQUENCY)
+    return {name: one[0] for name, one in found.items()}
+
+
+ANGLES = {"theta": ANGLE, "mu_s": ANGLE, "amplitude": ANGLE}
+
+
+# ----------------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_ishigamis_function(seed: int) -> None:
+    study = Sensitivity(sampling_of(ANGLES, samples=2**14, seed=seed))
+    found = reduced(study, ishigami(study.draws))
+    for name, exact in zip(("first_order", "total"), closed_form(), strict=True):
+        np.testing.assert_allclose(found[f"{name}_index"], exact, rtol=0.01, atol=0.003)
+        low, high = found[f"{name}_interval"]
+        assert ((low <= exact) & (exact <= high)).all()
+
+
+def test_estimates_are_those_of_scipy() -> None:
+    """The estimators of scipy.stats.sobol_indices, and its bootstrap's percentiles but for what chance does to them."""
+    study = Sensitivity(sampling_of(ANGLES, samples=512))
+    runs = ishigami(study.draws).reshape(5, 1, 512)
+    found = reduced(study, runs.ravel())
+    theirs = stats.sobol_indices(func={"f_A": runs[0], "f_B": runs[1], "f_AB": runs[2:]}, n=512)
+    np.testing.assert_allclose(found["first_order_index"], theirs.first_order, atol=1e-12)
+    np.testing.assert_allclose(found["total_index"], theirs.total_order, atol=1e-12)
+
+    centred = runs[:, 0] - runs[:2].mean()
+
+    def statistic(index: np.ndarray) -> np.ndarray:
+        a, b, *others = centred[:, index]
+        variance = np.var([a, b])
+        first = [np.mean(b * (other - a)) / variance for other in others]
+        return np.array([first, [np.mean((a - other) ** 2) / 2 / variance for other in others]])
+
+    theirs = stats.bootstrap(
+        [np.arange(512)], statistic, n_resamples=4000, method="percentile", rng=np.random.default_rng(1)
+    ).confidence_interval
+    ours = np.stack([found["first_order_interval"], found["total_interval"]])
+    width = theirs.high - theirs.low
+    assert (np.abs(ours[:, 0] - theirs.low) < 0.1 * width).all()
+    assert (np.abs(ours[:, 1] - theirs.high) < 0.1 * width).all()
+
+
+def test_intervals_of_random_numbers_hold_the_truth_as_often_as_they_say() -> None:
+    held = []
+    for seed in range(60):
+        study = Sensitivity(sampling_of(ANGLES, samples=2048, seed=seed, method="random"))
+        found = reduced(study, ishigami(study.draws))
+        for name, exact in zip(("first_order", "total"), closed_form(), strict=True):
+            low, high = found[f"{name}_interval"]
+            held.append((low <= exact) & (exact <= high))
+    assert 0.90 <= np.mean(held) <= 0.99
+
+
+def test_the_size_of_displacements_does_not_matter() -> None:
+    """Nor where they are zero: squares neither run over nor vanish."""
+    study = Sensitivity(sampling_of(ANGLES, samples=256))
+    values = ishigami(study.draws)
+    expected = reduced(study, values)
+    for factor in (2.0**900, 2.0**-900):
+        found = reduced(study, values * factor)
+        for name, one in expected.items():
+            np.testing.assert_array_equal(found[name], one)
+    moved = reduced(study, values + 1000.0)
+    np.testing.assert_allclose(moved["total_index"], expected["total_index"], rtol=1e-9)
+
+
+def test_a_product_of_two_inputs() -> None:
+    """u = W(A)/ω²: with A and f drawn the variance of a product, whose indices have a closed form."""
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
+    strength, pace = stats.uniform(3.0, 5.0), stats.lognorm(0.1, scale=2.0)
+    found = slipsweep.sample(
+        **block, uncertain={"amplitude": strength, "frequency": pace}, samples=2**14, sensitivity=True
+    )
+    levels = (np.arange(20000) + 0.5) / 20000
+    alone = slipsweep.sweep(**block, amplitude=strength.ppf(levels), frequency=1.0).permanent_displacement.values
+    scatter = {"amplitude": np.var(alone) / np.mean(alone) ** 2, "frequency": np.exp(4 * 0.1**2) - 1}
+    variance = np.prod([1 + value for value in scatter.values()]) - 1
+    for name, other in (("amplitude", "frequency"), ("frequency", "amplitude")):
+        one = found.sel(input=name)
+        assert one.first_order_index == pytest.approx(scatter[name] / variance, rel=0.01)
+        assert one.total_index == pytest.approx(1 - scatter[other] / variance, rel=0.01)
+
+
+def test_an_input_without_effect_has_no_index() -> None:
+    """λ plays no part where the yield acceleration governs: not to the last bit."""
+    found = slipsweep.sample(
+        theta=5.0,
+        mu_s=0.4,
+        amplitude=4.0,
+        frequency=1.0,
+        yield_acceleration=2.5,
+        uncertain={"decay_rate": FACTOR, "amplitude": {**FACTOR, "s": 0.05}},
+        decay_rate=8.0,
+        sensitivity=True,
+        samples=1024,
+    )
+    assert found.flag_share.sel(flag=int(slipsweep.Validity.YIELD_GOVERNS)) == 1.0
+    assert found.total_index.sel(input="decay_rate") == 0.0
+    assert found.first_order_index.sel(input="decay_rate") == 0.0
+    np.testing.assert_array_equal(found.total_interval.sel(input="decay_rate"), 0.0)
+    assert found.total_index.sel(input="amplitude") == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_single_input_is_all_of_it() -> None:
+    found = slipsweep.sample(
+        theta=5.0, mu_s=0.4, amplitude=[4.0, 8.0], frequency=1, uncertain={"amplitude": FACTOR}, sensitivity=True
+    )
+    np.testing.assert_allclose(found.total_index, 1.0, rtol=0.01)
+    np.testing.assert_allclose(found.first_order_index, 1.0, rtol=0.05)
+
+
+def test_correlated_inputs_are_one() -> None:
+    uncertain = {"mu_s": {**FACTOR, "s": 0.05}, "amplitude": FACTOR, "decay_rate": FACTOR, "delta_mu": FACTOR}
+    pairs = [("delta_mu", "decay_rate", 0.9), ("mu_s", "delta_mu", 0.1)]
+    sampling = sampling_of(uncertain, correlation=pairs, samples=4096)
+    assert sampling.independent == (("mu_s", "decay_rate", "delta_mu"), ("amplitude",))
+    study = Sensitivity(sampling)
+    draws = {name: values.reshape(4, -1) for name, values in study.draws.items()}
+    for name in ("mu_s", "decay_rate", "delta_mu"):
+        np.testing.assert_array_equal(draws[name][2:], [draws[name][1], draws[name][0]])
+    np.testing.assert_array_equal(draws["amplitude"][2:], [draws["amplitude"][0], draws["amplitude"][1]])
+    for at in range(4):
+        scores = np.corrcoef([np.log(draws[name][at]) for name in ("decay_rate", "delta_mu", "amplitude")])
+        np.testing.assert_allclose(scores[0, 1:], [0.9, 0.0], atol=0.02)
+    # sums of what is drawn: the variance of the group is that of its sum
+    found = reduced(study, np.sum([np.log(values) for values in study.draws.values()], axis=0))
+    share = (0.05**2 + 2 * 0.3**2 * 1.9 + 2 * 0.1 * 0.05 * 0.3) / (0.05**2 + 2 * 0.3**2 * 1.9 + 0.003 + 0.3**2)
+    for index in ("first_order_index", "total_index"):
+        np.testing.assert_allclose(found[index], [share, 1 - share], rtol=0.02)
+
+
+# --------------------------------------------------------------------- the grid, and no value
+
+CASE: dict[str, Any] = {"theta": [0.0, 15.0], "amplitude": [0.5, 4.0, 8.0], "samples": 128, "sensitivity": True}
+
+
+def test_indices_have_the_dimensions_of_shares() -> None:
+    """They do not depend on the frequency, but where the amplitude does."""
+    friction = stats.uniform(0.35, 0.1)
+    found = slipsweep.sample(**CASE, frequency=[1.0, 2.0], uncertain={"mu_s": friction, "amplitude": FACTOR})
+    assert found.total_index.dims == ("theta", "amplitude", "input")
+    assert found.total_interval.dims == ("theta", "amplitude", "bound", "input")
+    assert found.sensitivity_status.dims == ("theta", "amplitude")
+    assert found.input.values.tolist() == ["mu_s", "amplitude"]
+    assert found.bound.values.tolist() == [0.025, 0.975]
+    other = slipsweep.sample(**CASE, frequency=7.0, uncertain={"mu_s": friction, "amplitude": FACTOR})
+    xr.testing.assert_identical(found.total_index, other.total_index.drop_vars("frequency"))
+    by_displacement = slipsweep.sample(
+        theta=5.0, displacement_amplitude=[0.02, 0.1], frequency=[1.0, 2.0], samples=64, sensitivity=True,
+        uncertain={"mu_s": friction, "displacement_amplitude": FACTOR},
+    )  # fmt: skip
+    assert by_displacement.total_index.dims == ("displacement_amplitude", "frequency", "input")
+    one = by_displacement.isel(displacement_amplitude=0, frequency=1)
+    alone = slipsweep.sample(
+        theta=5.0, displacement_amplitude=0.02, frequency=2.0, samples=64, sensitivity=True,
+        uncertain={"mu_s": friction, "displacement_amplitude": FACTOR},
+    )  # fmt: skip
+    np.testing.assert_array_equal(one.total_interval, alone.total_interval)
+
+
+def test_statistics_are_what_they_are_without() -> None:
+    uncertain = {"mu_s": stats.uniform(0.35, 0.1), "amplitude": FACTOR}
+    found = slipsweep.sample(**CASE, frequency=1.0, uncertain=uncertain)
+    plain = slipsweep.sample(**{**CASE, "sensitivity": False}, frequency=1.0, uncertain=uncertain)
+    assert not {"input", "bound", "total_index"} & {*plain.variables}
+    assert "sensitivity" not in plain.attrs
+    for name, values in plain.variables.items():
+        assert found.variables[name].identical(values)
+
+
+def test_where_there_are_no_indices_the_status_says_why() -> None:
+    """A block that never slides, and one that some draws make slide under its own weight."""
+    uncertain = {"mu_s": stats.uniform(0.2, 0.2), "amplitude": {**FACTOR, "s": 0.05}}
+    found = slipsweep.sample(**CASE, frequency=1.0, uncertain=uncertain)
+    expected = [
+        [SensitivityStatus.NO_VARIANCE, SensitivityStatus.COMPUTED, SensitivityStatus.COMPUTED],
+        [SensitivityStatus.RUNS_WITHOUT_VALUE] * 3,
+    ]
+    np.testing.assert_array_equal(found.sensitivity_status, expected)
+    assert (found.valueless_share.sel(theta=15.0) > 0.3).all()
+    for name in ("first_order_index", "first_order_interval", "total_index", "total_interval"):
+        there = found[name].notnull().all([dim for dim in ("input", "bound") if dim in found[name].dims])
+        np.testing.assert_array_equal(there, found.sensitivity_status == 0)
+
+
+def test_one_run_without_a_value_is_enough() -> None:
+    study = Sensitivity(sampling_of(ANGLES, samples=64))
+    values = ishigami(study.draws)
+    values[-1] = np.nan
+    found = reduced(study, values)
+    assert found["sensitivity_status"] == SensitivityStatus.RUNS_WITHOUT_VALUE
+    assert np.isnan(found["total_index"]).all()
+
+
+def test_what_differs_by_rounding_is_the_same() -> None:
+    study = Sensitivity(sampling_of(ANGLES, samples=64))
+    values = 1.0 + 1e-15 * ishigami(study.draws)
+    assert np.ptp(values) > 0
+    assert reduced(study, values)["sensitivity_status"] == SensitivityStatus.NO_VARIANCE
+
+
+def test_progress_counts_every_run() -> None:
+    done: list[int] = []
+    slipsweep.sample(
+        **CASE, frequency=[1.0, 2.0], uncertain={"mu_s": stats.uniform(0.35, 0.1), "amplitude": FACTOR},
+        progress=done.append,
+    )  # fmt: skip
+    assert sum(done) == 6 * (128 + 4 * 128)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"sensitivity": 1024}, "sensitivity = 1024: must be true or false"),
+        ({"sensitivity": "yes"}, "sensitivity = 'yes': must be true or false"),
+        ({"samples": MOST_SAMPLES // 2}, f"samples = {MOST_SAMPLES // 2}: Sobol indices take .* runs a grid point"),
+    ],
+)
+def test_what_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        sampling_of(ANGLES, **options)
+
+
+def test_draws_of_the_runs_are_checked() -> None:
+    """They are others than those of the statistics, and one of them may be none that physics allows."""
+    uncertain = {"mu_s": stats.norm(0.4, 0.4 / 3.3), "amplitude": FACTOR}
+    case: dict[str, Any] = {"theta": 5.0, "amplitude": 4.0, "frequency": 1.0, "samples": 1024, "seed": 9}
+    slipsweep.sample(**case, uncertain=uncertain)
+    with pytest.raises(InputError, match=r"uncertain.mu_s = norm.*of the draws are not"):
+        slipsweep.sample(**case, uncertain=uncertain, sensitivity=True)
+
+
+# -------------------------------------------------------------------- files, commands, charts
+
+SWEEP = """
+[axes.theta]
+values = [0, 5]
+[axes.amplitude]
+values = [0.2, 2, 4, 6, 8]
+[axes.frequency]
+values = [1, 2]
+[uncertainty]
+samples = 256
+sensitivity = true
+[uncertainty.mu_s]
+distribution = "uniform"
+loc = 0.35
+scale = 0.1
+[uncertainty.amplitude]
+kind = "factor"
+distribution = "lognorm"
+s = 0.3
+"""
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sensitivity")
+    (folder / "a.toml").write_text(SWEEP)
+    assert main(["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--quiet"]) == 0
+    return folder / "a.nc"
+
+
+def test_a_file_has_what_python_gives(result: Path) -> None:
+    found = slipsweep.sample(
+        theta=[0.0, 5.0], amplitude=[0.2, 2.0, 4.0, 6.0, 8.0], frequency=[1.0, 2.0], samples=256, sensitivity=True,
+        uncertain={"mu_s": stats.uniform(0.35, 0.1), "amplitude": FACTOR},
+    )  # fmt: skip
+    with xr.open_dataset(result) as file:
+        assert file.input.values.tolist() == ["mu_s", "amplitude"]
+        for name in ("first_order_index", "first_order_interval", "total_index", "total_interval"):
+            np.testing.assert_array_equal(file[name].sel(input="amplitude"), found[name].sel(input="amplitude"))
+        np.testing.assert_array_equal(file.sensitivity_status, found.sensitivity_status)
+        assert file.attrs["sensitivity"] == f"Saltelli et al. (2010), 1024 runs; bootstrap of {RESAMPLES}"
+
+
+def test_commands_tell_what_moves_the_displacement(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], result: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", str(result), "-o", "again.nc"]) == 0
+    run = capsys.readouterr().out
+    assert "20 grid points (2 theta x 5 amplitude x 2 frequency), 256 samples each, and 1024 runs each for Sobol" in run
+    lines = run[run.index("Sobol indices of") :].splitlines()
+    with xr.open_dataset("again.nc") as file:
+        there = file.sensitivity_status == 0
+        assert (~there).sum() == 2
+        assert lines[0] == "Sobol indices of the permanent displacement, at 8 of 10 grid points:"
+        for line, name in zip(lines[2:4], ("amplitude", "mu_s"), strict=True):
+            means = [file[index].sel(input=name).mean().item() for index in ("first_order_index", "total_index")]
+            assert line.split()[0] == name
+            assert [float(number) for number in line.split()[1:3]] == pytest.approx(means, abs=5.1e-4)
+        largest = file.total_index.where(there, -1).argmax("input").where(there)
+        assert [int(line.split()[3]) for line in lines[2:4]] == [int((largest == at).sum()) for at in (1, 0)]
+    assert lines[4] == "  none at 2 (no_variance): all runs have the same displacement"
+    # modes are of the samples alone
+    modes = [float(line.split()[1].rstrip("%")) for line in run.splitlines() if line.split()[0] in ("stuck", "missing")]
+    assert 10.0 < modes[1] < 50.0
+    assert main(["info", "again.nc"]) == 0
+    assert "\n".join(lines[:5]) in capsys.readouterr().out
+    assert main(["run", str(result), "-o", "again.nc", "--resume"]) == 0
+    assert "\n".join(lines[:5]) in capsys.readouterr().out
+    assert main(["export", "again.nc", "-o", "a.csv", "--variable", "total_index"]) == 0
+    text = Path("a.csv").read_text().splitlines()
+    assert text[0] == "theta (degree),amplitude (m s-2),input,total_index (1)"
+    assert len(text) == 1 + 2 * 5 * 2
+
+
+def test_info_counts_what_other_programs_have_turned_about(tmp_path: Path, result: Path) -> None:
+    with xr.open_dataset(result) as file:
+        changed = file.load().transpose(..., "input", "theta")
+        changed.attrs.pop("slipsweep_run")
+        changed.to_netcdf(tmp_path / "b.nc")
+    ours, theirs = read_contents(result).tally, read_contents(tmp_path / "b.nc").tally
+    assert ours is not None
+    assert theirs is not None
+    assert ours.indices is not None
+    assert theirs.indices is not None
+    assert theirs.indices.status == ours.indices.status
+    assert theirs.indices.largest == ours.indices.largest
+    assert theirs.indices.first == ours.indices.first
+
+
+def test_charts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["chart", str(result)]) == 0
+    assert {path.name for path in tmp_path.glob("*.png")} == {
+        f"a-{kind}.png" for kind in ("fragility", "quantiles", "sensitivity")
+    }
+    with xr.open_dataset(result) as file:
+        data = file.load()
+    bars = data.slipsweep.chart("sensitivity", at={"theta": 5, "amplitude": 4.0})
+    point = data.sel(theta=5, amplitude=4.0)
+    (axes,) = bars.axes
+    labels = [text.get_text() for text in axes.get_yticklabels()]
+    assert labels == ["μs", "A"]  # the largest on top
+    widths = [patch.get_width() for patch in axes.patches]
+    np.testing.assert_allclose(widths, [*point.total_index, *point.first_order_index])
+    lines = data.slipsweep.chart("sensitivity", at={"theta": 5})
+    drawn = {line.get_label(): line.get_ydata() for line in lines.axes[0].lines}
+    np.testing.assert_array_equal(drawn["A"], data.total_index.sel(theta=5, input="amplitude"))
+    np.testing.assert_array_equal(drawn["μs"], data.total_index.sel(theta=5, input="mu_s"))
+    assert "No indices where all runs have the same displacement" in lines.texts[0].get_text() + str(lines._supxlabel)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--at", "theta=5", "--at", "amplitude=0.2"), "no Sobol indices in this slice: all runs have the same"),
+        (("--y", "theta"), "--y theta: not with sensitivity"),
+        (("--x", "bound"), "total_index needs an axis of two values or more"),
+    ],
+)
+def test_charts_that_cannot_be_drawn(
+    result: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], message: str
+) -> None:
+    assert main(["chart", str(result), "--kind", "sensitivity", *options, "-o", "none.png"]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_a_result_without_indices_says_how_to_have_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.toml").write_text(SWEEP.replace("sensitivity = true", ""))
+    assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.nc"), "-q"]) == 0
+    assert main(["chart", str(tmp_path / "a.nc"), "--kind", "sensitivity"]) == 2
+    assert "holds no Sobol indices; sensitivity = true in [uncertainty] asks for them" in capsys.readouterr().err

@@ -1,0 +1,338 @@
+"""Suites in sweep files: what a run writes, chunks, kills, workers, that it repeats itself, and what is refused."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep import InputError, RunError, Suite, read_suite, sweep
+from slipsweep.files import spec
+from slipsweep.files.motions import read_embedded
+from slipsweep.files.results import result_file
+from slipsweep.grid.tables import Table
+from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
+from slipsweep.motion.intensity import intensity_measures
+from slipsweep.runs import solving, store
+from slipsweep.runs.jobs import limit_job, sweep_job
+from tests.studies.test_record_sweeps import assert_same_data, stored
+
+SWEEPS = Path(__file__).parents[2] / "sweeps"
+
+SWEEP = """
+[excitation]
+records = ["motions/*.csv"]
+units = "g"
+baseline = "mean"
+polarity = "both"
+[axes.theta]
+values = [0, 5, 25]
+[axes.mu_s]
+values = [0.1, 0.3]
+[axes.amplitude]
+values = [0.3, 0.6]
+units = "g"
+[axes.time_scale]
+values = [1, 2]
+"""
+
+SAMPLES = """
+[excitation]
+records = "motions"
+units = "g"
+[axes.theta]
+values = [0, 5]
+[axes.arias_intensity]
+values = [1, 4]
+[axes.time_scale]
+values = [1, 2]
+[uncertainty]
+samples = 32
+[uncertainty.mu_s]
+distribution = "uniform"
+loc = 0.1
+scale = 0.2
+"""
+
+
+def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
+    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
+    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
+    path.write_text("time,acceleration\n" + "".join(rows))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A sweep file and three motions of different lengths and intervals; the folder's name looks like a pattern."""
+    folder = tmp_path / "site [a]*"
+    (folder / "motions").mkdir(parents=True)
+    for seed, (count, interval) in enumerate([(150, 0.01), (80, 0.02), (200, 0.005)]):
+        write_motion(folder / "motions" / f"m{seed}.csv", seed, count, interval)
+    (folder / "a.toml").write_text(SWEEP)
+    return folder
+
+
+def run(source: Path, path: Path, **options: Any) -> store.Report:
+    return store.run(sweep_job(spec.load(source)), path, command="slipsweep run a.toml", **options)
+
+
+def command(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "slipsweep", *map(str, arguments)],
+        capture_output=True, text=True, env=os.environ, cwd=folder, check=False,
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------------------- what is written
+
+
+def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
+    run(folder / "a.toml", folder / "a.nc")
+    suite = read_suite(folder / "motions", units="g", baseline="mean")
+    given: dict[str, Any] = {"amplitude": np.array([0.3, 0.6]) * 9.81, "time_scale": [1, 2], "polarity": "both"}
+    expected = sweep([0, 5, 25], [0.1, 0.3], excitation=suite, **given)
+    assert 0 < float(expected.permanent_displacement.max()) < 100
+    with xr.open_dataset(folder / "a.nc", mask_and_scale=False) as result:
+        assert result.permanent_displacement.dims == expected.permanent_displacement.dims
+        assert result.motion.values.tolist() == ["m0", "m1", "m2"]
+        for name in (*DEFAULT_SUITE_RESULTS, *MOTION_COORDINATES):
+            np.testing.assert_array_equal(result[name], expected[name], err_msg=name)
+        np.testing.assert_array_equal(
+            result.permanent_displacement.sel(motion="m1"), expected.permanent_displacement.sel(motion="m1")
+        )
+    with result_file(folder / "a.nc") as file:
+        kept = read_embedded(file, folder / "a.nc")
+    assert isinstance(kept, Suite)
+    assert kept.labels == suite.labels
+    for one, other in zip(kept.components, suite.components, strict=True):
+        assert one.attrs == other.attrs
+        np.testing.assert_array_equal(one.times, other.times)
+        np.testing.assert_array_equal(one.acceleration, other.acceleration)
+
+
+@pytest.mark.parametrize("text", [SWEEP, SAMPLES, "pairs"])
+def test_a_result_repeats_itself_without_the_motions(folder: Path, text: str) -> None:
+    if text == "pairs":
+        write_motion(folder / "motions" / "m3.csv", 4, 140, 0.01)
+        pairs = '[["motions/m0.csv", "motions/m3.csv"], ["motions/m1.csv", "motions/m1.csv"]]'
+        text = SWEEP.replace('["motions/*.csv"]', pairs)
+        text += "[axes.azimuth]\nvalues = [0, 30, 90]\n"
+    (folder / "a.toml").write_text(text)
+    run(folder / "a.toml", folder / "a.nc")
+    for path in (folder / "motions").iterdir():
+        path.unlink()
+    run(folder / "a.nc", folder / "b.nc")
+    assert_same_data(folder / "a.nc", folder / "b.nc")
+    with xr.open_dataset(folder / "a.nc") as one, xr.open_dataset(folder / "b.nc") as other:
+        names = {*one.attrs} - {"history"}
+        assert {name: one.attrs[name] for name in names} == {name: other.attrs[name] for name in names}
+    assert spec.load(folder / "b.nc").recorded == spec.load(folder / "a.nc").recorded
+
+
+def test_limits_of_a_suite(folder: Path) -> None:
+    text = SWEEP.replace("[0.1, 0.3]", "[0.1]").replace("[0, 5, 25]", "[5]")
+    job = limit_job(spec.parse(text, "a.toml", folder), [0.01, 0.1])
+    store.run(job, folder / "l.nc", command="slipsweep limit a.toml")
+    store.run(job, folder / "m.nc", command="slipsweep limit a.toml", chunk_cells=5)
+    assert_same_data(folder / "l.nc", folder / "m.nc")
+    with xr.open_dataset(folder / "l.nc") as result:
+        assert result.limit_amplitude.dims == ("theta", "mu_s", "time_scale", "polarity", "motion", "displacement")
+        assert result.limit_amplitude.notnull().any()
+
+
+# -------------------------------------------------------------------------------------- chunks
+
+
+@pytest.mark.parametrize("text", [SWEEP, SAMPLES])
+def test_chunks_and_folders_give_what_one_piece_gives(folder: Path, text: str) -> None:
+    (folder / "a.toml").write_text(text)
+    run(folder / "a.toml", folder / "a.nc")
+    for cells in (2, 7):  # parts of the motions, and of all else
+        run(folder / "a.toml", folder / f"b{cells}.nc", chunk_cells=cells)
+        assert_same_data(folder / "a.nc", folder / f"b{cells}.nc")
+    run(folder / "a.toml", folder / "split", chunk_cells=2, split=True)
+    name = "permanent_displacement" if text == SWEEP else "mean_displacement"
+    for path in sorted((folder / "split").iterdir())[:5]:
+        with xr.open_dataset(path) as chunk, xr.open_dataset(folder / "a.nc") as one:
+            places = {dim: chunk[dim] for dim in chunk[name].dims}
+            np.testing.assert_array_equal(chunk[name], one[name].sel(places))
+            assert chunk.sizes["motion"] < 3
+        # all motions are in every file: a part can be run again as a whole
+        np.testing.assert_array_equal(stored(path)["record_time"], stored(folder / "a.nc")["record_time"])
+
+
+def test_an_interrupted_run_goes_on_but_not_with_other_motions(folder: Path) -> None:
+    def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
+        for number, table in solving.solve_here(*arguments):
+            if number == 3:
+                raise RunError("the power went")
+            yield number, table
+
+    with pytest.raises(RunError, match="the power went"):
+        run(folder / "a.toml", folder / "a.nc", chunk_cells=7, solved=failing)
+    motion = (folder / "motions" / "m1.csv").read_text()
+    changed = {
+        "a sample": lambda: (folder / "motions" / "m1.csv").write_text(motion.replace("0.4,", "0.401,")),
+        "a name": lambda: (folder / "motions" / "m1.csv").rename(folder / "motions" / "m9.csv"),
+        "one more": lambda: write_motion(folder / "motions" / "m3.csv", 5, 50, 0.01),
+    }
+    for what, change in changed.items():
+        change()
+        with pytest.raises(InputError, match=r"cannot go on with the chunks in a\.nc\.parts: suite was"):
+            run(folder / "a.toml", folder / "a.nc", resume=True)
+        for other in ("m9.csv", "m3.csv"):
+            (folder / "motions" / other).unlink(missing_ok=True)
+        (folder / "motions" / "m1.csv").write_text(motion)
+        assert what
+    run(folder / "a.toml", folder / "a.nc", resume=True)
+    run(folder / "a.toml", folder / "b.nc")
+    assert_same_data(folder / "a.nc", folder / "b.nc")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="needs the extra cluster")
+def test_workers_give_the_same(folder: Path) -> None:
+    done = command("run", "a.toml", "-o", "a.nc", "--workers", 2, "--quiet", folder=folder)
+    assert done.returncode == 0, done.stderr
+    run(folder / "a.toml", folder / "b.nc")
+    assert_same_data(folder / "a.nc", folder / "b.nc")
+
+
+# --------------------------------------------------------------------------------- commands
+
+
+def test_info_and_export_show_the_motions(folder: Path) -> None:
+    (folder / "motions" / "m4.csv").write_text((folder / "motions" / "m0.csv").read_text())
+    done = command("run", "a.toml", folder=folder)
+    assert "the same motion under several labels: m0, m4" in done.stdout
+    lines = command("info", "a.nc", folder=folder).stdout.splitlines()
+    at = lines.index("motions, as recorded:")
+    assert lines[at + 1].split()[:3] == ["motion", "samples", "interval"]
+    assert [line.split()[:3] for line in lines[at + 2 : at + 5]] == [
+        ["m0", "150", "0.01"], ["m1", "80", "0.02"], ["m2", "200", "0.005"],
+    ]  # fmt: skip
+    assert command("export", "a.nc", "-o", "a.csv", "--quiet", folder=folder).returncode == 0
+    header, row = (folder / "a.csv").read_text().splitlines()[:2]
+    assert dict(zip(header.split(","), row.split(","), strict=True))["motion"] == "m0"
+    assert "motion_pga (m s-2)" in header
+    assert "sha256" not in header
+
+
+def test_one_motion_over_time_at_a_target(folder: Path) -> None:
+    block = ("--theta", 5, "--mu-s", 0.1, "--record", "motions/m0.csv", "--units", "g", "--time-scale", 2)
+    motion = read_suite(folder / "motions", units="g")["m0"]
+    for target, value in (("pgv", "40 cm/s"), ("arias-intensity", "0.4")):
+        done = command("simulate", *block, f"--{target}", value, folder=folder)
+        assert done.returncode == 0, done.stderr
+        given: dict[str, Any] = {target.replace("-", "_"): 0.4}
+        found = sweep(5, 0.1, excitation=motion, time_scale=2, **given)
+        assert f"{float(found.permanent_displacement):.6g} m" in done.stdout
+
+
+def test_a_chart_of_limits_and_charts_that_there_are_not(folder: Path) -> None:
+    (folder / "a.toml").write_text(SWEEP.replace("[0, 5, 25]", "[5]").replace("[0.1, 0.3]", "[0.1]"))
+    done = command("limit", "a.toml", "-d", "50mm", "-o", "l.png", folder=folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "l.png").stat().st_size > 10_000
+    command("run", "a.toml", folder=folder)
+    for asked in (("chart", "a.nc", "--kind", "contours", "-o", "c.png"), ("explore", "a.nc", "-o", "c.html")):
+        done = command(*asked, folder=folder)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+
+
+def test_damaged_files_are_told_line_by_line(folder: Path) -> None:
+    (folder / "motions" / "m1.csv").write_text("0,1\n0,2\n")
+    (folder / "motions" / "readme.csv").write_text("no numbers\n")
+    done = command("run", "a.toml", folder=folder)
+    assert done.returncode == 2
+    first, *more = done.stderr.splitlines()
+    assert first == ("slipsweep: error: a.toml: excitation.records: 2 of 4 files cannot be read: m1.csv, readme.csv")
+    assert [line.strip() for line in more] == [
+        "motions/m1.csv: line 2: time 0: must be greater than 0, the time before it",
+        "motions/readme.csv: no line of a time and an acceleration",
+    ]
+    assert not (folder / "a.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ('["motions/*.csv"]', '["motions/*.AT2"]', r"excitation\.records: motions/\*\.AT2: no file fits"),
+        ('["motions/*.csv"]', "3", "excitation.records = 3: must be a folder"),
+        ('["motions/*.csv"]', "[]", r"excitation\.records = \[\]: must name one motion"),
+        ('["motions/*.csv"]', '["motions/*.csv"]\nrecord = "motions/m0.csv"', "excitation.records: not allowed beside"),
+        ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS"]', "excitation.pairs = "),
+        ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS", "_EW"]', "without the other component: m0.csv"),
+        ('records = ["motions/*.csv"]', 'record = "motions/m0.csv"\npairs = ["a", "b"]', "excitation.pairs: only"),
+        ('"both"', '"both"\ncycles = 5', "excitation.cycles: not allowed with excitation.records"),
+        ("[axes.time_scale]", "[axes.frequency]", "axes.frequency: not allowed with excitation.records"),
+        ("[axes.time_scale]", "[axes.scale]", "axes.scale: not allowed beside amplitude"),
+        ("[axes.time_scale]", "[axes.pgv]", "axes.pgv: not allowed beside amplitude"),
+        ("[axes.time_scale]", "[axes.azimuth]", "azimuth: only with a Suite of pairs"),
+    ],
+)
+def test_what_sweep_files_refuse(folder: Path, before: str, after: str, message: str) -> None:
+    assert before in SWEEP
+    (folder / "a.toml").write_text(SWEEP.replace(before, after))
+    with pytest.raises(InputError, match=message):
+        spec.load(folder / "a.toml").plan()
+
+
+def test_strengths_of_records_are_not_those_of_waveforms(folder: Path) -> None:
+    for name in ("pgv", "arias_intensity", "azimuth"):
+        text = "".join(f"[axes.{one}]\nvalues = [0.5]\n" for one in ("theta", "mu_s", "frequency", name))
+        with pytest.raises(InputError, match=f"axes.{name}: only with excitation.record"):
+            spec.parse(text, "a.toml")
+
+
+def test_the_sample_is_what_its_script_makes() -> None:
+    path = SWEEPS / "data" / "suite.py"
+    module_spec = importlib.util.spec_from_file_location("suite", path)
+    assert module_spec is not None
+    assert module_spec.loader is not None
+    module = importlib.util.module_from_spec(module_spec)
+    sys.modules["suite"] = module  # its dataclass looks there
+    try:
+        module_spec.loader.exec_module(module)
+    finally:
+        del sys.modules["suite"]
+    texts = module.texts()
+    assert {one.name for one in (SWEEPS / "data" / "suite").iterdir()} == set(texts)
+    for name, text in texts.items():
+        assert (SWEEPS / "data" / "suite" / name).read_text(encoding="utf-8") == text
+
+
+def test_the_sample_ends_at_rest_and_comes_in_pairs() -> None:
+    suite = read_suite(SWEEPS / "data" / "suite", pairs=("_H1", "_H2"))
+    assert suite.labels == ("rock-far", "rock-near", "soft-far", "stiff-pulse")
+    for record in suite.components:
+        velocity = float(np.trapezoid(record.acceleration, record.times))
+        assert abs(velocity) < 2e-2 * intensity_measures(record)["pgv"]
+    moved = sweep(5, 0.3, excitation=suite, azimuth=[0, 45, 90], amplitude=5.0).permanent_displacement
+    assert float(moved.max()) > 0.0
+    assert len({*moved.values.ravel()}) == moved.size
+
+
+def test_the_sweep_of_the_sample(tmp_path: Path) -> None:
+    run(SWEEPS / "suite.toml", tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc") as result:
+        assert result.sizes["motion"] == 8
+        u = result.permanent_displacement
+        assert float(u.max()) > 0.1
+        # more shaking moves the median block further
+        assert (u.median(["motion", "polarity"]).diff("amplitude") >= 0.0).all()
+
+
+def test_a_result_that_was_changed_is_told(folder: Path) -> None:
+    run(folder / "a.toml", folder / "a.nc")
+    with xr.open_dataset(folder / "a.nc") as result:
+        cut = result.load().isel(record=slice(0, 2)).drop_encoding()
+    cut.to_netcdf(folder / "b.nc")
+    with pytest.raises(InputError, match=r"b\.nc: record_count, record_label: are not those"):
+        spec.load(folder / "b.nc")

@@ -1,0 +1,219 @@
+"""Suites of recorded motions: each motion as alone, strengths, azimuths, limits, samples, and what is refused."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep import InputError, Pair, Record, Suite, limit_amplitude, sample, simulate, sweep
+from slipsweep.grid.plans import plan_sweep
+from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, RECORD_RESULTS
+from slipsweep.motion.intensity import intensity_measures
+
+UNCERTAIN = {"mu_s": {"distribution": "uniform", "loc": 0.1, "scale": 0.2}}
+
+
+def noise(seed: int, count: int, interval: float) -> Record:
+    values = np.random.default_rng(seed).normal(size=count) * np.hanning(count)
+    return Record.sampled(3.0 * values, interval, f"noise{seed}.csv")
+
+
+MOTIONS = (noise(1, 300, 0.01), noise(2, 200, 0.02), noise(3, 500, 0.005))
+SUITE = Suite(MOTIONS, name="three")
+PAIRS = Suite((Pair(MOTIONS[0], noise(4, 280, 0.01)), Pair(MOTIONS[1], noise(5, 200, 0.02))), name="pairs")
+
+
+@pytest.mark.parametrize("model", ["mendez", "newmark"])
+@pytest.mark.parametrize("strength", ["amplitude", "scale", "pgv", "arias_intensity"])
+def test_each_motion_does_what_it_does_alone(model: str, strength: str) -> None:
+    given: dict[str, Any] = {strength: np.array([0.3, 0.9]) * {"amplitude": 6.0, "scale": 2.0}.get(strength, 1.0)}
+    given |= {"time_scale": [1, 2.5], "polarity": "both", "model": model, "variables": tuple(RECORD_RESULTS)}
+    found = sweep([0, 5], [0.1, 0.3], excitation=SUITE, **given)
+    assert found.permanent_displacement.dims == ("theta", "mu_s", *_order(strength), "polarity", "motion")
+    assert found.motion.values.tolist() == ["noise1", "noise2", "noise3"]
+    assert float(found.permanent_displacement.max()) > 0.0
+    for at, motion in enumerate(MOTIONS):
+        alone = sweep([0, 5], [0.1, 0.3], excitation=motion, **given)
+        for name in RECORD_RESULTS:
+            np.testing.assert_array_equal(found[name].isel(motion=at), alone[name], err_msg=name)
+
+
+def _order(strength: str) -> tuple[str, str]:
+    return strength, "time_scale"
+
+
+def test_the_factor_of_each_motion_makes_the_strength() -> None:
+    targets = {"amplitude": "pga", "pgv": "pgv", "arias_intensity": "arias_intensity"}
+    for strength, measure in targets.items():
+        given: dict[str, Any] = {strength: [0.5, 1.5]}
+        found = sweep(5, 0.3, excitation=SUITE, variables=["motion_factor"], **given)
+        assert found.motion_factor.dims == (strength, "motion")
+        for at, motion in enumerate(MOTIONS):
+            for value, factor in zip([0.5, 1.5], found.motion_factor.isel(motion=at).values, strict=True):
+                scaled = intensity_measures(Record(motion.times, motion.acceleration * factor))
+                assert scaled[measure] == pytest.approx(value, rel=1e-13)
+
+
+def test_measures_are_coordinates() -> None:
+    found = sweep(5, 0.3, excitation=SUITE)
+    assert set(found.data_vars) == {*DEFAULT_RECORD_RESULTS, "motion_factor"}
+    np.testing.assert_array_equal(found.motion_factor, 1.0)
+    for at, motion in enumerate(MOTIONS):
+        for name, value in intensity_measures(motion).items():
+            assert float(found[f"motion_{name}"].sel(motion=f"noise{at + 1}")) == value
+    assert found.motion_pgv.attrs["units"] == "m s-1"
+    assert (found.attrs["suite"], found.attrs["motions"]) == ("three", 3)
+
+
+def test_a_value_for_each_motion() -> None:
+    """Arrays along `motion` are taken together with it; labels that differ are refused."""
+    scales = xr.DataArray([0.5, 1.0, 2.0], dims="motion", coords={"motion": list(SUITE.labels)})
+    found = sweep(5, [0.1, 0.3], excitation=SUITE, scale=scales)
+    assert found.permanent_displacement.dims == ("mu_s", "motion")
+    for at, scale in enumerate(scales.values):
+        alone = sweep(5, [0.1, 0.3], excitation=MOTIONS[at], scale=scale)
+        np.testing.assert_array_equal(found.permanent_displacement.isel(motion=at), alone.permanent_displacement)
+    with pytest.raises(InputError, match="scale: its coordinate 'motion' differs"):
+        sweep(5, 0.3, excitation=SUITE, scale=scales.assign_coords(motion=["a", "b", "c"]))
+    with pytest.raises(InputError, match=r"2 values along 'motion'|3 values along 'motion'"):
+        sweep(5, 0.3, excitation=SUITE, scale=xr.DataArray([1.0, 2.0], dims="motion"))
+
+
+def test_lazy_results_and_parts_have_the_same_bits() -> None:
+    given: dict[str, Any] = {"excitation": SUITE, "amplitude": [2.0, 4.0, 6.0], "polarity": "both"}
+    now = sweep([0, 5], [0.1, 0.3], **given)
+    later = sweep([0, 5], [0.1, 0.3], **given, chunks={"motion": 1, "amplitude": 2})
+    for name in now:
+        np.testing.assert_array_equal(later[name].compute(), now[name], err_msg=str(name))
+    plan = plan_sweep(theta=[0, 5], mu_s=[0.1, 0.3], **given)
+    part = plan.part({"motion": slice(1, 2), "theta": slice(1, 2)})
+    # another process gets the samples of its own motions only
+    assert len(pickle.dumps(part)) < len(pickle.dumps(plan)) - 2 * 8 * (300 + 500) + 2000
+    solved = pickle.loads(pickle.dumps(part)).solve()
+    assert solved["motion"].values.tolist() == ["noise2"]
+    np.testing.assert_array_equal(
+        solved["permanent_displacement"].values, now.permanent_displacement[1:, ..., 1:2].values
+    )
+
+
+# ------------------------------------------------------------------------------------- pairs
+
+
+def test_an_azimuth_of_pairs_is_the_component_there() -> None:
+    azimuths = [0.0, 30.0, 90.0, 210.0]
+    found = sweep([0, 5], 0.2, excitation=PAIRS, azimuth=azimuths, amplitude=[3.0, 6.0])
+    assert found.permanent_displacement.dims == ("theta", "amplitude", "azimuth", "motion")
+    assert found.motion_pga.dims == ("azimuth", "motion")
+    for motion, pair in enumerate(PAIRS.motions):
+        for at, azimuth in enumerate(azimuths):
+            assert isinstance(pair, Pair)
+            component = pair.rotated(azimuth)
+            where = {"motion": motion, "azimuth": at}
+            alone = sweep([0, 5], 0.2, excitation=component, amplitude=[3.0, 6.0])
+            np.testing.assert_array_equal(found.permanent_displacement.isel(where), alone.permanent_displacement)
+            assert float(found.motion_pga.isel(where)) == component.peak
+            assert float(found.motion_mean_period.isel(where)) == intensity_measures(component)["mean_period"]
+
+
+def test_half_a_turn_is_the_other_polarity() -> None:
+    found = sweep(5, [0.1, 0.2], excitation=PAIRS, azimuth=[0, 90, 180, 270], polarity="both", scale=[1, 2])
+    moved = found.permanent_displacement
+    np.testing.assert_array_equal(moved.sel(azimuth=[180, 270], polarity=1), moved.sel(azimuth=[0, 90], polarity=-1))
+
+
+def test_an_azimuth_for_each_motion() -> None:
+    azimuth = xr.DataArray([20.0, 70.0], dims="motion")
+    found = sweep(5, [0.1, 0.2], excitation=PAIRS, azimuth=azimuth)
+    assert found.motion_pga.dims == ("motion",)
+    crossed = sweep(5, [0.1, 0.2], excitation=PAIRS, azimuth=[20.0, 70.0])
+    for at, degrees in enumerate((20.0, 70.0)):
+        own = crossed.permanent_displacement.isel(motion=at).sel(azimuth=degrees)
+        np.testing.assert_array_equal(found.permanent_displacement.isel(motion=at), own)
+
+
+# -------------------------------------------------------------------------- limits and samples
+
+
+def test_limits_are_those_of_each_motion() -> None:
+    given: dict[str, Any] = {"displacement": [0.01, 0.1], "theta": 5, "mu_s": [0.1, 0.2], "amplitude_steps": 16}
+    found = limit_amplitude(**given, excitation=SUITE, polarity="both")
+    assert found.limit_amplitude.dims == ("mu_s", "polarity", "motion", "displacement")
+    assert np.isfinite(found.limit_amplitude).any()
+    for at, motion in enumerate(MOTIONS):
+        alone = limit_amplitude(**given, excitation=motion, polarity="both")
+        for name in alone.data_vars:
+            np.testing.assert_array_equal(found[name].isel(motion=at), alone[name], err_msg=str(name))
+    rotated = limit_amplitude(**given, excitation=PAIRS, azimuth=[0, 90])
+    first = limit_amplitude(**given, excitation=MOTIONS[0])
+    np.testing.assert_array_equal(rotated.limit_amplitude.isel(motion=0).sel(azimuth=0), first.limit_amplitude)
+
+
+@pytest.mark.parametrize("strength", ["amplitude", "pgv", "arias_intensity"])
+@pytest.mark.parametrize("time_scale", [1.5, [1.0, 2.0]])
+def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> None:
+    given: dict[str, Any] = {strength: [0.8, 2.0], "uncertain": UNCERTAIN, "samples": 32, "time_scale": time_scale}
+    found = sample(5, excitation=SUITE, **given)
+    assert (found.mean_displacement > 0.0).any()
+    for at, motion in enumerate(MOTIONS):
+        alone = sample(5, excitation=motion, **given)
+        for name in alone.data_vars:
+            np.testing.assert_allclose(found[name].isel(motion=at), alone[name], rtol=1e-14, err_msg=str(name))
+
+
+def test_samples_of_a_velocity_are_means_of_sweeps() -> None:
+    """A target that stretched time changes is that of the motion as stretched, also where time is drawn."""
+    given: dict[str, Any] = {"excitation": SUITE, "samples": 64, "seed": 3}
+    drawn = {"time_scale": {"distribution": "uniform", "loc": 1.0, "scale": 1.0}}
+    statistics = sample(5, 0.2, pgv=0.5, uncertain=drawn, **given, quantiles=[0.0001, 0.9999])
+    scales = np.linspace(1.0, 2.0, 400)
+    swept = sweep(5, 0.2, pgv=0.5, excitation=SUITE, time_scale=scales)
+    np.testing.assert_allclose(statistics.mean_displacement, swept.permanent_displacement.mean("time_scale"), rtol=0.03)
+
+
+# --------------------------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"amplitude": 2, "scale": 1}, "amplitude, scale: must not both be given"),
+        ({"pgv": 2, "arias_intensity": 1}, "pgv, arias_intensity: must not both be given"),
+        ({"frequency": 1}, "frequency: not allowed with a Suite"),
+        ({"azimuth": 1}, "azimuth: only with a Suite of pairs"),
+        ({"excitation": PAIRS}, "azimuth: must be given with pairs"),
+        ({"excitation": PAIRS, "azimuth": 400}, "azimuth = 400: must be 0 <= azimuth <= 360"),
+        ({"pgv": -1}, "pgv = -1: must be"),
+        ({"solver": "step"}, "solver = .* not allowed with a Suite"),
+        ({"variables": ["sliding_mode"]}, "variables = 'sliding_mode'"),
+    ],
+)
+def test_what_suites_refuse(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        sweep(5, 0.3, **{"excitation": SUITE, **given})
+
+
+@pytest.mark.parametrize("strength", ["amplitude", "pgv", "arias_intensity"])
+def test_motions_that_do_not_move_are_not_scaled(strength: str) -> None:
+    still = Record(np.arange(3.0), np.zeros(3), "still")
+    given: dict[str, Any] = {strength: 1.0}
+    with pytest.raises(InputError, match=f"{strength}: still has no acceleration to scale"):
+        sweep(5, 0.3, excitation=Suite((MOTIONS[0], still)), **given)
+    turned = Suite((Pair(still, noise(1, 3, 1.0)),))
+    with pytest.raises(InputError, match=f"{strength}: still at azimuth 0 has no acceleration"):
+        sweep(5, 0.3, excitation=turned, **given, azimuth=[90, 0])
+    assert float(sweep(5, 0.3, excitation=turned, azimuth=0).permanent_displacement.item()) == 0.0
+
+
+def test_one_motion_of_a_suite_is_simulated() -> None:
+    with pytest.raises(InputError, match=r"simulate takes one motion of a Suite, such as suite\['noise1'\]"):
+        simulate(5, 0.3, excitation=SUITE)
+    history = simulate(5, 0.2, excitation=SUITE["noise2"], pgv=0.5)
+    swept = sweep(5, 0.2, excitation=SUITE, pgv=0.5)
+    assert float(history.permanent_displacement) == float(swept.permanent_displacement.sel(motion="noise2"))
+
+
+def test_other_shaking_does_not_know_these_strengths() -> None:
+    with pytest.raises(InputError, match="pgv: not allowed with a waveform"):
+        sweep(5, 0.3, amplitude=1, frequency=1, pgv=1)

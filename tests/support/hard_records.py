@@ -1,0 +1,230 @@
+"""Hard records: where the response to a recorded motion is hardest to solve, why, and what one ulp of the input does.
+
+`CATEGORIES` makes the cells of Newmark's block; `solve` is its response in 60 digits, `conditioning` how far
+that moves.  Nothing here is shared with the package.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from mpmath import mp, mpf, workdps
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+DIGITS = 60
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Samples at an interval, or at times; the yield acceleration; and the factor on the samples."""
+
+    samples: Floats
+    onset: float
+    interval: float = 1.0
+    times: Floats | None = None
+    scale: float = 1.0
+
+    def when(self, i: int) -> Any:
+        """The time of sample i."""
+        return mpf(self.interval) * i if self.times is None else mpf(float(self.times[i]))
+
+
+@dataclass(frozen=True)
+class Response:
+    """Of Newmark's block: exact to `DIGITS`."""
+
+    displacement: Any
+    velocity: Any
+    slips: int
+
+
+@dataclass(frozen=True)
+class Category:
+    """Cells that are hard for one reason."""
+
+    name: str
+    danger: str
+    cells: Callable[[], Iterator[Cell]]
+
+
+def solve(cell: Cell) -> Response:
+    """The response to straight lines between the samples, from event to event."""
+    with workdps(DIGITS):
+        onset, v, u, highest, slips, slides = mpf(cell.onset), mpf(0), mpf(0), mpf(0), 0, False
+        values = [mpf(cell.scale) * mpf(float(a)) for a in cell.samples]
+        for i in range(len(values) - 1):
+            left, first, last = cell.when(i + 1) - cell.when(i), values[i], values[i + 1]
+            slope = (last - first) / left
+            while left > 0:
+                rate = first - onset
+                if not slides:
+                    if last <= onset and rate <= 0:
+                        break
+                    waits = -rate / slope if rate < 0 else mpf(0)
+                    slides, slips, first, left = True, slips + 1, max(first, onset), left - waits
+                    continue
+                stop = _stop(v, rate, slope)
+                lasts = min(stop, left)
+                if rate > 0 > slope and -rate / slope < lasts:
+                    highest = max(highest, v - rate * rate / slope / 2)
+                u += v * lasts + rate * lasts**2 / 2 + slope * lasts**3 / 6
+                v += rate * lasts + slope * lasts**2 / 2
+                first, left = first + slope * lasts, left - lasts
+                highest = max(highest, v)
+                if stop == lasts:
+                    v, slides = mpf(0), False
+                    if slope <= 0:
+                        break
+        return Response(u + v * v / (2 * onset), highest, slips)
+
+
+def _stop(v: Any, rate: Any, slope: Any) -> Any:
+    """The first time after 0 at which v + rate t + slope t²/2 falls to zero."""
+    if slope == 0:
+        return -v / rate if rate < 0 else mp.inf
+    square = rate * rate - 2 * slope * v
+    if square < 0:
+        return mp.inf
+    # the smaller root above 0 at which it falls: (−rate − √) / slope
+    root = (-rate - mp.sqrt(square)) / slope
+    return root if root > 0 else mp.inf
+
+
+def neighbours(cell: Cell) -> Iterator[Cell]:
+    """`cell` with one of its inputs an ulp up or down; the samples, and the times, are one input each."""
+    for toward in (-math.inf, math.inf):
+        yield replace(cell, onset=math.nextafter(cell.onset, toward))
+        yield replace(cell, scale=math.nextafter(cell.scale, toward))
+        yield replace(cell, samples=np.nextafter(cell.samples, np.where(cell.samples == 0.0, 0.0, toward)))
+        if cell.times is None:
+            yield replace(cell, interval=math.nextafter(cell.interval, toward))
+        else:
+            yield replace(
+                cell, times=np.nextafter(cell.times, np.where(np.arange(cell.times.size) % 2, toward, -toward))
+            )
+
+
+def conditioning(cell: Cell) -> tuple[Response, Any, Any]:
+    """The exact response, and how far displacement and peak velocity move: plus half an ulp of their own."""
+    own, others = solve(cell), [solve(other) for other in neighbours(cell)]
+    with workdps(DIGITS):
+        bounds = [
+            max(abs(getattr(other, name) - getattr(own, name)) for other in others)
+            + mpf(float(np.spacing(abs(float(getattr(own, name)))))) / 2
+            for name in ("displacement", "velocity")
+        ]
+    return own, bounds[0], bounds[1]
+
+
+# ------------------------------------------------------------------------------------- cells
+
+
+def _noise(seed: int, count: int, coarse: int = 1) -> Floats:
+    """Samples of a band of frequencies under an envelope, from 0 to 0, of peak 1."""
+    rng, at = np.random.default_rng(seed), np.linspace(0.0, 1.0, count)
+    waves = np.sin(2.0 * np.pi * (np.arange(2, 14)[:, None] / coarse * at + rng.uniform(size=(12, 1)))).sum(axis=0)
+    shaped = np.asarray(waves * np.sin(np.pi * at) ** 2)
+    return shaped / float(np.abs(shaped).max())
+
+
+def _onset_on_a_sample() -> Iterator[Cell]:
+    for seed in range(20):
+        samples = _noise(seed, 60)
+        rising = np.flatnonzero((samples[1:-1] > 0.05) & (samples[2:] > samples[1:-1])) + 1
+        onset = float(samples[rising[seed % rising.size]])
+        yield Cell(samples, onset, interval=0.02)
+        yield Cell(samples, math.nextafter(onset, (-1) ** seed * math.inf), interval=0.02)
+
+
+def _peak_just_above() -> Iterator[Cell]:
+    for seed in range(12):
+        samples = _noise(100 + seed, 40)
+        peak = float(samples.max())
+        if peak < 0.9:
+            samples, peak = -samples, float(-samples.min())
+        for ulps in (1, 2, 1000):
+            yield Cell(samples, peak - ulps * float(np.spacing(peak) / 2.0), interval=0.01)
+
+
+def _plateaus() -> Iterator[Cell]:
+    for onset in (0.3, 1.0, 0.1):
+        for above in (0.0, 1e-15, 1e-8, 1e-2):
+            high = onset * (1.0 + above)
+            yield Cell(np.array([0.0, high, high, high, 0.0, -0.2, 0.0]), onset, interval=0.05)
+            yield Cell(np.array([0.0, 2 * onset, onset, onset, high, 0.0, 0.0, high, 0.0]), onset, interval=0.05)
+            yield Cell(np.array([high, high, 0.0, onset, onset, 3 * onset, onset, 0.0]), onset, interval=0.05)
+
+
+def _duplicated_zeros() -> Iterator[Cell]:
+    for gap in (1, 2, 7):
+        rest = [0.0] * gap
+        for onset in (0.2, 0.5, 0.99):
+            yield Cell(
+                np.array([*rest, 1.0, *rest, 1.0, *rest, -1.0, *rest, 1.0, -0.3, 1.0, *rest]), onset, interval=0.1
+            )
+            yield Cell(np.array([0.0, 1e-300, 0.0, -0.0, 1.0, 0.0, 5e-324, 0.0, 0.7, -1.0, 0.0]), onset, interval=0.1)
+
+
+def _many_small_slips() -> Iterator[Cell]:
+    # each of about 1e-9 m: a triangle that exceeds the onset by 2 %
+    for seed, count in enumerate((300, 1000, 3000)):
+        tops = 1.0 + 0.02 * np.random.default_rng(seed).uniform(0.5, 1.0, count)
+        samples = np.zeros(2 * count + 1)
+        samples[1::2] = tops
+        yield Cell(samples, 1.0, interval=0.01)
+
+
+def _intervals() -> Iterator[Cell]:
+    for seed, interval in enumerate((1e-6, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 3.0, 10.0)):
+        for onset in (0.05, 0.4):
+            yield Cell(_noise(200 + seed, 50), onset, interval=interval)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        times = np.concatenate([[0.0], np.cumsum(10.0 ** rng.uniform(-6.0, 1.0, 49))])
+        yield Cell(_noise(220 + seed, 50), 0.1, times=times)
+
+
+def _magnitudes() -> Iterator[Cell]:
+    for seed, size in enumerate((1e-150, 1e-120, 1e-80, 1e-20, 1e20, 1e80, 1e120, 1e150)):
+        for onset in (0.02, 0.3, 0.8):
+            yield Cell(size * _noise(300 + seed, 40), size * onset, interval=0.02)
+        scale = min(max(size, 1e-90), 1e90)
+        yield Cell(_noise(300 + seed, 40), 0.3 * scale, interval=0.02, scale=scale)
+
+
+def _never_at_rest() -> Iterator[Cell]:
+    # small onsets: V is carried from pulse to pulse, and the record ends before the slide
+    for seed in range(8):
+        samples = _noise(400 + seed, 80)
+        for onset in (1e-3, 1e-6, 1e-12):
+            yield Cell(np.abs(samples) if seed % 2 else samples, onset, interval=0.01)
+
+
+def _stop_at_a_sample() -> Iterator[Cell]:
+    # a rectangle in doubles: V is exactly 0 at a sample, at the next onset, or not quite
+    for onset in (0.25, 0.5, 0.125):
+        for level in (1.0, 2.0, 1.5):
+            fall = np.array([0.0, level, level, 0.0, 0.0, 0.0, level, 0.0, 0.0])
+            yield Cell(fall, onset, interval=0.25)
+            for wait in range(1, 5):
+                again = [0.0] * wait
+                yield Cell(np.array([0.0, level, *again, onset, level, 0.0, -onset, 0.0]), onset, interval=0.25)
+
+
+CATEGORIES = (
+    Category(
+        "onset_on_a_sample", "Üy is a sample, or its neighbour: a slide begins at an end of a piece", _onset_on_a_sample
+    ),
+    Category("peak_just_above", "a peak one ulp above Üy: the slide is all cancellation", _peak_just_above),
+    Category("plateaus", "plateaus at Üy, just above and just below", _plateaus),
+    Category("duplicated_zeros", "rests at zero, zeros twice, numbers next to zero", _duplicated_zeros),
+    Category("many_small_slips", "thousands of slips of some 1e-9 m: rounding adds up", _many_small_slips),
+    Category("intervals", "intervals from 1e-6 s to 10 s, even or not", _intervals),
+    Category("magnitudes", "accelerations from 1e-150 to 1e150", _magnitudes),
+    Category("never_at_rest", "Üy next to nothing: V is carried on beyond the record", _never_at_rest),
+    Category("stop_at_a_sample", "V reaches 0 at a sample, or just as the next slide begins", _stop_at_a_sample),
+)
