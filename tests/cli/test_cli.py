@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import netCDF4
@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from slipsweep import cli
 from tests.support.commands import command
 from tests.support.processes import SLIPSWEEP, on_a_terminal, slipsweep
 
@@ -183,6 +184,33 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path: Path) -> None:
     )
     assert_fails(done, 1, "long.nc.parts/data.nc: writing failed: ", "is the disk full?")
     assert names(tmp_path) == {"long.toml"}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_inside_a_destructor_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], number: signal.Signals
+) -> None:
+    """Python prints and drops what a destructor, or the end of a generator, raises."""
+
+    def generator() -> Iterator[int]:
+        try:
+            yield 1
+        finally:
+            os.kill(os.getpid(), number)
+            time.sleep(0.01)  # the handler runs here
+
+    def run() -> None:
+        next(generator())
+        end = time.monotonic() + 30.0
+        while time.monotonic() < end:
+            time.sleep(0.001)
+
+    monkeypatch.setattr(cli.app.registered_commands[0], "callback", run)
+    before = [signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)], sys.unraisablehook
+    assert cli.main(["run"]) == 128 + number
+    assert capsys.readouterr().err == "slipsweep: interrupted; nothing written\n"
+    assert before == ([signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)], sys.unraisablehook)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")

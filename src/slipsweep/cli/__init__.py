@@ -11,6 +11,7 @@ import os
 import re
 import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
@@ -81,12 +82,32 @@ def _signals() -> Iterator[None]:
             signal.signal(number, signal.SIG_IGN)
         raise Interrupted(signum)
 
-    before = {number: signal.signal(number, interrupt) for number in watched}
+    def watch() -> None:
+        for number in watched:
+            signal.signal(number, interrupt)
+
+    def unraisable(lost: Any) -> None:
+        """Have a signal come once more that came inside a destructor, where Python prints and drops what is raised."""
+        if not isinstance(lost.exc_value, Interrupted):
+            hook(lost)
+            return
+        watch()
+        # by a thread, a moment later: raised here, it would be dropped again
+        again.append(threading.Timer(0.02, os.kill, (os.getpid(), lost.exc_value.signum)))
+        again[-1].start()
+
+    again: list[threading.Timer] = []
+    before = {number: signal.getsignal(number) for number in watched}
+    hook, sys.unraisablehook = sys.unraisablehook, unraisable
+    watch()
     try:
         yield
     finally:
+        for timer in again:
+            timer.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)
+        sys.unraisablehook = hook
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
