@@ -148,6 +148,23 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
         assert ((first - limits >= 0) & (first - limits <= step)).all()
 
 
+def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
+    """The limit is never above the first of 20 000 amplitudes that reaches the target, where u(A) is a saw."""
+    cases = {
+        "theta": [2.3172513553765843, 0.36648698271118385, 15.89918679025317, 24.5976881494476, 3.6498712978278363],
+        "mu_s": [0.1577915701729295, 0.46619195565406957, 0.4068037810141504, 0.3295178983842375, 0.3445097343681004],
+        "yield_acceleration": [0.0515279329701465, 0.10852104853669972, 0.6496015442182281, 0.471275, 0.370525],
+        "displacement": [1.9511674594282442, 5.5909408592753485, 3.7266584270787724, 2.280030173177515, 3.500075],
+    }
+    given = {name: xr.DataArray(values, dims="case") for name, values in cases.items()}
+    target = given.pop("displacement")
+    limits = slipsweep.limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
+    amplitudes = np.geomspace(0.05, 5.0, 20_001)
+    moved = slipsweep.sweep(amplitude=amplitudes, frequency=1.0, **given).permanent_displacement
+    first = amplitudes[(moved >= target).transpose("case", "amplitude").values.argmax(axis=1)]
+    assert ((limits <= first) & (limits > 0.9 * first)).all()
+
+
 def test_statuses_without_a_limit() -> None:
     limits = slipsweep.limit_amplitude(1e6, [0, 20], 0.3, 1.0)
     np.testing.assert_array_equal(limits.limit_status, [LimitStatus.NOT_REACHED, LimitStatus.INVALID])

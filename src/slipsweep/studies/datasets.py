@@ -264,10 +264,10 @@ def limit_amplitude(
     gaps where the model gives no value (`validity`), so that a displacement may be reached at
     several amplitudes, or passed in a jump.  The smallest is returned: the first step of a scan
     with ``u >= displacement`` holds it.  The scan runs from the yield acceleration to
-    `maximum_amplitude` in `amplitude_steps` equal ratios and has both sides of every change of
-    mode seen between two of its points; a peak of u within one sliding mode narrower than a
-    step can be missed.  Under a record the amplitude is that peak ground acceleration to which it is scaled, and the
-    scan has both sides of every amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
+    `maximum_amplitude` in `amplitude_steps` equal ratios, finer where it may hide a peak, and has
+    both sides of the change of mode.  A peak narrower than a part of a step can be missed.  Under a
+    record the amplitude is that peak ground acceleration to which it is scaled, and the scan has both
+    sides of every amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
 
     Parameters
     ----------

@@ -2,17 +2,17 @@
 
 The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall
 behind a jump, and has gaps where the model gives no value.  So every block is first scanned
-from its yield acceleration upwards, the places where its mode changes are found to the last
-bit and join the scan, and the first step of the scan that reaches the target is bisected until
-two neighbouring double-precision numbers are left.  Both the scan and the bisection ask the
-cycle solver, for all cells at once.
+from its yield acceleration upwards, with both sides of the amplitudes at which its mode changes.
+Steps of the scan that may hide a peak are scanned once more, finely.  The first step that reaches
+the target is bisected until two neighbouring double-precision numbers are left.  Scans and the
+bisection ask the cycle solver, for all cells at once.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from slipsweep.model.variables import (
     TOLERABLE_DISPLACEMENT,
     LimitStatus,
     SlidingMode,
+    Validity,
 )
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
@@ -42,7 +43,14 @@ from slipsweep.motion.suites import Suite
 Floats = NDArray[np.float64]
 
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
-AMPLITUDE_STEPS = 512
+AMPLITUDE_STEPS = 256
+
+#: Parts of a step that may hide a peak.
+_PARTS = 256
+
+#: Which steps may: those of a block that does not recouple, where u jumps up by a fifth and more each time that one
+#: pulse less stops it and then falls, from this part of the target on; and those beside a maximum of the scan.
+_SAW, _MAXIMUM = 0.7, 0.99
 
 #: What a limit takes beside its block's scan, in cells of the cycle solver: the bisection, and a scan's scaling.
 _COST = 100.0
@@ -194,22 +202,19 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     # every amplitude of the scan, at every frequency
     every = {name: values[:, np.newaxis, :] for name, values in arrays.items()}
     size = (shape[0], amplitudes.shape[1], shape[1])
-    scanned = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement",), size)["permanent_displacement"]
-    reaches = scanned >= displacement[:, np.newaxis, :]
-    first = reaches.argmax(axis=1)
-    row, column = np.nonzero(reaches.any(axis=1))
-    at = first[row, column]
-    # the scan begins at yield, where no block has moved: there is always a step before
-    low, high = amplitudes[row, at - 1], amplitudes[row, at]
+    found = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement", "validity"), size)
+    scanned = found["permanent_displacement"]
+
+    def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
+        cells = _zipped(arrays, row, column)
+        moved = _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
+        return np.asarray(moved >= displacement[row, column])
+
+    reached = _first_step(amplitudes, scanned >= displacement[:, np.newaxis, :])
+    hidden = _hidden_peaks(amplitudes, scanned, found["validity"], displacement, displaced)
+    row, column, low, high = _first_of(shape, reached, hidden)
     cells = _zipped(arrays, row, column)
-    target = displacement[row, column]
-
-    def displaced(amplitude: Floats, which: NDArray[np.intp]) -> NDArray[np.bool_]:
-        part = {name: values if values.size == 1 else values[which] for name, values in cells.items()}
-        found = _at(problem, part, amplitude, ("permanent_displacement",))
-        return np.asarray(found["permanent_displacement"] >= target[which])
-
-    low, high = _bisect(low, high, displaced)
+    low, high = _bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
     wanted = ("permanent_displacement", *_codes(problem), "validity")
     before, after = _at(problem, cells, low, wanted), _at(problem, cells, high, wanted)
 
@@ -255,10 +260,11 @@ def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_am
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
     if isinstance(problem.excitation, Record):
-        thresholds = [known[name] for name in wanted]
-        changes = _pulse_changes(problem.excitation, float(blocks["polarity"].item()), np.hstack(thresholds))
+        heights = _highest(problem.excitation, float(blocks["polarity"].item())) / problem.excitation.peak
+        thresholds = np.hstack([known[name] for name in wanted])
     else:
-        changes = _mode_changes(problem, blocks, amplitudes)
+        heights, thresholds = np.ones(1), np.hstack([known[name] for name in limited] or [start])
+    changes = _mode_changes(thresholds, heights)
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
     return np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
 
@@ -277,49 +283,81 @@ def _highest(record: Record, polarity: float) -> Floats:
     return np.unique(wave_of_record(record, polarity).height)[-_MOST_PULSES:]
 
 
-def _pulse_changes(record: Record, polarity: float, thresholds: Floats) -> Floats:
-    """Amplitudes just below and just above those at which a pulse of a record begins to count, or changes its mode.
+def _mode_changes(thresholds: Floats, heights: Floats) -> Floats:
+    """Amplitudes just below and just above those at which a pulse begins to count, or changes its mode.
 
-    A pulse does where its own peak passes one of the `thresholds` (columns) of a block (rows): Üy, or Üg,lim of
-    Eq. 7, neither of which depends on the amplitude.
+    A pulse does where its own peak, of these `heights` in parts of the amplitude, passes one of the `thresholds`
+    (columns) of a block (rows): Üy, or Üg,lim of Eq. 7, neither of which depends on the amplitude.
     """
-    heights = _highest(record, polarity)
     with np.errstate(over="ignore", invalid="ignore"):
-        places = (thresholds[:, :, None] * (record.peak / heights)).reshape(len(thresholds), -1)
+        places = (thresholds[:, :, None] / heights).reshape(len(thresholds), -1)
         return np.hstack([places * (1.0 - _BESIDE), places * (1.0 + _BESIDE)])
 
 
-def _mode_changes(problem: Problem, blocks: Mapping[str, Floats], amplitudes: Floats) -> Floats:
-    """The neighbouring numbers between which the sliding mode of blocks (rows) changes, as far as a scan sees it."""
+class _Steps(NamedTuple):
+    """Steps of a scan in which a target is reached: of which block (row), for which target (column), from where."""
 
-    def modes(amplitude: Floats, cells: Mapping[str, Floats]) -> NDArray[Any]:
-        given = {**cells, "frequency": np.ones((1,) * amplitude.ndim)}
-        return _at(problem, given, amplitude, ("sliding_mode",))["sliding_mode"]
-
-    scanned = modes(amplitudes, blocks)
-    row, step = np.nonzero(scanned[:, 1:] != scanned[:, :-1])
-    own, count = scanned[row, step], len(amplitudes)
-
-    def has_changed(amplitude: Floats, which: NDArray[np.intp]) -> NDArray[np.bool_]:
-        return np.asarray(modes(amplitude, _zipped(blocks, row[which], None)) != own[which])
-
-    before, after = _bisect(amplitudes[row, step], amplitudes[row, step + 1], has_changed)
-    changes = np.bincount(row, minlength=count)
-    place = np.arange(row.size) - np.repeat(np.cumsum(changes) - changes, changes)
-    sides = np.full((2, count, changes.max(initial=0)), math.nan)
-    sides[0, row, place], sides[1, row, place] = before, after
-    return np.hstack([*sides])
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+    low: Floats
+    high: Floats
 
 
-def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp] | None) -> dict[str, Floats]:
-    """Cells picked from two-dimensional inputs, one after the other; without columns the first."""
+def _first_step(amplitudes: Floats, reaches: NDArray[np.bool_]) -> _Steps:
+    """The first step of the scan that reaches each target, of those that are reached."""
+    row, column = np.nonzero(reaches.any(axis=1))
+    # the scan begins at yield, where no block has moved: there is always a step before
+    at = reaches.argmax(axis=1)[row, column]
+    return _Steps(row, column, amplitudes[row, at - 1], amplitudes[row, at])
+
+
+def _hidden_peaks(
+    amplitudes: Floats,
+    scanned: Floats,
+    validity: NDArray[np.int16],
+    target: Floats,
+    displaced: Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]],
+) -> _Steps:
+    """Places between the points of a scan at which a target is reached, up to the one where the scan itself reaches it.
+
+    Block, amplitude and target are the dimensions of `scanned`; block and target those of `target`.
+    """
+    wanted = target[:, np.newaxis, :]
+    saw = (validity & Validity.NOT_RECOUPLED != 0) & (scanned >= _SAW * wanted)
+    inner = scanned[:, 1:-1]
+    saw[:, 1:-1] |= (inner > scanned[:, :-2]) & (inner > scanned[:, 2:]) & (inner >= _MAXIMUM * wanted)
+    before = ~np.logical_or.accumulate(scanned >= wanted, axis=1)[:, :-1]
+    row, step, column = np.nonzero((saw[:, 1:] | saw[:, :-1]) & before)
+    found = [_Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
+    for (some,) in slabs((row.size,), _SCANNED // _PARTS):
+        rows, columns = row[some], column[some]
+        ends = amplitudes[rows, step[some]], amplitudes[rows, step[some] + 1]
+        parts = np.linspace(*ends, _PARTS + 1)  # part, step
+        reaches = displaced(parts.ravel(), np.tile(rows, _PARTS + 1), np.tile(columns, _PARTS + 1)).reshape(parts.shape)
+        (which,) = np.nonzero(reaches.any(axis=0))
+        at = np.maximum(reaches[:, which].argmax(axis=0), 1)
+        found.append(_Steps(rows[which], columns[which], parts[at - 1, which], parts[at, which]))
+    return _Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+
+def _first_of(shape: tuple[int, ...], *found: _Steps) -> _Steps:
+    """The lowest of the steps found for each block and target."""
+    row, column, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
+    order = np.argsort(high, kind="stable")
+    _, first = np.unique((row * shape[1] + column)[order], return_index=True)
+    chosen = order[first]
+    return _Steps(row[chosen], column[chosen], low[chosen], high[chosen])
+
+
+def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp]) -> dict[str, Floats]:
+    """Cells picked from two-dimensional inputs, one after the other."""
     picked = {}
     for name, values in arrays.items():
         if values.size == 1:
             picked[name] = values.reshape(1)
             continue
         down = row if values.shape[0] > 1 else np.zeros_like(row)
-        across = column if column is not None and values.shape[1] > 1 else np.zeros_like(row)
+        across = column if values.shape[1] > 1 else np.zeros_like(row)
         picked[name] = values[down, across]
     return picked
 
