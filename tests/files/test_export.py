@@ -1,9 +1,13 @@
 """Long tables hold every cell once, exactly; flags come apart as the bits say."""
 
+import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import openpyxl
 import pandas as pd
 import pytest
 import xarray as xr
@@ -58,7 +62,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(path: Path) -> pd.DataFrame:
-    return pd.read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+    readers = {".csv": pd.read_csv, ".parquet": pd.read_parquet, ".xlsx": pd.read_excel}
+    frame: pd.DataFrame = readers[path.suffix](path)
+    return frame
 
 
 def bare(frame: pd.DataFrame) -> pd.DataFrame:
@@ -66,16 +72,24 @@ def bare(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.rename(columns=lambda header: header.partition(" (")[0])
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".xlsx"])
 @pytest.mark.parametrize("chunk_cells", [7, export.CHUNK_CELLS])
 def test_a_table_has_every_cell_once(folder: Path, tmp_path: Path, suffix: str, chunk_cells: int) -> None:
     if suffix == ".parquet":
         pytest.importorskip("pyarrow")
     done: list[int] = []
+    told: list[int] = []
+
+    @contextlib.contextmanager
+    def progress(total: int) -> Iterator[Callable[[int], None]]:
+        told.append(total)
+        yield done.append
+
     path = tmp_path / f"t{suffix}"
-    rows = export.export(folder / "grid.nc", path, chunk_cells=chunk_cells, progress=done.append)
+    rows = export.export(folder / "grid.nc", path, chunk_cells=chunk_cells, progress=progress)
     table = bare(read(path))
     assert rows == sum(done) == len(table) == 3 * 2 * 3 * 2 * 2
+    assert told == [rows]
     axes = ["theta", "mu_s", "displacement_amplitude", "frequency", "decay_rate"]
     with xr.open_dataset(folder / "grid.nc", mask_and_scale=False) as data:
         expected = data.to_dataframe(dim_order=axes).reset_index()
@@ -102,7 +116,6 @@ def test_units_stand_in_the_header(folder: Path, tmp_path: Path) -> None:
 def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
     text = GRID.replace("displacement_amplitude", "amplitude").replace("decay_rate", "structure_frequency")
     store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
-    assert export.count_rows(tmp_path / "a.nc", ["limiting_acceleration"]) == 18
     assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", variables=["limiting_acceleration"]) == 18
     table = bare(pd.read_csv(tmp_path / "a.csv"))
     assert list(table) == ["theta", "mu_s", "amplitude", "limiting_acceleration"]
@@ -174,7 +187,7 @@ def test_the_command(folder: Path) -> None:
 def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "other.nc").write_text("nothing")
     for arguments, options, message in (
-        (("grid.nc", "t.txt"), {}, "the name must end in one of .csv, .parquet"),
+        (("grid.nc", "t.txt"), {}, "the name must end in one of .csv, .parquet, .xlsx"),
         (("grid.nc", "t.csv"), {"variables": ["permanent_displacment"]}, 'did you mean "permanent_displacement"'),
         (("none.nc", "t.csv"), {}, "none.nc: no such file"),
         ((str(tmp_path / "other.nc"), "t.csv"), {}, "not a netCDF file"),
@@ -183,9 +196,151 @@ def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pyte
             export.export(folder / arguments[0], tmp_path / arguments[1], **options)  # type: ignore[arg-type]
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.delitem(sys.modules, "pyarrow.parquet", raising=False)
-    with pytest.raises(InputError, match=r"Parquet needs pyarrow: pip install 'slipsweep\[parquet\]'"):
-        export.export(folder / "grid.nc", tmp_path / "t.parquet")
+    monkeypatch.setitem(sys.modules, "xlsxwriter", None)
+    for ending, needs in (("parquet", "pyarrow"), ("xlsx", "xlsxwriter")):
+        with pytest.raises(InputError, match=rf"\.{ending} needs {needs}: pip install 'slipsweep\[{ending}\]'"):
+            export.export(folder / "grid.nc", tmp_path / f"t.{ending}")
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
+
+
+# ------------------------------------------------------------------- slices and pivoted tables
+
+
+def test_a_slice_has_the_values_asked_for(folder: Path, tmp_path: Path) -> None:
+    """By value, by several in the order given, and with a unit."""
+    path = tmp_path / "t.csv"
+    at = {"theta": "20,5", "displacement_amplitude": "5cm", "decay_rate": "2.5", "mu_s": "0.3"}
+    assert export.export(folder / "grid.nc", path, at=at, chunk_cells=1) == 2 * 2
+    table = bare(read(path))
+    with xr.open_dataset(folder / "grid.nc") as data:
+        cut = data.sel(theta=[20, 5], displacement_amplitude=[0.05], decay_rate=[2.5], mu_s=[0.3])
+        # coordinates stay in columns, in the file's order
+        assert list(table.theta) == [20, 20, 5, 5]
+        assert set(table.mu_s) == {0.3}
+        np.testing.assert_array_equal(
+            table.permanent_displacement.to_numpy(np.float32), cut.permanent_displacement.values.ravel()
+        )
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".xlsx"])
+def test_a_pivoted_table_has_an_axis_as_columns(folder: Path, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"t{suffix}"
+    export.export(
+        folder / "grid.nc",
+        path,
+        variables=["permanent_displacement"],
+        at={"decay_rate": "1", "mu_s": "0.5", "theta": "5"},
+        rows=["displacement_amplitude"],
+        columns="frequency",
+        chunk_cells=1,
+    )
+    table = read(path).set_index(read(path).columns[0])
+    assert table.index.name == (
+        "displacement_amplitude (m) \\ frequency (Hz): permanent_displacement (m) "
+        "at theta = 5 degree, mu_s = 0.5, decay_rate = 1"
+    )
+    assert [*map(float, table.columns)] == [1.0, 2.0]
+    assert list(table.index) == [0.01, 0.05, 0.1]
+    with xr.open_dataset(folder / "grid.nc") as data:
+        expected = data.permanent_displacement.sel(decay_rate=1, mu_s=0.5, theta=5)
+        np.testing.assert_array_equal(table.to_numpy(np.float32), expected)
+
+
+def test_the_rows_of_a_pivoted_table_are_all_other_axes_unless_chosen(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    command_line = ("export", "grid.nc", "-o", path, "--variable", "limiting_acceleration", "--columns", "mu_s")
+    assert command(folder, *command_line).stdout.startswith(f"{path}  36 rows, ")
+    assert [header.partition(" ")[0] for header in read(path)][:3] == ["theta", "displacement_amplitude", "frequency"]
+    assert list(read(path).iloc[:2, 3]) == [1.0, 2.5]
+    done = command(folder, "export", "cases.nc", "-o", "p.csv", "--variable", "sliding_mode", "--columns", "case")
+    assert done.returncode == 0, done.stderr
+    header = (folder / "p.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert header == 'frequency (Hz) \\ case: sliding_mode,"mild ± slope, wet",steep'
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--at", "theta=6"), "theta=6: not among the values of the file; its neighbours are 5 and 20 degree"),
+        (("--at", "theta=21"), "theta=21: outside the values of the file, 0 to 20 degree"),
+        (("--at", "thet=5"), '--at thet=5: no such axis here; did you mean "theta"?'),
+        (("--at", "theta=5mm"), "must be a number, with a unit that converts to degree"),
+        (("--at", "theta"), "--at theta: must be NAME=VALUE"),
+        (("--rows", "theta"), "--rows theta: needs --columns"),
+        (("--columns", "theta", "--rows", "theta"), "must be different axes"),
+        (("--columns", "thet"), 'no such axis here; did you mean "theta"?'),
+        (("--columns", "mu_s"), "a table with --columns has one result; choose it with --variable (permanent_disp"),
+        (
+            ("--columns", "mu_s", "--rows", "theta", "--at", "frequency=2"),
+            "neither in --rows nor in --columns: displacement_amplitude (3 values), decay_rate (2 values)",
+        ),
+    ],
+)
+def test_what_is_no_slice(folder: Path, tmp_path: Path, options: tuple[str, ...], message: str) -> None:
+    done = command(folder, "export", "grid.nc", "-o", tmp_path / "t.csv", *options)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert message in done.stderr
+    assert not (tmp_path / "t.csv").exists()
+
+
+def test_a_case_is_cut_by_its_label(folder: Path, tmp_path: Path) -> None:
+    export.export(folder / "cases.nc", tmp_path / "t.csv", at={"case": "mild ± slope, wet"})
+    assert set(read(tmp_path / "t.csv").label) == {"mild ± slope, wet"}
+    with pytest.raises(InputError, match='--at case=steap: must be a label; did you mean "steep"'):
+        export.export(folder / "cases.nc", tmp_path / "u.csv", at={"case": "steap"})
+
+
+# ----------------------------------------------------------------------------- spreadsheets
+
+
+def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
+    """Read by another program: a sheet for each result, and one of inputs, estimates, flags and provenance."""
+    path = tmp_path / "t.xlsx"
+    export.export(folder / "cases.nc", path, columns="frequency", at={"case": "steep,1"}, words=True)
+    book = openpyxl.load_workbook(path)
+    assert book.sheetnames[-1] == "about"
+    assert {"permanent_displacement", "sliding_mode", "validity"} <= {*book.sheetnames}
+    rows = [*book["validity"].iter_rows(values_only=True)]
+    assert [type(value) for value in rows[0][-3:]] == [int] * 3  # numbers, that a formula can look up
+    assert [row[-1] for row in rows[1:]] == ["statically_unstable", "yield_governs"]
+    assert book["permanent_displacement"].cell(2, book["permanent_displacement"].max_column).value is None
+    about = {str(name): text for name, text in book["about"].iter_rows(values_only=True) if name}
+    assert about["plane inclination"] == "2 values, 5 to 25 degree"
+    assert about["friction parameters"] == "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"
+    assert about["1 statically_unstable"].startswith("no value: 50.00% of 6 cells; ")
+    assert about["file"] == str(folder / "cases.nc")
+    assert about["solved by"] == f"slipsweep {slipsweep.__version__}"
+    texts = [str(text or "") for _, text in book["about"].iter_rows(values_only=True)]
+    start = next(at for at, line in enumerate(texts) if line == CASES.splitlines()[1])
+    assert texts[start : start + len(CASES.splitlines()) - 1] == CASES.splitlines()[1:]
+
+
+def test_a_label_is_no_formula(tmp_path: Path) -> None:
+    text = CASES.replace("steep", "=1+1")
+    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    export.export(tmp_path / "a.nc", tmp_path / "t.xlsx")
+    table = openpyxl.load_workbook(tmp_path / "t.xlsx").worksheets[0]
+    kinds = {cell.value: cell.data_type for row in table.iter_rows() for cell in row if isinstance(cell.value, str)}
+    assert kinds["=1+1"] == "s"
+
+
+@pytest.mark.parametrize(
+    ("num", "options", "message"),
+    [
+        (1200, {}, "the table has 1440000 rows, a sheet of .xlsx 1048576 with its header; take one value of "
+         "theta (1200) or mu_s (1200) with --at, or write .csv"),
+        (17000, {"columns": "theta"}, "columns, a sheet of .xlsx 16384; give fewer values of theta with --at"),
+    ],
+)  # fmt: skip
+def test_what_no_spreadsheet_holds(tmp_path: Path, num: int, options: dict[str, Any], message: str) -> None:
+    shape = (num, 1200 if num == 1200 else 2)
+    modes = xr.DataArray(np.zeros(shape, np.int8), dims=("theta", "mu_s"), name="sliding_mode")
+    data = modes.assign_coords(theta=np.arange(shape[0]), mu_s=np.arange(shape[1])).to_dataset()
+    data.assign_attrs(source="slipsweep 0").to_netcdf(tmp_path / "a.nc")
+    with pytest.raises(InputError) as refused:
+        export.export(tmp_path / "a.nc", tmp_path / "t.xlsx", **options)
+    assert message in str(refused.value)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
 
 
 # ----------------------------------------------------------------------------------- flags

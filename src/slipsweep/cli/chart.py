@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import FIGURES, Overwrite, check_ending, write_figure
+from slipsweep.cli.common import FIGURES, Overwrite, check_ending, cuts, write_figure
 from slipsweep.errors import InputError
 
 EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
@@ -90,7 +90,7 @@ def chart(
         wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in chosen}
         outputs.check_outputs(given or [wanted[name][0] for name in chosen], overwrite, reads=[file])
         look = Look(units, show_cautions, kinds.levels_of(variable, levels.split(",") if levels else (), result.g))
-        wish = kinds.Wish(x, y, _cuts(at or ()), variable, panels.split(",") if panels else (), together, look)
+        wish = kinds.Wish(x, y, cuts(at), variable, panels.split(",") if panels else (), together, look)
         figures, left_out = kinds.draw_all(result, chosen, wish, strict=bool(asked))
         if together:
             for path in given:
@@ -103,15 +103,3 @@ def chart(
             typer.echo(path)
     for name, reason in left_out.items():
         typer.echo(f"no {name}: {reason}")
-
-
-def _cuts(given: "tuple[str, ...] | list[str]") -> dict[str, str]:
-    cuts: dict[str, str] = {}
-    for text in given:
-        name, separator, value = text.partition("=")
-        if not (separator and name and value):
-            raise InputError(f"--at {text}: must be NAME=VALUE, as in --at theta=12")
-        if name.strip() in cuts:
-            raise InputError(f"--at {text}: {name.strip()} is given twice")
-        cuts[name.strip()] = value.strip()
-    return cuts

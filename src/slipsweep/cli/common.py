@@ -127,6 +127,19 @@ def check_ending(path: Path, endings: Sequence[str]) -> None:
         raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
 
 
+def cuts(given: Sequence[str] | None) -> dict[str, str]:
+    """Take apart what was typed with ``--at``: names and values."""
+    found: dict[str, str] = {}
+    for text in given or ():
+        name, separator, value = text.partition("=")
+        if not (separator and name and value):
+            raise InputError(f"--at {text}: must be NAME=VALUE, as in --at theta=12")
+        if name.strip() in found:
+            raise InputError(f"--at {text}: {name.strip()} is given twice")
+        found[name.strip()] = value.strip()
+    return found
+
+
 def taken_as(values: Mapping[str, float], g: float) -> str:
     """Inputs in the units that they were taken in: ``amplitude 3.55 m/s2 (0.3619 g), frequency 1.8 Hz``."""
     texts = []

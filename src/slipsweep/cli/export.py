@@ -1,39 +1,64 @@
-"""`slipsweep export`: a result as a long table."""
+"""`slipsweep export`: a result as a table."""
 
+import functools
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, examples, progress_bar
+from slipsweep.cli.common import Overwrite, Quiet, cuts, examples, progress_bar
 
 EXAMPLE = examples(
-    "slipsweep export design_chart.nc -o table.parquet",
-    "slipsweep export paper.nc -o paper.csv --words",
-    "slipsweep export design_chart.nc -o table.csv --variable permanent_displacement --variable validity",
+    "slipsweep export design_chart.nc -o table.parquet --variable permanent_displacement --variable validity",
+    "slipsweep export design_chart.nc -o slice.csv --at theta=5 --at mu_s=0.4 --at amplitude=0.1g,0.2g,0.3g --words",
+    "slipsweep export design_chart.nc -o chart.xlsx --at theta=5 --at mu_s=0.4 --rows amplitude --columns frequency",
 )
 
 
 def export(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="Table to write: .csv or .parquet (needs pyarrow).")
+        Path, typer.Option("--output", "-o", metavar="FILE", help="Table to write: .csv, .parquet or .xlsx.")
     ],
-    overwrite: Overwrite = False,
     variables: Annotated[
         list[str] | None,
         typer.Option("--variable", metavar="NAME", help="Result to export (default: all); may be repeated."),
     ] = None,
     words: Annotated[bool, typer.Option("--words", help="Sliding modes and flags as words instead of codes.")] = False,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Value of an axis to take: theta=12, amplitude=0.3g, case=LABEL; or several: theta=8,11. May be "
+            "repeated.",
+        ),
+    ] = None,
+    rows: Annotated[
+        str | None, typer.Option(metavar="NAME[,NAME]", help="With --columns: axes of the rows (default: all others).")
+    ] = None,
+    columns: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Axis whose values become columns, of one result a table.")
+    ] = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a result as a long table: a row a cell, coordinates as columns, units in the header."""
+    """Write a result as a table: CSV, Parquet or .xlsx.
+
+    A row a cell, coordinates as columns, units in the header; or with --columns a table of one result over two axes.
+    """
     from slipsweep.files import export as tables
     from slipsweep.grid.resources import size_text
 
-    with progress_bar(tables.count_rows(file, variables or None), quiet, "rows") as progress:
-        rows = tables.export(
-            file, output, variables=variables or None, words=words, overwrite=overwrite, progress=progress
-        )
+    written = tables.export(
+        file,
+        output,
+        variables=variables or None,
+        words=words,
+        at=cuts(at),
+        rows=rows.split(",") if rows else (),
+        columns=columns,
+        overwrite=overwrite,
+        progress=functools.partial(progress_bar, quiet=quiet, unit="rows"),
+    )
     if not quiet:
-        typer.echo(f"{output}  {rows} rows, {size_text(output.stat().st_size)}")
+        typer.echo(f"{output}  {written} rows, {size_text(output.stat().st_size)}")

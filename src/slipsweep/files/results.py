@@ -488,6 +488,19 @@ class ResultFile:
         return values, order
 
 
+def cut_chunks(
+    sizes: Mapping[str, int], where: Mapping[str, NDArray[np.intp]], most: int = CHUNK_CELLS
+) -> Iterator[tuple[dict[str, Any], dict[str, int]]]:
+    """Cut what is kept of a grid into chunks of at most `most` cells: where in the file each lies, and its lengths.
+
+    `where` has the indices that are kept along some of the dimensions.
+    """
+    kept = {dim: len(where[dim]) if dim in where else length for dim, length in sizes.items()}
+    for chunk in grid_chunks(kept, most):
+        part = {dim: where[dim][one] if dim in where else one for dim, one in chunk.items()}
+        yield part, {dim: one.stop - one.start for dim, one in chunk.items()}
+
+
 def read_table(file: ResultFile, names: Sequence[str]) -> Table:
     """Read some results, and all coordinates along their dimensions.
 
@@ -567,7 +580,7 @@ def read_contents(path: Path) -> Contents:
             nbytes(path) if is_finished(path) else path.stat().st_size,
             {name: str(value) for name, value in file.attrs.items() if name != RUN},
             {
-                name: f"{file[name].size} motions" if motions and name == "motion" else _values_text(file[name])
+                name: f"{file[name].size} motions" if motions and name == "motion" else values_text(file[name])
                 for name in file.coordinates
                 if not (name in told and file[name].dims == ("motion",))
             },
@@ -638,20 +651,23 @@ def _indices(file: ResultFile) -> Indices | None:
     return counted
 
 
-def _values_text(variable: FileVariable) -> str:
-    """The values of a coordinate in words, read in chunks: it may lie over the whole grid."""
+def values_text(variable: FileVariable, where: Mapping[str, NDArray[np.intp]] | None = None) -> str:
+    """The values of a coordinate in words, or of some of it, read in chunks: it may lie over the whole grid."""
+    where = where or {}
     if variable.is_text:
-        return ", ".join(map(str, variable.read({}).data.ravel()))
+        return ", ".join(map(str, variable.read(where).data.ravel()))
     units = _units_text(variable, " ")
     low, high, count = math.inf, -math.inf, 0
-    for chunk in grid_chunks(variable.sizes, CHUNK_CELLS):
-        there = variable.read(chunk).compressed()
+    size = 0
+    for part, shape in cut_chunks(variable.sizes, where):
+        size += math.prod(shape.values())
+        there = variable.read(part).compressed()
         if there.size:
             low, high, count = min(low, there.min()), max(high, there.max()), count + there.size
-    missing = f", {variable.size - count} missing" if count < variable.size else ""
-    if variable.size == 1 == count:
+    missing = f", {size - count} missing" if count < size else ""
+    if size == 1 == count:
         return f"{low:.6g}{units}"
-    return f"{variable.size} values" + (f", {low:.6g} to {high:.6g}{units}" if count else "") + missing
+    return f"{size} values" + (f", {low:.6g} to {high:.6g}{units}" if count else "") + missing
 
 
 def _variable_text(variable: FileVariable) -> str:

@@ -34,7 +34,7 @@ def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
 
 def conversion(key: str, own: str, units: str | None, g: float) -> float:
     """Return what to multiply a number in `units` by, to have it in the unit `own`; as `unit_factor`."""
-    if units is None or units in _OWN_UNITS[own]:
+    if units is None or units in _OWN_UNITS.get(own, (own,)):
         return 1.0
     if own == "m s-2" and units == "g":
         return g
@@ -82,13 +82,17 @@ def quantity(key: str, text: str, parameter: str, g: float) -> float:
     InputError
         It is not a number, or its unit does not convert.
     """
+    return quantity_in(key, text, PARAMETERS[parameter]["units"], g)
+
+
+def quantity_in(key: str, text: str, own: str, g: float) -> float:
+    """Return a number with a unit in the unit `own`; as `quantity`."""
     found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
-    own = PARAMETERS[parameter]["units"]
     refusal = InputError(f"{key} = {show(text)}: must be a number, with a unit that converts to {own} if in another")
     if found is None:
         raise refusal
     try:
-        return float(found[1]) * unit_factor(key, parameter, found[2] or None, g)
+        return float(found[1]) * conversion(key, own, found[2] or None, g)
     except InputError:
         raise refusal from None
 
