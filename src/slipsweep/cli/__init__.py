@@ -20,7 +20,21 @@ from typing import Annotated, Any
 import typer
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, explore, export, hazard, info, limit, run, simulate, streams, verify
+from slipsweep.cli import (
+    calibrate,
+    chart,
+    example,
+    explore,
+    export,
+    hazard,
+    info,
+    limit,
+    report,
+    run,
+    simulate,
+    streams,
+    verify,
+)
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -54,6 +68,8 @@ app.command(epilog=chart.EXAMPLE)(chart.chart)
 app.command(epilog=calibrate.FRICTION_EXAMPLE)(calibrate.friction)
 app.command(epilog=calibrate.EXAMPLE)(calibrate.calibrate)
 app.command(epilog=explore.EXAMPLE)(explore.explore)
+app.command(epilog=report.EXAMPLE)(report.report)
+app.command(epilog=example.EXAMPLE)(example.example)
 app.command(epilog=verify.EXAMPLE)(verify.verify)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments
