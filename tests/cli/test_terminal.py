@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from slipsweep import cli
 from tests.support.commands import command as run
+from tests.support.commands import run_command
 from tests.support.processes import on_a_terminal, slipsweep
 
 COMMANDS = ("run", "info", "export", "simulate")
@@ -24,17 +26,52 @@ def test_help_is_plain_in_a_pipe_and_has_examples(tmp_path: Path, command: str) 
     examples = done.stdout.partition("Examples:\n")[2].splitlines()
     assert len(examples) >= 2
     for line in examples:  # each whole, in a line of its own
-        assert line.startswith(f"    slipsweep {command} ")
+        assert line.startswith(f"  slipsweep {command} ")
 
 
-def test_help_on_a_terminal(tmp_path: Path) -> None:
-    text = on_a_terminal(tmp_path, "export", "--help")
-    assert "\x1b[" in text
-    assert "╭" in text
-    assert "Examples:" in text
-    plain = on_a_terminal(tmp_path, "export", "--help", environment={"NO_COLOR": "1"})
-    assert "Examples:" in plain
-    assert "\x1b" not in plain
+def test_help_on_a_terminal_is_that_in_a_pipe(tmp_path: Path) -> None:
+    wide = {"COLUMNS": "100"}
+    seen = on_a_terminal(tmp_path, "export", "--help", environment=wide)
+    assert seen.splitlines() == slipsweep(tmp_path, "export", "--help", environment=wide).stdout.splitlines()
+
+
+#: All commands.
+NAMES = sorted(one.callback.__name__ for one in cli.app.registered_commands if one.callback is not None)
+
+
+@pytest.mark.parametrize("name", ["", *NAMES])
+def test_help_is_one_screen(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """Of 40 lines and 100 columns; and every option is in it, by name at least."""
+    monkeypatch.setenv("COLUMNS", "100")
+    asked = [name] if name else []
+    ended = run_command(*asked, "--help")
+    lines = ended.output.splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 100
+    assert not any(line.endswith("...") for line in lines[1:])
+    described = run_command(*asked, "--help-all").output if name else ended.output
+    rows = re.findall(r"^  (?:-\w, )?(--[a-z][\w-]+)", described, re.MULTILINE)
+    assert rows
+    for option in rows:
+        assert re.search(rf"(^|[ ,]){option}\b", ended.output), option
+    # an option in no group would stand beside this one
+    assert described.partition("Help:\n")[2].startswith("  -h, --help ") or not name
+
+
+def test_rare_options_are_described_on_request(tmp_path: Path) -> None:
+    short, long = (run(tmp_path, "simulate", option).stdout for option in ("--help", "--help-all"))
+    assert "Phases of the harmonics, degrees" not in short
+    assert "Phases of the harmonics, degrees" in long
+    assert "Rare options (--help-all describes them):\n" in short
+    assert "--phases" in short
+
+
+def test_commands_are_grouped_by_task(tmp_path: Path) -> None:
+    text = run(tmp_path, "--help").stdout
+    groups = dict(re.findall(r"^([A-Z][\w ]+):\n((?:  \w.*\n?)+)", text, re.MULTILINE))
+    tasks = {name: re.findall(r"^  (\w+)", body, re.MULTILINE) for name, body in groups.items()}
+    assert tasks["Compute"] == ["run", "simulate", "limit", "hazard"]
+    assert sorted(name for names in tasks.values() for name in names) == NAMES
 
 
 def test_the_examples_are_good_commands(tmp_path: Path) -> None:

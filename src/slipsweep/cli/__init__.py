@@ -8,11 +8,10 @@ What a command needs is imported inside it, so that `slipsweep --help` is there 
 import atexit
 import gc
 import os
-import re
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 from typing import Annotated, Any
@@ -35,10 +34,13 @@ from slipsweep.cli import (
     streams,
     verify,
 )
+from slipsweep.cli.help import WIDTH, Command, Group
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=Group,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDTH},
+    rich_markup_mode=None,  # its boxes take the lines that keep a help from one screen
     pretty_exceptions_enable=False,
 )
 
@@ -58,19 +60,29 @@ def _options(
     """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters."""
 
 
-app.command(epilog=run.EXAMPLE)(run.run)
-app.command(epilog=info.EXAMPLE)(info.info)
-app.command(epilog=export.EXAMPLE)(export.export)
-app.command(epilog=limit.EXAMPLE)(limit.limit)
-app.command(epilog=hazard.EXAMPLE)(hazard.hazard)
-app.command(epilog=simulate.EXAMPLE)(simulate.simulate)
-app.command(epilog=chart.EXAMPLE)(chart.chart)
-app.command(epilog=calibrate.FRICTION_EXAMPLE)(calibrate.friction)
-app.command(epilog=calibrate.EXAMPLE)(calibrate.calibrate)
-app.command(epilog=explore.EXAMPLE)(explore.explore)
-app.command(epilog=report.EXAMPLE)(report.report)
-app.command(epilog=example.EXAMPLE)(example.example)
-app.command(epilog=verify.EXAMPLE)(verify.verify)
+#: Commands by task: what they are called with, and their examples.
+_COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
+    "Start": [(example.example, example.EXAMPLE)],
+    "Compute": [
+        (run.run, run.EXAMPLE),
+        (simulate.simulate, simulate.EXAMPLE),
+        (limit.limit, limit.EXAMPLE),
+        (hazard.hazard, hazard.EXAMPLE),
+    ],
+    "Draw": [(chart.chart, chart.EXAMPLE), (report.report, report.EXAMPLE), (explore.explore, explore.EXAMPLE)],
+    "Read and check results": [
+        (info.info, info.EXAMPLE),
+        (export.export, export.EXAMPLE),
+        (verify.verify, verify.EXAMPLE),
+    ],
+    "Tests on a shaking table": [
+        (calibrate.friction, calibrate.FRICTION_EXAMPLE),
+        (calibrate.calibrate, calibrate.EXAMPLE),
+    ],
+}
+for _task, _commands in _COMMANDS.items():
+    for _command, _example in _commands:
+        app.command(cls=Command, rich_help_panel=_task, epilog=_example)(_command)
 
 # typer names only one of its usage errors; the class above it covers unknown options and missing arguments
 _UsageError: Any = typer.BadParameter.__mro__[1]
@@ -141,7 +153,6 @@ def _run(arguments: list[str]) -> int:
     _spare_time()
     try:
         with _signals():
-            _plain_help(not sys.stdout.isatty() or bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb")
             # without standalone mode errors come back here instead of being boxed in several lines
             status: Any = app(arguments or ["--help"], prog_name="slipsweep", standalone_mode=False)
     except _UsageError as error:
@@ -167,16 +178,6 @@ def _spare_time() -> None:
     atexit.register(gc.freeze)
     # numpy and scipy each start a thread a core for linear algebra, of which there is none: they spin, then wait
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-def _plain_help(plain: bool) -> None:
-    """Have `--help` without boxes and colours where nobody sees them, and its examples unwrapped."""
-    app.rich_markup_mode = None if plain else "rich"
-    for command in app.registered_commands:
-        lines = (command.epilog or "").replace("\b", "").split()
-        examples = re.split(r" (?=slipsweep )", " ".join(lines))
-        # a paragraph after a backspace is left as it is; rich makes one line of what has no blank line in it
-        command.epilog = "\b\n" + "\n  ".join(examples) if plain else "\n\n".join(examples)
 
 
 def _words(error: Any) -> str:

@@ -8,6 +8,7 @@ import typer
 
 from slipsweep.cli.common import (
     FIGURES,
+    OUTPUT,
     MuS,
     Overwrite,
     Quiet,
@@ -17,7 +18,7 @@ from slipsweep.cli.common import (
     typed_command,
     write_figure,
 )
-from slipsweep.cli.options import chooses
+from slipsweep.cli.options import BLOCK, chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 FRICTION_EXAMPLE = examples(
     "slipsweep friction test.csv --theta 5 --mu-s 0.38",
-    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --drift block_acceleration --rest 0:0.5 -o friction.png",
+    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --rest 0:0.5 --drift all -o friction.png",
 )
 
 EXAMPLE = examples(
@@ -37,21 +38,28 @@ EXAMPLE = examples(
     "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
 )
 
+#: The group of options that say what of the measurement is used, and how.
+TEST = "Measurement"
+
 Test = Annotated[
     Path,
     typer.Argument(
         metavar="TEST.csv",
-        help="CSV whose header names columns with units: time (s), table acceleration (g), block acceleration (m/s2), "
+        help="Columns time (s), table acceleration (g), block acceleration (m/s2), "
         "relative velocity (m/s), relative displacement (mm).",
     ),
 ]
 Offset = Annotated[
     list[str] | None,
-    typer.Option(metavar="CHANNEL", help="Channel whose sensor has an offset, or all; may be repeated."),
+    typer.Option(
+        metavar="CHANNEL", help="Channel whose sensor has an offset, or all; may be repeated.", rich_help_panel=TEST
+    ),
 ]
 Drift = Annotated[
     list[str] | None,
-    typer.Option(metavar="CHANNEL", help="Channel whose sensor drifts in a straight line, or all; may be repeated."),
+    typer.Option(
+        metavar="CHANNEL", help="Channel whose sensor drifts linearly, or all; may be repeated.", rich_help_panel=TEST
+    ),
 ]
 
 
@@ -60,27 +68,39 @@ def friction(
     test: Test,
     theta: Theta,
     mu_s: MuS,
-    g: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
+    g: Annotated[float, typer.Option(help="Gravity, m/s².", rich_help_panel=BLOCK)] = 9.81,
     offset: Offset = None,
     drift: Drift = None,
     rest: Annotated[
-        str | None, typer.Option(metavar="FROM:TO", help="Times of rest, s, to find offsets and drifts by.")
+        str | None,
+        typer.Option(
+            metavar="FROM:TO",
+            help="Times of rest, s, to find offsets and drifts by.",
+            rich_help_panel=TEST,
+        ),
     ] = None,
     threshold: Annotated[
         str | None,
         typer.Option(
             metavar="VALUE",
-            help="Relative acceleration of a slide, like 0.02g, or in m/s² (default: 4 times its noise).",
+            help="Relative acceleration of a slide: 0.02g (default: 4 times its noise).",
+            rich_help_panel=TEST,
         ),
     ] = None,
     output: Annotated[
         list[Path] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .png, .svg or .pdf; may be repeated."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write .nc, .png, .svg or .pdf; may be repeated.",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the friction that a test on a shaking table measured (Eq. 1), and its slides."""
+    """Compute the friction coefficient over a test, and its slides."""
     angle = quantity("--theta", theta, "theta", g)
     least = None if threshold is None else quantity("--threshold", threshold, "amplitude", g)
     paths = _checked(output, overwrite, test, (".nc", *FIGURES))
@@ -127,16 +147,24 @@ def calibrate(
     mu_s: MuS,
     offset: Offset = None,
     drift: Drift = None,
-    cycles: Annotated[bool, typer.Option("--cycles/--no-cycles", help="Fit each cycle by itself, too.")] = True,
+    cycles: Annotated[
+        bool, typer.Option("--cycles/--no-cycles", help="Fit each cycle by itself, too.", rich_help_panel=TEST)
+    ] = True,
     output: Annotated[
         list[Path] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .toml, .png, .svg or .pdf; may be repeated."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write .nc, .toml, .png, .svg or .pdf; may be repeated.",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     overwrite: Overwrite = False,
     model: Model,
     quiet: Quiet = False,
 ) -> None:
-    """Find yield acceleration, λ and Δμ from a test on a shaking table."""
+    """Estimate yield acceleration, λ and Δμ from a test."""
     angle = quantity("--theta", theta, "theta", model.g)
     paths = _checked(output, overwrite, test, (".nc", ".toml", *FIGURES))
     from slipsweep.motion.shaking import read_test

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import FIGURES, Overwrite, check_ending, cuts, write_figure
+from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, check_ending, cuts, write_figure
 from slipsweep.errors import InputError
 
 EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
@@ -21,37 +21,53 @@ def chart(
             metavar="KIND",
             help="contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility, "
             "quantiles or sensitivity; may be repeated (default: all that fit).",
+            rich_help_panel="Chart",
         ),
     ] = None,
     at: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Where to cut an axis: theta=12, amplitude=0.3g, case=LABEL (default: its middle). Several values "
-            "choose the curves or panels of an axis: theta=8,11,14.",
+            help="Value of another axis: theta=12, amplitude=0.3g, case=LABEL (default: the middle); "
+            "several select curves or panels: theta=8,11,14.",
+            rich_help_panel="Chart",
         ),
     ] = None,
-    x: Annotated[str | None, typer.Option(metavar="NAME", help="Axis to draw over.")] = None,
+    x: Annotated[str | None, typer.Option(metavar="NAME", help="Axis to draw over.", rich_help_panel="Axes")] = None,
     y: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Upright axis of a map, or the axis that tells curves apart.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Vertical axis of a map, or the curve parameter.",
+            rich_help_panel="Axes",
+        ),
     ] = None,
     panels: Annotated[
-        str | None, typer.Option(metavar="NAME[,NAME]", help="One or two axes to draw panels over, across and down.")
+        str | None,
+        typer.Option(
+            metavar="NAME[,NAME]",
+            help="One or two axes of panels, across and down.",
+            rich_help_panel="Axes",
+        ),
     ] = None,
     variable: Annotated[
-        str, typer.Option(metavar="NAME", help="What contours and families show.")
+        str, typer.Option(metavar="NAME", help="What contours and families show.", rich_help_panel="Chart")
     ] = "permanent_displacement",
     levels: Annotated[
-        str | None, typer.Option(metavar="LEVEL,...", help="Contours, with units: 1cm,5cm,30cm (default: round ones).")
+        str | None,
+        typer.Option(
+            metavar="LEVEL,...",
+            help="Contours: 1cm,5cm,30cm (default: round ones).",
+            rich_help_panel="Look",
+        ),
     ] = None,
     units: Annotated[
-        Literal["m/s2", "g"], typer.Option(help="Unit of accelerations on the main axis and in the caption.")
+        Literal["m/s2", "g"], typer.Option(help="Unit of accelerations.", rich_help_panel="Look")
     ] = "m/s2",
     show_cautions: Annotated[
         bool,
         typer.Option(
-            "--show-cautions",
-            help="Draw values flagged not_recoupled or upslope, left out otherwise; no displacement below zero.",
+            "--show-cautions", help="Draw values flagged not_recoupled or upslope, too.", rich_help_panel="Look"
         ),
     ] = False,
     output: Annotated[
@@ -61,14 +77,12 @@ def chart(
             "-o",
             metavar="FILE",
             help="Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf.",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Draw design charts from a result: contours, sliding modes, families of curves, ratios to Newmark.
-
-    All of them as one PDF with a title page: -o charts.pdf without --kind.
-    """
+    """Draw design charts of a result."""
     given = output or []
     for path in given:
         check_ending(path, FIGURES)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from slipsweep.cli.options import BLOCK
 from slipsweep.errors import InputError
 from slipsweep.model.variables import (
     FLAG_KIND_TEXT,
@@ -34,33 +35,49 @@ if TYPE_CHECKING:
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
 
-Theta = Annotated[str, typer.Option(metavar="VALUE", help="Plane inclination, like 0.1rad, or in degrees.")]
-MuS = Annotated[float, typer.Option(help="Static friction coefficient.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
+Theta = Annotated[
+    str, typer.Option(metavar="VALUE", help="Plane inclination: 5 (degrees), 0.1rad.", rich_help_panel=BLOCK)
+]
+MuS = Annotated[float, typer.Option(help="Static friction coefficient.", rich_help_panel=BLOCK)]
+#: Groups of options that several commands have.
+OUTPUT, LARGE = "Output", "Large runs"
+
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.", rich_help_panel=OUTPUT)]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.", rich_help_panel=OUTPUT)]
 
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on with an interrupted run, from the chunks that it finished.")
+    bool,
+    typer.Option("--resume", help="Go on with an interrupted run, from its finished chunks.", rich_help_panel=LARGE),
 ]
-Split = Annotated[bool, typer.Option("--split", help="Write a folder with a netCDF file for each chunk, not one file.")]
+Split = Annotated[
+    bool,
+    typer.Option("--split", help="Write a folder with a netCDF file for each chunk.", rich_help_panel=LARGE),
+]
 Shared = Annotated[
     bool,
-    typer.Option("--shared", help="Workers of --scheduler reach the output too: they write it themselves."),
+    typer.Option("--shared", help="The workers of --scheduler write the output themselves.", rich_help_panel=LARGE),
 ]
 Memory = Annotated[
-    str | None, typer.Option(metavar="SIZE", help="Most memory to take, like 512MiB or 2GB (default: 500 to 600 MB).")
+    str | None,
+    typer.Option(
+        metavar="SIZE", help="Most memory to take: 512MiB, 2GB (default: 500 to 600 MB).", rich_help_panel=LARGE
+    ),
 ]
 Workers = Annotated[
-    int | None, typer.Option(metavar="N", help="Solve on N processes of this machine (needs the extra [cluster]).")
+    int | None,
+    typer.Option(metavar="N", help="Solve on N processes of this machine (extra [cluster]).", rich_help_panel=LARGE),
 ]
 Scheduler = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="Solve on the workers of the dask scheduler at HOST:PORT.")
+    str | None,
+    typer.Option(
+        metavar="ADDRESS", help="Solve on the workers of the dask scheduler at HOST:PORT.", rich_help_panel=LARGE
+    ),
 ]
 
 
 def examples(*lines: str) -> str:
     """Put commands under a command's `--help`, a line each."""
-    return "\n\n".join(("Examples:", *lines))
+    return "\n".join(("Examples:", *lines))
 
 
 def echo_tally(tally: "Tally") -> None:

@@ -16,7 +16,7 @@ def example(
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a sweep file that comes with slipsweep, and the data it reads, to this folder."""
+    """List the sweep files that come with slipsweep, or write one with its data."""
     from slipsweep.files import shipped
 
     if name is None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, check_ending
+from slipsweep.cli.common import OUTPUT, Overwrite, check_ending
 from slipsweep.errors import InputError
 
 EXAMPLE = "Example: slipsweep explore design_chart.nc -o design_chart.html"
@@ -18,15 +18,24 @@ def explore(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep run wrote.")],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="PAGE.html", help="Page to write (default: the file's name, .html)."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PAGE.html",
+            help="Page to write (default: the file's name, .html).",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     overwrite: Overwrite = False,
     size: Annotated[
-        str, typer.Option(metavar="SIZE", help="The most that the page may take; larger results are thinned to it.")
+        str,
+        typer.Option(
+            metavar="SIZE", help="Largest size of the page; larger results are thinned to it.", rich_help_panel=OUTPUT
+        ),
     ] = "25MB",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary.", rich_help_panel=OUTPUT)] = False,
 ) -> None:
-    """Write one page, for any browser, to explore a result in: no server, no network."""
+    """Write a page for the browser in which to explore a result."""
     from slipsweep.explore import page as pages
     from slipsweep.grid.resources import size_text
 

@@ -6,38 +6,56 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, Quiet, cuts, examples, progress_bar
+from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, examples, progress_bar
 
 EXAMPLE = examples(
-    "slipsweep export design_chart.nc -o table.parquet --variable permanent_displacement --variable validity",
-    "slipsweep export design_chart.nc -o slice.csv --at theta=5 --at mu_s=0.4 --at amplitude=0.1g,0.2g,0.3g --words",
-    "slipsweep export design_chart.nc -o chart.xlsx --at theta=5 --at mu_s=0.4 --rows amplitude --columns frequency",
+    "slipsweep export paper.nc -o paper.csv --words",
+    "slipsweep export design_chart.nc -o t.parquet --at theta=5 --at amplitude=0.1g,0.2g,0.3g",
+    "slipsweep export design_chart.nc -o t.xlsx --at theta=5 --at mu_s=0.4 --columns frequency",
 )
 
 
 def export(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="Table to write: .csv, .parquet or .xlsx.")
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="Table to write: .csv, .parquet or .xlsx.", rich_help_panel=OUTPUT
+        ),
     ],
     variables: Annotated[
         list[str] | None,
-        typer.Option("--variable", metavar="NAME", help="Result to export (default: all); may be repeated."),
+        typer.Option(
+            "--variable",
+            metavar="NAME",
+            help="Result to export (default: all); may be repeated.",
+            rich_help_panel="Table",
+        ),
     ] = None,
-    words: Annotated[bool, typer.Option("--words", help="Sliding modes and flags as words instead of codes.")] = False,
+    words: Annotated[
+        bool, typer.Option("--words", help="Sliding modes and flags as words, not codes.", rich_help_panel="Table")
+    ] = False,
     at: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Value of an axis to take: theta=12, amplitude=0.3g, case=LABEL; or several: theta=8,11. May be "
-            "repeated.",
+            help="Values of an axis to take: theta=12, amplitude=0.1g,0.2g, case=LABEL; may be repeated.",
+            rich_help_panel="Table",
         ),
     ] = None,
     rows: Annotated[
-        str | None, typer.Option(metavar="NAME[,NAME]", help="With --columns: axes of the rows (default: all others).")
+        str | None,
+        typer.Option(
+            metavar="NAME[,NAME]",
+            help="With --columns: axes of the rows (default: all others).",
+            rich_help_panel="Table",
+        ),
     ] = None,
     columns: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Axis whose values become columns, of one result a table.")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Axis whose values become columns, of one result a table.", rich_help_panel="Table"
+        ),
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,

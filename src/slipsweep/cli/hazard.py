@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from slipsweep.cli.common import FIGURES, Overwrite, Quiet, check_ending, write_figure
+from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, write_figure
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,24 +23,41 @@ def hazard(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A result under a suite, with an axis amplitude.")],
     curve: Annotated[
         Path,
-        typer.Option(metavar="HAZARD.csv", help='Hazard curve: columns "PGA (g)" and "annual rate", from low to high.'),
+        typer.Option(
+            metavar="HAZARD.csv",
+            help='Columns "PGA (g)" and "annual rate", from low to high.',
+            rich_help_panel="Hazard",
+        ),
     ],
     displacement: Annotated[
         list[str],
-        typer.Option("--displacement", "-d", metavar="LENGTH", help="To exceed: 50mm, 2in, 0.05 (m). Repeat."),
+        typer.Option(
+            "--displacement",
+            "-d",
+            metavar="LENGTH",
+            help="To exceed: 50mm, 2in, 0.05 (m). Repeat.",
+            rich_help_panel="Hazard",
+        ),
     ],
     at: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Take one value of another axis: mu_s=0.4 (default: all of them)."),
+        typer.Option(
+            metavar="NAME=VALUE", help="One value of another axis: mu_s=0.4 (default: all).", rich_help_panel="Hazard"
+        ),
     ] = None,
     output: Annotated[
         list[Path] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write .png, .svg or .pdf; may be repeated."),
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="Write .png, .svg or .pdf; may be repeated.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the mean annual rate of exceeding a displacement, from a hazard curve and the fragility of a suite."""
+    """Compute the mean annual rate of exceeding a displacement.
+
+    From a hazard curve and the fragility under a suite of recorded motions.
+    """
     paths = output or []
     for path in paths:
         check_ending(path, FIGURES)

@@ -11,7 +11,7 @@ EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc"
 
 
 def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:
-    """Tell what is in a result, how it was made, and the shares of its modes and flags."""
+    """Show what a result holds, how it was made, and its shares of flags."""
     from slipsweep.files import results
     from slipsweep.grid.resources import size_text
 

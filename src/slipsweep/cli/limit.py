@@ -7,6 +7,7 @@ import typer
 
 from slipsweep.cli.common import (
     FIGURES,
+    OUTPUT,
     Chunks,
     Memory,
     Overwrite,
@@ -34,30 +35,45 @@ EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit
 def limit(
     sweep: Annotated[
         Path,
-        typer.Argument(metavar="OUT.nc|SWEEP.toml", help="A result, or a sweep file: its model and all axes but A's."),
+        typer.Argument(metavar="OUT.nc|SWEEP.toml", help="A result or sweep file: its model and axes but amplitude."),
     ],
     displacement: Annotated[
         list[str],
-        typer.Option("--displacement", "-d", metavar="LENGTH", help="What is tolerable: 50mm, 2in, 0.05 (m). Repeat."),
+        typer.Option(
+            "--displacement",
+            "-d",
+            metavar="LENGTH",
+            help="What is tolerable: 50mm, 2in, 0.05 (m). Repeat.",
+            rich_help_panel="Limit",
+        ),
     ],
     output: Annotated[
         list[Path] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .png, .svg or .pdf; may be repeated."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write .nc, .png, .svg or .pdf; may be repeated.",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     maximum_amplitude: Annotated[
-        str | None, typer.Option(metavar="ACCELERATION", help="End of the search: 2g, 15 (m/s²).  [default: 5g]")
+        str | None,
+        typer.Option(
+            metavar="ACCELERATION", help="End of the search: 2g, 15 (m/s²).  [default: 5g]", rich_help_panel="Limit"
+        ),
     ] = None,
     overwrite: Overwrite = False,
+    quiet: Quiet = False,
     resume: Resume = False,
     split: Split = False,
     memory: Memory = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    quiet: Quiet = False,
 ) -> None:
-    """Find the smallest amplitude that reaches a tolerable displacement, over all other axes of a sweep.
+    """Find the limiting PGA for a tolerable displacement.
 
-    Solved anew, to the last digit, not interpolated from the result.
+    Over all other axes of a sweep; solved anew to rounding, not interpolated from the result.
     """
     chunks = Chunks(overwrite, resume, split, memory, workers, scheduler)
     results: list[Path] = []

@@ -7,9 +7,16 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from slipsweep.cli.help import RARE
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Family, Option, declared
 from slipsweep.motion.reading import Reading
+
+#: Groups of options that say what shakes, and how it responds.
+SHAKING, BLOCK = "Shaking", "Block"
+
+#: The group of the options of a choice, by what names it on the command line.
+PANELS = {"waveform": SHAKING, "model": BLOCK}
 
 
 def option_name(text: str) -> str:
@@ -103,25 +110,36 @@ def _family_parameters(family: Family[Any], default: str | None) -> list[inspect
     """Which choice, and the options of all."""
     names = Literal[tuple(family.names)]  # type: ignore[valid-type]
     note = "" if default else f" (default: {family.default})"
-    about = typer.Option(f"--{family.attribute}", help=f"The {family.keyword}{note}.")
+    words = ", ".join(family.names)
+    about = typer.Option(
+        f"--{family.attribute}",
+        metavar="NAME",
+        help=f"{family.keyword.capitalize()}: {words}{note}.",
+        rich_help_panel=PANELS[family.attribute],
+    )
     kind: Any = Annotated[names if default else names | None, about]
     first = inspect.Parameter(family.attribute, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
     return [first, *(_parameter(one, family) for one in family.options.values())]
 
 
 def _parameter(one: Option, family: Family[Any] | None = None) -> inspect.Parameter:
-    """An option of a command; None where it is not typed."""
+    """An option of a command; None where it is not typed.  Those that some choices only have are rare ones."""
     kind: Any = Literal[one.words] if one.words else str if one.is_list else one.kind
     notes = []
+    panel = RARE
     if family is not None:
         of = [choice.name for choice in family.choices if one.name in {o.name for o in declared(choice)}]
-        if len(of) < len(family.choices):
+        if len(of) == len(family.choices):
+            panel = PANELS[family.attribute]
+        else:
             notes.append(f"with {', '.join(of)}")
     if one.default is not None and not one.is_list:
         notes.append(f"default: {one.default}")
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
-    about = typer.Option(option_name(one.name), help=text, metavar="A,B,..." if one.is_list else None)
+    about = typer.Option(
+        option_name(one.name), help=text, metavar="A,B,..." if one.is_list else None, rich_help_panel=panel
+    )
     return inspect.Parameter(
         one.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, about]
     )

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from slipsweep.cli.chart import chart
-from slipsweep.cli.common import Overwrite, check_ending, examples
+from slipsweep.cli.common import OUTPUT, Overwrite, check_ending, examples
 
 EXAMPLE = examples("slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite")
 
@@ -14,11 +14,14 @@ EXAMPLE = examples("slipsweep report design_chart.nc", "slipsweep report design_
 def report(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help='A result of "slipsweep run".')],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="OUT.pdf", help="PDF to write (default: OUT.pdf).")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="OUT.pdf", help="PDF to write (default: OUT.pdf).", rich_help_panel=OUTPUT
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write all charts that fit a result to one PDF: a title page, then a chart a page."""
+    """Write all charts that fit a result to one PDF, with a title page."""
     path = output or Path(f"{file.stem}.pdf")
     check_ending(path, (".pdf",))
     chart(file, output=[path], overwrite=overwrite)

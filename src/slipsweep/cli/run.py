@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from slipsweep.cli.common import (
+    OUTPUT,
     Chunks,
     Memory,
     Overwrite,
@@ -41,30 +42,33 @@ _OTHER_FORMATS = (
 def run(
     sweep: Annotated[
         Path,
-        typer.Argument(
-            metavar="SWEEP.toml|OUT.nc", help="A sweep file (- for standard input), or an earlier result to make again."
-        ),
+        typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to make again."),
     ],
+    solver: Annotated[
+        Literal["auto", "step", "cycle"] | None,
+        typer.Option(
+            help="Solver, in place of solver.method.",
+            rich_help_panel="Solver",
+        ),
+    ] = None,
     output: Annotated[
         str | None,
         typer.Option(
             "--output",
             "-o",
-            metavar="OUT.nc|OUT.zarr|URL",
-            help="netCDF file or Zarr store to write (default: output.path, else the sweep's name with .nc).",
+            metavar="OUT.nc|OUT.zarr",
+            help="File or store to write (default: output.path, else SWEEP.nc).",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     overwrite: Overwrite = False,
+    quiet: Quiet = False,
     resume: Resume = False,
     split: Split = False,
     memory: Memory = None,
-    solver: Annotated[
-        Literal["auto", "step", "cycle"] | None, typer.Option(help="Solver, over the sweep file's solver.method.")
-    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     shared: Shared = False,
-    quiet: Quiet = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec

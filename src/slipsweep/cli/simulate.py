@@ -9,6 +9,7 @@ import typer
 
 from slipsweep.cli.common import (
     FIGURES,
+    OUTPUT,
     Overwrite,
     Quiet,
     check_ending,
@@ -17,7 +18,8 @@ from slipsweep.cli.common import (
     typed_command,
     write_figure,
 )
-from slipsweep.cli.options import chooses, option_name, reads_record
+from slipsweep.cli.help import RARE
+from slipsweep.cli.options import BLOCK, SHAKING, chooses, option_name, reads_record
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
@@ -38,11 +40,8 @@ if TYPE_CHECKING:
     from slipsweep.motion.records import Record
 
 EXAMPLE = examples(
-    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8",
-    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o history.png -o history.csv",
-    "slipsweep simulate --theta 10 --mu-s 0.5 --displacement-amplitude 0.05 --frequency 2 --model newmark",
-    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 --waveform triangle --ramp-in 2",
-    "slipsweep simulate --theta 5 --mu-s 0.38 --record motion.AT2 --scale 2 -o history.csv -o history.png",
+    "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o a.png -o a.csv",
+    "slipsweep simulate --theta 5 --mu-s 0.38 --record motion.AT2 --scale 2 -o history.nc",
 )
 
 
@@ -51,67 +50,126 @@ EXAMPLE = examples(
 def simulate(
     *,
     theta: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Plane inclination, like 0.1rad, or in degrees.")
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Plane inclination: 5 (degrees), 0.1rad.",
+            rich_help_panel=BLOCK,
+        ),
     ] = None,
-    mu_s: Annotated[float | None, typer.Option(help="Static friction coefficient.")] = None,
-    frequency: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Excitation frequency, Hz; not with a record.")
+    mu_s: Annotated[float | None, typer.Option(help="Static friction coefficient.", rich_help_panel=BLOCK)] = None,
+    yield_acceleration: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE", help="Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", rich_help_panel=BLOCK
+        ),
     ] = None,
+    yield_coefficient: Annotated[
+        float | None,
+        typer.Option(
+            help="Üy/g of Newmark's block, in place of --theta and --mu-s.",
+            rich_help_panel=RARE,
+        ),
+    ] = None,
+    decay_rate: Annotated[
+        float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).", rich_help_panel=BLOCK)
+    ] = None,
+    delta_mu: Annotated[
+        float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).", rich_help_panel=BLOCK)
+    ] = None,
+    minimum_friction: Annotated[
+        float | None, typer.Option(help="Minimum friction μmin (default: Eq. 9).", rich_help_panel=BLOCK)
+    ] = None,
+    structure_frequency: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE", help="Natural frequency of the structure, Hz: flag flexible_block.", rich_help_panel=RARE
+        ),
+    ] = None,
+    model: Model,
     amplitude: Annotated[
         str | None,
         typer.Option(
-            metavar="VALUE", help="Peak ground acceleration, like 0.36g, or in m/s²; a record is scaled to it."
+            metavar="VALUE",
+            help="Peak ground acceleration: 0.36g, 3.5 (m/s²).",
+            rich_help_panel=SHAKING,
         ),
     ] = None,
     displacement_amplitude: Annotated[
         str | None,
         typer.Option(
             metavar="VALUE",
-            help="Peak ground displacement, like 30mm, or in m, instead of the acceleration; not with a record.",
+            help="Peak ground displacement instead: 30mm, 0.03 (m); not with a record.",
+            rich_help_panel=SHAKING,
+        ),
+    ] = None,
+    frequency: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Excitation frequency, Hz; not with a record.",
+            rich_help_panel=SHAKING,
+        ),
+    ] = None,
+    excitation: Waveform | None = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="A recorded motion: CSV, PEER AT2, COSMOS or ESM text.", rich_help_panel=SHAKING
+        ),
+    ] = None,
+    reading: Mapping[str, Any],
+    scale: Annotated[
+        float | None,
+        typer.Option(
+            help="Factor on a record's acceleration (default: 1).",
+            rich_help_panel=SHAKING,
+        ),
+    ] = None,
+    pgv: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Peak ground velocity to scale a record to: 40cm/s.",
+            rich_help_panel=RARE,
+        ),
+    ] = None,
+    arias_intensity: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Arias intensity to scale a record to, m/s.",
+            rich_help_panel=RARE,
+        ),
+    ] = None,
+    time_scale: Annotated[
+        float | None, typer.Option(help="Factor on a record's time (default: 1).", rich_help_panel=RARE)
+    ] = None,
+    polarity: Annotated[
+        Literal["1", "-1"] | None,
+        typer.Option(
+            help="Sign of a record; 1: positive drives downslope (default: 1).",
+            rich_help_panel=SHAKING,
         ),
     ] = None,
     output: Annotated[
         list[Path] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write .nc, .csv, .png, .svg or .pdf; may be repeated."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write .nc, .csv, .png, .svg or .pdf; may be repeated.",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     overwrite: Overwrite = False,
-    excitation: Waveform | None = None,
-    record: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A recorded motion: CSV (time, acceleration), PEER AT2, COSMOS or ESM text."),
-    ] = None,
-    reading: Mapping[str, Any],
-    scale: Annotated[float | None, typer.Option(help="Factor on a record's acceleration (default: 1).")] = None,
-    pgv: Annotated[
-        str | None,
-        typer.Option(metavar="VALUE", help="Peak ground velocity that a record is scaled to, like 40cm/s, or in m/s."),
-    ] = None,
-    arias_intensity: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Arias intensity that a record is scaled to, m/s.")
-    ] = None,
-    time_scale: Annotated[float | None, typer.Option(help="Factor on a record's time (default: 1).")] = None,
-    polarity: Annotated[
-        Literal["1", "-1"] | None, typer.Option(help="Sign that a record is taken with (default: 1).")
-    ] = None,
-    yield_acceleration: Annotated[
-        str | None,
-        typer.Option(metavar="VALUE", help="Yield acceleration, like 0.1g, or in m/s² (default: Coulomb's)."),
-    ] = None,
-    yield_coefficient: Annotated[
-        float | None,
-        typer.Option(help="Yield coefficient, Üy/g, of Newmark's block, in place of --theta and --mu-s."),
-    ] = None,
-    decay_rate: Annotated[float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).")] = None,
-    delta_mu: Annotated[float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).")] = None,
-    minimum_friction: Annotated[float | None, typer.Option(help="Minimum friction μmin (default: Eq. 9).")] = None,
-    structure_frequency: Annotated[
-        str | None,
-        typer.Option(metavar="VALUE", help="Natural frequency of the structure, Hz, for the flexible_block flag."),
-    ] = None,
-    model: Model,
     points: Annotated[
         int | None,
-        typer.Option(min=4, help="Points in time per cycle (default: 512); of a record, its samples are the points."),
+        typer.Option(
+            min=4,
+            help="Points in time per cycle of a waveform (default: 512).",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:

@@ -15,7 +15,7 @@ def verify(
         str, typer.Argument(metavar="OUT.nc|FOLDER|OUT.zarr", help="A result of run or limit, whole or split.")
     ],
 ) -> None:
-    """Check that a result is as it was written, by the checksums in it; status 1 if it is not."""
+    """Check a result against the checksums in it; status 1 if it differs."""
     from slipsweep.cli.common import place_of
     from slipsweep.errors import RunError
     from slipsweep.runs.verify import verify as verified
