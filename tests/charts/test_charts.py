@@ -24,7 +24,8 @@ from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.explore import page as explore
+from slipsweep.explore.excerpt import read_excerpt
+from slipsweep.explore.page import cell_arrays, page
 from slipsweep.files import spec
 from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import NOTES
@@ -571,9 +572,10 @@ def test_what_can_be_drawn_is_drawn_and_the_rest_named(
         assert capsys.readouterr().err.count("\n") == 1
     if "newmark" in undrawn:
         with pytest.raises(InputError, match="displacement: holds inf; what is drawn must be within"):
-            explore.read_excerpt(path, 1000)
+            read_excerpt(path, 1000)
     else:
-        explore.page(explore.read_excerpt(path, 1000), None, "a.nc", "")
+        excerpt = read_excerpt(path, 1000)
+        page(excerpt, cell_arrays(excerpt), None, "a.nc", "")
 
 
 def test_a_single_value_is_seen(small: Path) -> None:

@@ -8,7 +8,9 @@ import os
 import re
 import shutil
 import sys
+import textwrap
 import time
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,10 +19,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Sine, SlidingMode, Validity, simulate, sweep
+from slipsweep import InputError, Sine, SlidingMode, Validity, read_suite, simulate, suite_statistics, sweep
 from slipsweep.cli.explore import parse_size
-from slipsweep.explore.page import evenly, thinned_lengths, write_page
-from slipsweep.model.variables import FlagKind, flags_of
+from slipsweep.explore.excerpt import evenly, thinned_lengths
+from slipsweep.explore.page import write_page
+from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, NOTES, VALIDITY_TEXT, VALUELESS, FlagKind, flags_of
 from tests.support.commands import command
 
 pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
@@ -45,6 +48,8 @@ cycles = 4
 [output]
 path = "small.nc"
 """
+
+SUITE = Path(__file__).parents[2] / "sweeps" / "data" / "suite"
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 
@@ -93,10 +98,14 @@ def contents(page: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """What a page tells of itself, and its arrays."""
     scripts = Elements(page.read_text(encoding="utf-8")).scripts
     meta = json.loads(scripts["meta"])
-    arrays = {
-        name: np.frombuffer(base64.b64decode(scripts[f"array-{name}"]), "<" + kind["dtype"]).reshape(kind["shape"])
-        for name, kind in meta["arrays"].items()
-    }
+    arrays = {}
+    for name, told in meta["arrays"].items():
+        data = zlib.decompress(base64.b64decode(scripts[f"array-{name}"]))
+        arrays[name] = np.frombuffer(data, "<" + told["dtype"]).reshape(told["shape"])
+        if law := told.get("law"):  # displacements at the first value of this dimension tell all others
+            dims = [dim["name"] for dim in meta["dims"]]
+            values = np.array(meta["dims"][dims.index(law["dim"])]["values"]) ** law["power"]
+            arrays[name] = arrays[name] * values.reshape([-1 if dim == law["dim"] else 1 for dim in dims])
     return meta, arrays
 
 
@@ -136,11 +145,14 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
     with xr.open_dataset(result, mask_and_scale=False) as data:
         expected = data.sel(axes_of(meta))
         assert axes_of(meta)["theta"] == [0.0, 5.0, 20.0]
-        for name, kind in (("permanent_displacement", "f4"), ("sliding_mode", "i1"), ("validity", "i2")):
-            values = expected[name].transpose(*axes_of(meta)).values.astype(kind)
+        for name in ("sliding_mode", "validity"):
+            values = expected[name].transpose(*axes_of(meta)).values
             np.testing.assert_array_equal(np.broadcast_to(arrays[name], values.shape), values)
-    # neither depends on frequency here: stored once
-    assert arrays["sliding_mode"].shape == arrays["validity"].shape == (3, 2, 23, 1)
+        # single precision, and once more by the law of frequencies
+        displacement = expected.permanent_displacement.transpose(*axes_of(meta)).values
+        np.testing.assert_allclose(arrays["permanent_displacement"], displacement, rtol=4e-7, atol=0)
+    # none of them needs all frequencies here: stored once
+    assert {tuple(meta["arrays"][name]["shape"]) for name in expected if name in meta["arrays"]} == {(3, 2, 23, 1)}
     assert [dim["log"] for dim in meta["dims"]] == [False, False, False, True]
     assert "All 2,484 cells of the file are here." in written.read_text()
 
@@ -148,6 +160,27 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
 def test_page_refers_to_nothing_outside(written: Path) -> None:
     page = Elements(written.read_text(encoding="utf-8"))
     assert page.addresses == ["data:,"]
+
+
+def test_cells_of_more_frequencies_take_no_room(tmp_path: Path) -> None:
+    """u = W/ω²: so three million cells (sweeps/design_chart.toml) take less than a page of 10 MB has."""
+    sizes = []
+    for number in (10, 1000):
+        data = sweep([0, 5], [0.3, 0.5], np.linspace(1, 12, 60), np.geomspace(0.1, 20, number))
+        data.to_netcdf(tmp_path / "own.nc")
+        write_page(tmp_path / "own.nc", tmp_path / "page.html", overwrite=True)
+        meta, _ = contents(tmp_path / "page.html")
+        assert len(axes_of(meta)["frequency"]) == number
+        sizes.append((tmp_path / "page.html").stat().st_size)
+    assert sizes[1] - sizes[0] < 25 * 990  # bytes for the values of the axis; 240 cells at each of them
+
+
+def test_frequency_is_logarithmic_also_if_its_values_are_not(tmp_path: Path) -> None:
+    data = sweep(5, [0.3, 0.5], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0])
+    data.to_netcdf(tmp_path / "own.nc")
+    write_page(tmp_path / "own.nc", tmp_path / "page.html")
+    meta, _ = contents(tmp_path / "page.html")
+    assert {dim["name"]: dim["log"] for dim in meta["dims"]} == {"mu_s": False, "amplitude": False, "frequency": True}
 
 
 def test_histories_are_those_of_simulate(written: Path) -> None:
@@ -188,25 +221,29 @@ def test_histories_are_those_of_simulate(written: Path) -> None:
 
 
 def test_large_result_is_thinned_to_the_size_and_says_how(tmp_path: Path) -> None:
-    grid = SWEEP.replace("num = 23", "num = 460").replace("num = 18", "num = 180")
+    # A = ω²d: no frequency tells another
+    grid = SWEEP.replace("amplitude", "displacement_amplitude").replace(
+        "start = 1\nstop = 12", "start = 0.001\nstop = 0.1"
+    )
+    grid = grid.replace("num = 23", "num = 460").replace("num = 18", "num = 180")
     result, output = make(tmp_path, grid), tmp_path / "page.html"
     excerpt = write_page(result, output, size=2_500_000)
     assert 2_000_000 < output.stat().st_size <= 2_500_000
     meta, arrays = contents(output)
     axes = axes_of(meta)
     kept = {dim: len(values) for dim, values in axes.items()}
-    assert kept == excerpt.table["permanent_displacement"].sizes != excerpt.lengths
-    assert kept["amplitude"] < 460
+    assert kept == excerpt.sizes != excerpt.lengths
+    assert kept["displacement_amplitude"] < 460
     with xr.open_dataset(result) as data:
-        for dim in ("amplitude", "frequency"):
+        for dim in ("displacement_amplitude", "frequency"):
             assert axes[dim][0] == data[dim][0]
             assert axes[dim][-1] == data[dim][-1]
         expected = data.permanent_displacement.sel(axes).values.astype("f4")
     np.testing.assert_array_equal(arrays["permanent_displacement"], expected)
     text = output.read_text(encoding="utf-8")
     assert f"Thinned: {math.prod(kept.values()):,} of the file's 496,800 cells" in text
-    assert f"amplitude: {kept['amplitude']} of 460 values" in text
-    assert f"{axes['amplitude'][1]:.5g}" in text
+    assert f"displacement_amplitude: {kept['displacement_amplitude']} of 460 values" in text
+    assert f"{axes['displacement_amplitude'][1]:.5g}" in text
 
 
 def test_unsorted_axes_are_sorted(tmp_path: Path) -> None:
@@ -216,8 +253,8 @@ def test_unsorted_axes_are_sorted(tmp_path: Path) -> None:
     write_page(tmp_path / "own.nc", tmp_path / "page.html")
     meta, arrays = contents(tmp_path / "page.html")
     assert axes_of(meta) == {"mu_s": [0.3, 0.5], "amplitude": [3.0, 6.0, 9.0], "frequency": [1.0, 2.0, 4.0]}
-    expected = data.sortby(["mu_s", "amplitude", "frequency"]).permanent_displacement.values.astype("f4")
-    np.testing.assert_array_equal(arrays["permanent_displacement"], expected)
+    expected = data.sortby(["mu_s", "amplitude", "frequency"]).permanent_displacement.values
+    np.testing.assert_allclose(arrays["permanent_displacement"], expected, rtol=4e-7, atol=0)
 
 
 def test_further_dimensions_and_ground_displacement(tmp_path: Path) -> None:
@@ -240,7 +277,7 @@ def test_further_dimensions_and_ground_displacement(tmp_path: Path) -> None:
     assert [*axes_of(meta)] == ["theta", "mu_s", "displacement_amplitude", "frequency", "yield_acceleration"]
     assert (meta["map"]["y"], meta["map"]["x"]) == ("displacement_amplitude", "frequency")
     assert arrays["sliding_mode"].shape[3] == 3
-    amplitude = np.reshape(meta["coords"]["amplitude"]["values"], meta["coords"]["amplitude"]["shape"])
+    amplitude = arrays["coordinate_amplitude"]
     np.testing.assert_allclose(amplitude[2, 1], (4.0 * math.pi) ** 2 * 0.02, rtol=1e-15)
     expected = simulate(
         5, 0.4, amplitude[2, 1], 2.0, yield_acceleration=0.5, times=np.array(meta["histories"]["phase"]) / (4 * math.pi)
@@ -250,13 +287,77 @@ def test_further_dimensions_and_ground_displacement(tmp_path: Path) -> None:
     np.testing.assert_allclose(kept, expected, rtol=0, atol=float(expected.max()) / 60_000)
 
 
+# ------------------------------------------------------------------ other shaking, and statistics
+
+
+@pytest.fixture(scope="module")
+def suite_page(tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, Path]:
+    """Of four motions and both polarities, with a frequency of the structure nowhere."""
+    folder = tmp_path_factory.mktemp("suite")
+    suite = read_suite([SUITE / f"{name}_H1.AT2" for name in ("rock-far", "rock-near", "soft-far", "stiff-pulse")])
+    data = sweep([0, 5], [0.1, 0.2, 0.3], amplitude=[1.0, 2.0, 4.0, 8.0], excitation=suite, polarity="both")
+    data.to_netcdf(folder / "suite.nc")
+    write_page(folder / "suite.nc", folder / "suite.html")
+    return data, folder / "suite.html"
+
+
+def test_a_suite_shows_its_motions_and_their_statistics(suite_page: tuple[xr.Dataset, Path]) -> None:
+    data, path = suite_page
+    data = data.sortby("polarity")
+    meta, arrays = contents(path)
+    assert (meta["map"]["y"], meta["map"]["x"]) == ("amplitude", "mu_s")
+    motion = next(dim for dim in meta["dims"] if dim["name"] == "motion")
+    assert motion["labels"] == data.motion.values.tolist()
+    order = [dim["name"] for dim in meta["dims"]]
+
+    def spread(values: xr.DataArray) -> np.ndarray:
+        values = values.expand_dims([dim for dim in order if dim not in values.dims])
+        return values.transpose(*order).values
+
+    np.testing.assert_array_equal(arrays["permanent_displacement"], spread(data.permanent_displacement).astype("f4"))
+    np.testing.assert_array_equal(arrays["validity"], spread(data.validity))
+    found = suite_statistics(data, quantiles=[0.16, 0.5, 0.84])
+    for name in ("displacement_quantile", "exceedance_probability"):
+        expected = spread(found[name])
+        np.testing.assert_allclose(np.broadcast_to(arrays[name], expected.shape), expected, rtol=1e-6)
+        assert meta["arrays"][name]["dims"] == list(found[name].dims)
+    assert 0.0 < arrays["exceedance_probability"].mean() < 1.0
+    assert meta["histories"] is None
+
+
+@pytest.mark.parametrize("drawn", [False, True])
+def test_records_and_uncertain_inputs(tmp_path: Path, drawn: bool) -> None:
+    uncertain = "[uncertainty]\nsamples = 64\n[uncertainty.mu_s]\ndistribution = 'uniform'\nloc = 0.1\nscale = 0.2\n"
+    text = f"""
+    [excitation]
+    record = "{(SUITE / "rock-far_H1.AT2").as_posix()}"
+    [axes.theta]
+    values = [2, 5]
+    [axes.scale]
+    values = [1, 2, 4]
+    [axes.time_scale]
+    values = [0.5, 1, 2]
+    """
+    text = textwrap.dedent(text) + (uncertain if drawn else "[axes.mu_s]\nvalues = [0.2]\n")
+    result, output = make(tmp_path, text), tmp_path / "page.html"
+    write_page(result, output)
+    meta, arrays = contents(output)
+    assert meta["map"] == {"y": "scale", "x": "time_scale"}
+    with xr.open_dataset(result) as data:
+        names = ("displacement_quantile", "exceedance_probability") if drawn else ("permanent_displacement",)
+        for name in names:
+            order = [dim["name"] for dim in meta["dims"] if dim["name"] in data[name].dims]
+            expected = data[name].transpose(*order).values
+            np.testing.assert_allclose(arrays[name].reshape([data.sizes[d] for d in order]), expected, rtol=4e-7)
+            assert np.nanmax(expected) > 0.0
+
+
 # ---------------------------------------------------------------------- errors and outputs
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (SWEEP.replace("start = 1\nstop = 12\nnum = 23", "values = [3]"), "no map to draw"),
         (SWEEP + 'variables = ["sliding_mode"]', "holds no permanent_displacement"),
         (
             "[[cases]]\ntheta = 5\nmu_s = 0.4\namplitude = 4\nfrequency = 2\n[[cases]]\ntheta = 5\nmu_s = 0.5\n"
@@ -311,7 +412,7 @@ def test_failure_leaves_nothing(result: Path, tmp_path: Path, monkeypatch: pytes
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("text", "size"), [("25MB", 25_000_000), ("1.5 GB", 1_500_000_000), ("900kB", 900_000)])
+@pytest.mark.parametrize(("text", "size"), [("10MB", 10_000_000), ("1.5 GB", 1_500_000_000), ("900kB", 900_000)])
 def test_size(text: str, size: int) -> None:
     assert parse_size(text) == size
 
@@ -355,21 +456,23 @@ def wait_for(driver: Any, script: str) -> Any:
 def opened(browser: Any, written: Path) -> Any:
     for log in ("browser", "performance"):
         browser.get_log(log)
-    browser.get(written.as_uri())
-    wait_for(browser, "document.body.dataset.ready")
-    wait_for(browser, "Bokeh.documents[0].is_idle")
+    show(browser, written)
     return browser
 
 
 def move(driver: Any, theta: int, mu_s: int) -> None:
     """Move both sliders to a position."""
     for name, position in (("theta", theta), ("mu_s", mu_s)):
-        driver.execute_script(
-            "const slider = document.getElementById(arguments[0]);"
-            "slider.value = arguments[1]; slider.dispatchEvent(new Event('input'))",
-            f"slider-{name}",
-            position,
-        )
+        place_slider(driver, name, position)
+
+
+def place_slider(driver: Any, name: str, position: int) -> None:
+    driver.execute_script(
+        "const slider = document.getElementById(arguments[0]);"
+        "slider.value = arguments[1]; slider.dispatchEvent(new Event('input'))",
+        f"slider-{name}",
+        position,
+    )
 
 
 def point(driver: Any, x: float, y: float, click: bool = False) -> None:
@@ -377,19 +480,42 @@ def point(driver: Any, x: float, y: float, click: bool = False) -> None:
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
 
+    host = driver.find_element(By.ID, "map")
+    driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", host)
     frame = driver.execute_script(
         "const m = Bokeh.documents[0].get_model_by_name('map'); const b = Bokeh.index.find_one(m).frame.bbox;"
         "return [b.left, b.top, b.width, b.height]"
     )
-    host = driver.find_element(By.ID, "map")
     left = frame[0] + x * frame[2] - host.size["width"] / 2
     top = frame[1] + y * frame[3] - host.size["height"] / 2
     actions = ActionChains(driver, duration=0).move_to_element_with_offset(host, round(left), round(top))
     (actions.click() if click else actions).perform()
 
 
+def text_of(driver: Any, name: str) -> str:
+    text = driver.execute_script("return document.getElementById(arguments[0]).textContent", name)
+    return str(text).replace("\u00a0", " ")
+
+
 def told(driver: Any, name: str) -> str:
-    return str(driver.execute_script("return document.getElementById('readout-' + arguments[0]).textContent", name))
+    return text_of(driver, f"readout-{name}")
+
+
+def flag_rows(driver: Any) -> list[list[str]]:
+    """What the readout says of flags: the kind and its text, the flag and its text."""
+    rows: list[list[str]] = driver.execute_script(
+        "return [...document.querySelectorAll('dd.flag')].map((dd) => [dd.previousSibling.textContent, dd.textContent])"
+    )
+    return rows
+
+
+def chosen(driver: Any, element: str = "readout") -> list[int] | None:
+    """The index of the cell that an element is of."""
+    index = driver.execute_script("return document.getElementById(arguments[0]).dataset.index", element)
+    return json.loads(index) if index else None
+
+
+AXES: list[Any] = [[0, 5, 20], [0.3, 0.5], np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)]
 
 
 def test_page_loads_without_errors_and_without_network(opened: Any) -> None:
@@ -434,40 +560,45 @@ def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
             wait_for(opened, "document.getElementById('readout-title').textContent === 'Cell under the pointer'")
             amplitude = float(told(opened, "amplitude").split()[0])
             frequency = float(told(opened, "frequency").split()[0])
+            assert told(opened, "amplitude") == f"{amplitude:g} m/s² ({amplitude / 9.81:.4g} g)"
             # the cell is where the pointer is: axes from half a cell before the first value to half a cell after
             assert abs(amplitude - (12.25 - 11.5 * y)) <= 0.27
             step = math.log(50) / 17
             assert abs(math.log(frequency / 0.2) - (-0.5 + 18 * x) * step) <= 0.54 * step
-            cell = data.sel(theta=[0, 5, 20][theta], mu_s=[0.3, 0.5][mu_s]).sel(
+            cell = data.sel(theta=AXES[0][theta], mu_s=AXES[1][mu_s]).sel(
                 amplitude=amplitude, frequency=frequency, method="nearest"
             )
             displacement = float(cell.permanent_displacement)
-            text = told(opened, "displacement")
+            text = told(opened, "permanent_displacement")
             if math.isnan(displacement):
                 assert text == "no value"
             else:
-                assert text.endswith(" mm")
-                assert float(text.removesuffix(" mm")) == pytest.approx(displacement * 1000, rel=5.1e-4, abs=1e-30)
+                number, units = text.split()
+                metres = float(number) * {"mm": 1e-3, "m": 1.0}[units]
+                assert metres == pytest.approx(displacement, rel=5.1e-4, abs=1e-30)
+            raised = Validity(int(cell.validity))
+            flags = [
+                [f"{kind}: {FLAG_KIND_TEXT[kind]}", f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}"]
+                for kind in FlagKind
+                for flag in raised & flags_of(kind)
+            ]
+            assert flag_rows(opened) == flags
+            assert flags or told(opened, "flags") == "none"
             mode = SlidingMode(int(cell.sliding_mode)).name.lower()
             assert told(opened, "mode") == mode
-            raised = Validity(int(cell.validity))
-            flags = [(flag.name or "").lower() for kind in FlagKind for flag in raised & flags_of(kind)]
-            assert re.findall(r"(?:no value|caution|note) (\w+):", told(opened, "flags")) == flags
-            assert flags or told(opened, "flags") == "none"
-            seen |= {mode, *flags}
+            seen |= {mode, *(flag.split(":")[0] for _, flag in flags)}
         assert {"stuck", "stick_slip", "continuous", "missing", "statically_unstable"} <= seen
 
 
-def test_history_is_of_the_cell_that_was_chosen(opened: Any, result: Path) -> None:
+def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
     move(opened, 1, 0)
     point(opened, 0.4, 0.25, click=True)
-    wait_for(opened, "document.getElementById('readout-title').textContent !== ''")
-    index = json.loads(opened.execute_script("return document.getElementById('readout').dataset.index"))
-    axes: list[Any] = [[0, 5, 20], [0.3, 0.5], np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)]
-    theta, mu_s, amplitude, frequency = (float(axis[at]) for axis, at in zip(axes, index, strict=True))
+    index = chosen(opened)
+    assert index is not None
+    assert chosen(opened, "history-note") == index
+    theta, mu_s, amplitude, frequency = (float(axis[at]) for axis, at in zip(AXES, index, strict=True))
     assert (theta, mu_s) == (5, 0.3)
-    note = opened.execute_script("return document.getElementById('history-note').textContent")
-    assert "First 3 of 4 cycles, of this cell." in note
+    assert text_of(opened, "history-note").endswith("the first 3 of 4 cycles.")
     drawn = opened.execute_script(
         "const d = Bokeh.documents[0].get_model_by_name('history').data; return [[...d.t], [...d.v], [...d.u]]"
     )
@@ -478,15 +609,171 @@ def test_history_is_of_the_cell_that_was_chosen(opened: Any, result: Path) -> No
         np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
 
 
+def held_cells(driver: Any) -> list[list[float]]:
+    """Amplitudes and frequencies of the cells that are marked."""
+    cells: list[list[float]] = driver.execute_script(
+        "const d = Bokeh.documents[0].get_model_by_name('held').data; return [[...d.y], [...d.x]]"
+    )
+    return cells
+
+
+def test_a_click_goes_to_the_nearest_cell_with_a_history_and_says_so(
+    browser: Any, result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from selenium.webdriver.common.by import By
+
+    monkeypatch.setattr("slipsweep.explore.page._HISTORIES_BYTES", 60_000)
+    write_page(result, tmp_path / "page.html")
+    meta, arrays = contents(tmp_path / "page.html")
+    keep = meta["histories"]["keep"]
+    assert (keep["theta"], keep["mu_s"]) == ([0, 1, 2], [0, 1])
+    assert 1 < len(keep["amplitude"]) < 23
+    show(browser, tmp_path / "page.html")
+    move(browser, 1, 0)
+    there = [k for at, k in enumerate(keep["amplitude"]) if np.isfinite(arrays["history_scale"][1, 0, at, 0])]
+    assert sorted(set(held_cells(browser)[0])) == [AXES[2][k] for k in there]
+    missing = next(k for k in range(1, 22) if k not in there and k + 1 in there)
+    point(browser, 9.5 / 18, 1 - (missing + 0.5) / 23, click=True)
+    assert chosen(browser) == chosen(browser, "history-note") == [1, 0, missing + 1, 9]
+    note = text_of(browser, "history-note")
+    assert note.startswith(f"The cell that was clicked (A = {AXES[2][missing]:g} m/s²")
+    assert f"this is the nearest that has one. A = {AXES[2][missing + 1]:g} m/s²" in note
+    # the slider stops at any cell: one without a history shows none, and a button goes on
+    place_slider(browser, "amplitude", missing)
+    assert chosen(browser) == [1, 0, missing, 9]
+    assert chosen(browser, "history-note") is None
+    assert not browser.find_element(By.ID, "histories").is_displayed()
+    assert text_of(browser, "history-note").startswith("This cell has no time history in the page.")
+    browser.find_element(By.ID, "nearest").click()
+    assert chosen(browser) == chosen(browser, "history-note") == [1, 0, missing + 1, 9]
+
+
+def pixels(driver: Any, name: str) -> np.ndarray:
+    """An image of the map, from below."""
+    image = driver.execute_script(
+        "const d = Bokeh.documents[0].get_model_by_name(arguments[0]).data.image[0]; return [d.shape, [...d]]", name
+    )
+    return np.reshape(np.array(image[1], float), image[0])
+
+
 def test_map_colours_are_the_dataset(opened: Any) -> None:
     """The picture itself: every pixel has the displacement of the cell it lies in."""
     move(opened, 1, 0)
-    image = opened.execute_script(
-        "const d = Bokeh.documents[0].get_model_by_name('colours').data.image[0]; return [d.shape, [...d]]"
+    seen = pixels(opened, "colours")
+    mm = 1000 * sweep(5, 0.3, *AXES[2:], excitation=Sine(cycles=4)).permanent_displacement.values
+    rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)
+    columns = ((np.arange(18) + 0.5) * seen.shape[1] / 18).astype(int)
+    np.testing.assert_allclose(seen[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)
+
+
+def test_cautions_are_hatched_and_notes_are_not(opened: Any) -> None:
+    move(opened, 1, 0)
+    hatched = pixels(opened, "marks") != 0
+    cells = sweep(5, 0.3, *AXES[2:], excitation=Sine(cycles=4))
+    moved, raised = cells.permanent_displacement.values > 0, cells.validity.values
+    height, width = hatched.shape
+    seen = set()
+    for row, column in np.argwhere(moved):
+        # inside of the cell, where no line between modes runs
+        inside = hatched[
+            math.ceil(row * height / 23) + 2 : (row + 1) * height // 23 - 1,
+            math.ceil(column * width / 18) + 2 : (column + 1) * width // 18 - 1,
+        ]
+        flags = Validity(int(raised[row, column]))
+        assert inside.any() == bool(flags & CAUTIONS)
+        assert not flags & VALUELESS
+        seen.add((bool(flags & CAUTIONS), bool(flags & NOTES)))
+    assert {(True, True), (False, True)} <= seen
+
+
+def test_zoom_keeps_the_chosen_cell_in_view(opened: Any) -> None:
+    from selenium.webdriver.common.by import By
+
+    point(opened, 0.9, 0.1, click=True)
+    index = chosen(opened)
+    assert index is not None
+    for _ in range(2):
+        opened.find_element(By.ID, "zoom-in").click()
+    low, high = opened.execute_script(
+        "const r = Bokeh.documents[0].get_model_by_name('y_range'); return [r.start, r.end]"
     )
-    pixels = np.reshape(np.array(image[1], float), image[0])
-    amplitude, frequency = np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)
-    mm = 1000 * sweep(5, 0.3, amplitude, frequency, excitation=Sine(cycles=4)).permanent_displacement.values
-    rows = ((np.arange(23) + 0.5) * image[0][0] / 23).astype(int)
-    columns = ((np.arange(18) + 0.5) * image[0][1] / 18).astype(int)
-    np.testing.assert_allclose(pixels[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)
+    assert high - low == pytest.approx(11.5 / 4)
+    assert low <= AXES[2][index[2]] <= high
+    # a click means the cell that is seen there
+    point(opened, 0.5, 0.5, click=True)
+    there = chosen(opened)
+    assert there is not None
+    assert abs(AXES[2][there[2]] - (low + high) / 2) <= 0.26
+    opened.find_element(By.ID, "zoom-whole").click()
+
+
+# ------------------------------------------------------------------------- for everybody
+
+
+def show(driver: Any, path: Path, width: int = 1340) -> None:
+    """Open a page in a window of some width; narrow ones are phones."""
+    driver.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500},
+    )
+    driver.get(path.as_uri())
+    wait_for(driver, "document.body.dataset.ready")
+    wait_for(driver, "Bokeh.documents[0].is_idle")
+
+
+@pytest.mark.parametrize("width", [360, 414, 1340])
+def test_nothing_is_wider_than_the_screen_and_axe_finds_nothing(
+    browser: Any, written: Path, suite_page: tuple[xr.Dataset, Path], width: int
+) -> None:
+    axe_core = pytest.importorskip("axe_core_python")
+    script = (Path(axe_core.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
+    for path in (written, suite_page[1]):
+        show(browser, path, width)
+        wide = browser.execute_script("return [document.documentElement.scrollWidth, window.innerWidth]")
+        assert wide[0] <= wide[1] == width
+        beyond = browser.execute_script(
+            "return [...document.querySelectorAll('body *:not(#spoken)')].filter((e) =>"
+            " e.getBoundingClientRect().right > innerWidth || (e.clientWidth && e.scrollWidth > e.clientWidth + 1)"
+            ").map((e) => e.outerHTML.slice(0, 80))"
+        )
+        assert beyond == []
+        browser.execute_script(script)
+        found = browser.execute_async_script("axe.run().then(arguments[arguments.length - 1])")
+        # one rule and one name each: all of them, whatever their impact
+        assert [(broken["id"], broken["impact"]) for broken in found["violations"]] == []
+        assert len(found["passes"]) > 15
+
+
+def test_everything_is_reached_by_keyboard_and_told(browser: Any, suite_page: tuple[xr.Dataset, Path]) -> None:
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    data, path = suite_page
+    show(browser, path)
+    order = []
+    for _ in range(30):
+        browser.switch_to.active_element.send_keys(Keys.TAB)
+        order.append(browser.execute_script("return document.activeElement.id"))
+        if order[-1] == "zoom-whole":
+            break
+    assert order == [
+        "layer", "slider-theta", "slider-polarity", "slider-motion", "slider-amplitude", "slider-mu_s",
+        "zoom-in", "zoom-out", "zoom-whole",
+    ]  # fmt: skip
+    for name, key in (("motion", "soft-far"), ("amplitude", Keys.END), ("mu_s", Keys.HOME)):
+        browser.find_element(By.ID, f"slider-{name}").send_keys(key)
+    cell = data.isel(theta=0).sel(polarity=-1, motion="soft-far_H1", amplitude=8, mu_s=0.1)
+    spoken = wait_for(browser, "/ 8\\sm.s²/.test(document.getElementById('spoken').textContent)") and text_of(
+        browser, "spoken"
+    )
+    number = re.search(r"permanent displacement, downslope: ([\d.]+) mm", spoken)
+    assert number
+    assert float(number[1]) == pytest.approx(1000 * float(cell.permanent_displacement), rel=5.1e-4)
+    amplitude = browser.find_element(By.ID, "slider-amplitude")
+    assert amplitude.get_attribute("aria-valuetext").replace("\u00a0", " ") == "8 metres per second squared (0.8155 g)"
+    # the share that exceeds a threshold does not depend on the motion, whose control goes
+    browser.find_element(By.ID, "layer").send_keys("probability")
+    assert not browser.find_element(By.ID, "slider-motion").is_displayed()
+    share = (data.isel(theta=0).sel(amplitude=8, mu_s=0.1).permanent_displacement > 0.1).mean().item()
+    assert f"100 mm: {100 * share:.4g} %" in told(browser, "exceedance_probability")
+    assert "probability" in text_of(browser, "map-title")

@@ -297,7 +297,6 @@ def test_other_commands_on_the_result(folder: Path) -> None:
     assert export.export(folder / "a.nc", folder / "samples.csv", variables=["record_acceleration"]) == 500
     for arguments, message in (
         (("chart", folder / "a.nc"), "is the response to recorded motions; charts and pages"),
-        (("explore", folder / "a.nc"), "is the response to recorded motions; charts and pages"),
         (("run", folder / "a.toml", "-o", folder / "b.nc", "--solver", "step"), "--solver step: not allowed"),
     ):
         done = command(folder, *arguments)

@@ -548,8 +548,6 @@ def test_other_commands_say_what_they_want(folder: Path, capsys: pytest.CaptureF
     assert "limits are those of a sweep without [uncertainty]" in capsys.readouterr().err
     assert main(["chart", path, "--kind", "contours"]) == 2
     assert "permanent_displacement: no such variable" in capsys.readouterr().err
-    assert main(["explore", path]) == 2
-    assert "which slipsweep chart draws" in capsys.readouterr().err
     assert main(["info", path]) == 0
     assert "exceedance_probability" in capsys.readouterr().out
 

@@ -32,7 +32,7 @@ def explore(
         typer.Option(
             metavar="SIZE", help="Largest size of the page; larger results are thinned to it.", rich_help_panel=OUTPUT
         ),
-    ] = "25MB",
+    ] = "10MB",
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary.", rich_help_panel=OUTPUT)] = False,
 ) -> None:
     """Write a page for the browser in which to explore a result."""
@@ -45,16 +45,16 @@ def explore(
     excerpt = pages.write_page(file, path, size=nbytes, overwrite=overwrite)
     if quiet:
         return
-    shown = excerpt.table["permanent_displacement"].sizes
     for dim, length in excerpt.lengths.items():
-        thinned = "" if shown[dim] == length else f"  thinned: {shown[dim]} of {length} (more with --size)"
-        typer.echo(f"{dim:<24}{shown[dim]} values{thinned}")
+        shown = excerpt.sizes[dim]
+        thinned = "" if shown == length else f"  thinned: {shown} of {length} (more with --size)"
+        typer.echo(f"{dim:<24}{shown} values{thinned}")
     typer.echo(f"{path}  {size_text(path.stat().st_size)}")
 
 
 def parse_size(text: str) -> int:
-    """Return the bytes in a size such as ``25MB``; InputError for anything else."""
+    """Return the bytes in a size such as ``10MB``; InputError for anything else."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(kB|MB|GB)", text.strip())
     if not found:
-        raise InputError(f"--size = {text!r}: must be a number and kB, MB or GB, such as 25MB")
+        raise InputError(f"--size = {text!r}: must be a number and kB, MB or GB, such as 10MB")
     return int(float(found[1]) * _UNITS[found[2]])

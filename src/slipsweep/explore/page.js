@@ -1,23 +1,24 @@
 // Moves the numbers of an explore page: looks cells up, fills the figures that Bokeh draws, and
-// scales time histories to a frequency.  No physics is computed here.
-(function () {
+// scales displacements and time histories to a frequency.  No physics is computed here.
+(async function () {
   "use strict";
-  const meta = JSON.parse(document.getElementById("meta").textContent);
-  const types = { f4: Float32Array, i1: Int8Array, i2: Int16Array };
+  const element = (id) => document.getElementById(id);
+  const meta = JSON.parse(element("meta").textContent);
+  const types = { f8: Float64Array, f4: Float32Array, i1: Int8Array, i2: Int16Array };
   const arrays = {};
-  for (const [name, { dtype, shape }] of Object.entries(meta.arrays)) {
-    const element = document.getElementById("array-" + name);
-    const text = atob(element.textContent.trim());
-    const bytes = new Uint8Array(text.length);
-    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-    arrays[name] = { values: new types[dtype](bytes.buffer), shape };
-    element.remove(); // the text is not needed twice
+  for (const [name, told] of Object.entries(meta.arrays)) {
+    const packed = Uint8Array.from(atob(element("array-" + name).textContent.trim()), (c) => c.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+    arrays[name] = { ...told, values: new types[told.dtype](await new Response(stream).arrayBuffer()) };
+    element("array-" + name).remove(); // the text is not needed twice
   }
   const dims = meta.dims;
   const position = Object.fromEntries(dims.map((dim, i) => [dim.name, i]));
   const X = position[meta.map.x], Y = position[meta.map.y];
-  // index along every dimension: the sliders' and the chosen cell's
-  const chosen = dims.map((dim, i) => (i === X || i === Y ? Math.floor(dim.values.length / 2) : Math.floor((dim.values.length - 1) / 2)));
+  const known = { ...meta.coords, ...Object.fromEntries(dims.map((dim) => [dim.name, dim])) };
+  let layer = meta.layers[0];
+  // index along every dimension: what the controls say
+  const chosen = dims.map((dim, i) => Math.floor((dim.values.length - (i === X || i === Y ? 0 : 1)) / 2));
 
   // Where an index lies in an array that may have length 1 along a dimension.
   function offset(shape, index) {
@@ -27,13 +28,19 @@
   }
   function value(name, index) {
     const array = arrays[name];
-    return array ? array.values[offset(array.shape, index)] : null;
+    if (!array) return null;
+    const found = array.values[offset(array.shape, index)], law = array.law;
+    return law ? found * coordinate(law.dim, index) ** law.power : found;
   }
   function coordinate(name, index) {
     if (name in position) return dims[position[name]].values[index[position[name]]];
-    const coord = meta.coords[name];
+    const coord = arrays["coordinate_" + name];
     return coord ? coord.values[offset(coord.shape, coord.dims.map((dim) => index[position[dim]]))] : null;
   }
+  // Whether a result can be told for what is chosen: no dimension of it is hidden.
+  const isShown = (dim) => position[dim] === X || position[dim] === Y || arrays[layer.name].dims.includes(dim);
+  const own = (dim) => dim === "quantile" || dim === "threshold";
+  const isTold = (name) => name in arrays && arrays[name].dims.every((dim) => own(dim) || isShown(dim));
 
   // Edges of the cells along an axis, half way between values, in the scale of the axis.
   function scaled(dim, x) { return dim.log ? Math.log10(x) : x; }
@@ -54,54 +61,100 @@
     }
     return low;
   }
-  function pixelCells(edgesOf, pixels) {
-    const first = edgesOf[0], step = (edgesOf[edgesOf.length - 1] - first) / pixels;
-    return Int32Array.from({ length: pixels }, (_, i) => find(edgesOf, first + (i + 0.5) * step));
+  // The part of an axis that is seen, and the cells in its pixels.
+  const ends = (edgesOf) => [edgesOf[0], edgesOf[edgesOf.length - 1]];
+  const seen = { [X]: ends(edgesX), [Y]: ends(edgesY) };
+  function pixelCells(edgesOf, [from, to], pixels) {
+    return Int32Array.from({ length: pixels }, (_, i) => find(edgesOf, from + ((i + 0.5) * (to - from)) / pixels));
   }
-  const width = meta.map.width, height = meta.map.height;
-  const cellsX = pixelCells(edgesX, width), cellsY = pixelCells(edgesY, height);
+  function cellAt(i, j) {
+    const index = chosen.slice();
+    index[X] = i; index[Y] = j;
+    return index;
+  }
+
+  // ----------------------------------------------------------------------------- in words
+  const digits = (x) => String(Number(x.toPrecision(5)));
+  function withUnit(name, x) {
+    const { unit, acceleration, labels } = known[name];
+    if (labels && labels.length) return labels[Math.round(x) - 1];
+    if (name === "threshold") return lengthText(x);
+    if (name === "quantile" && x === 0.5) return "0.5 (median)";
+    const text = digits(x) + (unit === "" || unit === "°" ? "" : "\u00a0") + unit;
+    return acceleration ? `${text} (${Number((x / meta.g).toPrecision(4))}\u00a0g)` : text;
+  }
+  function described(names, index) {
+    return names.map((name) => `${known[name].symbol} = ${withUnit(name, coordinate(name, index))}`).join(", ");
+  }
+  function lengthText(u) {
+    if (Number.isNaN(u)) return "no value";
+    return Math.abs(u) < 10 ? `${digits(Number((u * 1000).toPrecision(4)))}\u00a0mm` : `${digits(Number(u.toPrecision(4)))}\u00a0m`;
+  }
+  function valueText(about, u) {
+    return about.scale === "displacement" || Number.isNaN(u) ? lengthText(u) : `${Number((100 * u).toPrecision(4))}\u00a0%`;
+  }
+  function layerText(about, index) { // a statistic along all its quantiles or thresholds
+    const i = arrays[about.name].dims.filter(own).map((dim) => position[dim])[0];
+    if (i === undefined) return valueText(about, value(about.name, index));
+    return dims[i].values.map((x, k) => {
+      const at = index.slice();
+      at[i] = k;
+      return `${withUnit(dims[i].name, x)}: ${valueText(about, value(about.name, at))}`;
+    }).join("; ");
+  }
 
   // ------------------------------------------------------------------ marks over the colours
   function rgba(r, g, b, a) { return ((a << 24) | (b << 16) | (g << 8) | r) >>> 0; }
   const CLEAR = 0, LINE = rgba(0, 0, 0, 255), HATCH = rgba(0, 0, 0, 150);
-  const STUCK = rgba(238, 238, 238, 255), MISSING = rgba(255, 255, 255, 255), CROSS = rgba(150, 150, 150, 255);
-  const UPSLOPE = rgba(204, 121, 167, 255);
+  const WHITE = rgba(255, 255, 255, 255), GREY = rgba(140, 140, 140, 255), COLOUR = rgba(104, 190, 194, 255);
+  const STUCK = rgba(238, 238, 238, 255), UPSLOPE = rgba(204, 121, 167, 255);
   const KINDS = {
-    stuck: "stuck: no displacement",
-    missing: "no value (see flags)",
-    flagged: "caution (see flags)",
+    stuck: "no displacement",
+    missing: "no value",
+    flagged: "caution",
     upslope: "upslope (negative)",
     boundary: "limit of a sliding mode",
+    held: "cell with a time history",
   };
   function kind(index) {
-    const u = value("permanent_displacement", index);
+    const u = value(layer.name, index);
     if (Number.isNaN(u)) return "missing";
+    if (layer.scale === "probability") return "plain";
     if (u === 0) return "stuck";
     if (u < 0) return "upslope";
-    return value("validity", index) & meta.cautions ? "flagged" : "plain";
+    return layer.name === "permanent_displacement" && value("validity", index) & meta.cautions ? "flagged" : "plain";
   }
-  function mark(what, i, j) { // the colour of pixel (i, j)
-    if (what === "stuck") return STUCK;
-    if (what === "upslope") return UPSLOPE;
-    if (what === "missing") return (i + j) % 10 === 0 || (i - j + 100000) % 10 === 0 ? CROSS : MISSING;
+  function mark(what, i, j) { // the colour of pixel (i, j); told apart in grey too
+    if (what === "stuck") return i % 8 === 0 && j % 8 === 0 ? GREY : STUCK;
+    if (what === "upslope") return i % 6 === 0 ? HATCH : UPSLOPE;
+    if (what === "missing") return (i + j) % 10 === 0 || (i - j + 100000) % 10 === 0 ? GREY : WHITE;
     if (what === "flagged") return (i + j) % 9 === 0 ? HATCH : CLEAR;
-    if (what === "boundary") return Math.abs(j - 8) < 1 ? LINE : CLEAR;
+    if (what === "boundary") return j === 8 ? LINE : WHITE;
+    if (what === "held") {
+      const far = Math.hypot(i - 15, j - 8);
+      return far < 2.6 ? WHITE : far < 3.8 ? LINE : COLOUR;
+    }
     return CLEAR;
   }
 
-  let model, figures;
+  let figures;
+  const frameBox = () => window.Bokeh.index.find_one(figures.map).frame.bbox;
   function draw() {
-    const nx = dims[X].values.length, ny = dims[Y].values.length, index = chosen.slice();
-    const mm = new Float32Array(nx * ny), kinds = new Array(nx * ny), modes = new Int8Array(nx * ny);
+    const nx = dims[X].values.length, ny = dims[Y].values.length;
+    const shades = new Float32Array(nx * ny), kinds = new Array(nx * ny), modes = new Int8Array(nx * ny);
+    const lined = layer.name === "permanent_displacement" && arrays.sliding_mode;
+    const held = { x: [], y: [] };
     for (let j = 0; j < ny; j++) {
       for (let i = 0; i < nx; i++) {
-        index[X] = i; index[Y] = j;
-        const u = value("permanent_displacement", index) * 1000;
-        mm[j * nx + i] = u > 0 ? u : NaN;
-        kinds[j * nx + i] = kind(index);
-        modes[j * nx + i] = arrays.sliding_mode ? value("sliding_mode", index) : 0;
+        const index = cellAt(i, j), at = j * nx + i, u = value(layer.name, index);
+        shades[at] = layer.scale === "probability" ? u : u > 0 ? u * 1000 : NaN;
+        kinds[at] = kind(index);
+        modes[at] = lined ? value("sliding_mode", index) : 0;
+        if (place(index) >= 0) { held.x.push(dims[X].values[i]); held.y.push(dims[Y].values[j]); }
       }
     }
+    const frame = frameBox(), width = Math.max(Math.round(frame.width), 1), height = Math.max(Math.round(frame.height), 1);
+    const cellsX = pixelCells(edgesX, seen[X], width), cellsY = pixelCells(edgesY, seen[Y], height);
     const NumberArray = figures.colours.data.image[0].constructor, MarkArray = figures.marks.data.image[0].constructor;
     const image = new NumberArray(width * height, [height, width]);
     const overlay = new MarkArray(width * height, [height, width]);
@@ -109,153 +162,251 @@
       const row = cellsY[j] * nx, below = cellsY[Math.max(j - 1, 0)] * nx;
       for (let i = 0; i < width; i++) {
         const cell = row + cellsX[i], left = row + cellsX[Math.max(i - 1, 0)], under = below + cellsX[i];
-        image[j * width + i] = mm[cell];
+        image[j * width + i] = shades[cell];
         overlay[j * width + i] =
           modes[cell] !== modes[left] || modes[cell] !== modes[under] ? LINE : mark(kinds[cell], i, j);
       }
     }
-    const raised = (dim, at) => (dim.log ? 10 ** at : at);
-    const x = raised(dims[X], edgesX[0]), y = raised(dims[Y], edgesY[0]);
-    const dw = raised(dims[X], edgesX[nx]) - x, dh = raised(dims[Y], edgesY[ny]) - y;
-    const place = { x: [x], y: [y], dw: [dw], dh: [dh] };
-    figures.colours.data = { image: [image], ...place };
-    figures.marks.data = { image: [overlay], ...place };
-    legend(new Set(kinds), new Set(modes).size > 1);
-    return { x, y, dw, dh };
+    const [[x, right], [y, top]] = [X, Y].map((i) => seen[i].map((at) => (dims[i].log ? 10 ** at : at)));
+    const corner = { x: [x], y: [y], dw: [right - x], dh: [top - y] };
+    figures.x_range.setv({ start: x, end: right });
+    figures.y_range.setv({ start: y, end: top });
+    figures.colours.data = { image: [image], ...corner };
+    figures.marks.data = { image: [overlay], ...corner };
+    figures.held.data = held;
+    const found = new Set(kinds);
+    if (new Set(modes).size > 1) found.add("boundary");
+    if (held.x.length) found.add("held");
+    legend(found);
+    summarize(shades, kinds);
   }
 
-  function legend(kinds, boundaries) {
-    const host = document.getElementById("legend");
-    host.replaceChildren();
-    for (const [name, text] of Object.entries(KINDS)) {
-      if (name === "boundary" ? !boundaries : !kinds.has(name)) continue;
-      const item = document.createElement("span"), canvas = document.createElement("canvas");
+  function legend(found) {
+    const items = Object.entries(KINDS).filter(([name]) => found.has(name)).map(([name, text]) => {
+      const item = document.createElement("li"), canvas = document.createElement("canvas");
       [canvas.width, canvas.height] = [30, 16];
+      canvas.setAttribute("aria-hidden", "true");
       const context = canvas.getContext("2d"), pixels = context.createImageData(30, 16);
       const words = new Uint32Array(pixels.data.buffer);
-      for (let j = 0; j < 16; j++) for (let i = 0; i < 30; i++) words[j * 30 + i] = mark(name, i, j) || (name === "flagged" ? rgba(104, 190, 194, 255) : MISSING);
+      for (let j = 0; j < 16; j++) for (let i = 0; i < 30; i++) words[j * 30 + i] = mark(name, i, j) || COLOUR;
       context.putImageData(pixels, 0, 0);
       item.append(canvas, text);
-      host.append(item);
-    }
+      return item;
+    });
+    element("legend").replaceChildren(...items);
+  }
+  function summarize(shades, kinds) { // what a picture shows, for those who do not see it
+    const extra = dims.filter((dim) => own(dim.name) && isShown(dim.name)).map((dim) => dim.name);
+    element("map-title").textContent = layer.title + (extra.length ? ` (${described(extra, chosen)})` : "");
+    const numbers = shades.filter((x) => !Number.isNaN(x)).sort(), ends = numbers.length ? [numbers[0], numbers[numbers.length - 1]] : [];
+    const [low, high] = ends.map((x) => valueText(layer, layer.scale === "displacement" ? x / 1000 : x));
+    const words = { stuck: "without displacement", missing: "without a value", flagged: "with a caution", upslope: "upslope" };
+    const counted = Object.entries(words).map(([name, text]) => [kinds.filter((what) => what === name).length, text])
+      .filter(([n]) => n > 0).map(([n, text]) => `, ${n} ${text}`).join("");
+    element("map-summary").textContent =
+      `${dims[Y].title} over ${dims[X].title}. ${kinds.length} cells${counted}` +
+      (ends.length ? `; from ${low} to ${high}.` : ".");
   }
 
   // ------------------------------------------------------------------------------- readout
-  function digits(x) { return String(Number(x.toPrecision(5))); }
-  function withUnit(name, x) {
-    const unit = meta.units[name], space = unit === "" || unit === "°" ? "" : "\u00a0";
-    return digits(x) + space + (unit || "");
+  function flagRows(index) {
+    if (!isTold("validity")) return arrays.validity || layer.name !== "permanent_displacement" ? [] : [["flags", "not in the file", "flags"]];
+    const raised = meta.flags.filter((flag) => value("validity", index) & flag.mask);
+    if (!raised.length) return [["flags", "none", "flags"]];
+    return raised.map((flag) => [`${flag.kind}: ${meta.kinds[flag.kind]}`, `${flag.name}: ${flag.text}`, "flag"]);
   }
-  function described(names, index) {
-    return names.map((name) => `${meta.symbols[name] || name} = ${withUnit(name, coordinate(name, index))}`).join(", ");
+  function rows(index) {
+    const found = [Y, X].map((i) => [dims[i].title.replace(/ \(.*\)$/, ""), withUnit(dims[i].name, coordinate(dims[i].name, index)), dims[i].name]);
+    if ("amplitude" in meta.coords) found.splice(1, 0, [known.amplitude.title.replace(/ \(.*\)$/, ""), withUnit("amplitude", coordinate("amplitude", index)), "amplitude"]);
+    for (const about of meta.layers) if (isTold(about.name)) found.push([about.title, layerText(about, index), about.name]);
+    if (isTold("sliding_mode")) found.push(["sliding mode", meta.modes[value("sliding_mode", index)], "mode"]);
+    return [...found, ...flagRows(index)];
   }
-  function displacementText(u) { return Number.isNaN(u) ? "no value" : `${(u * 1000).toPrecision(4)} mm`; }
-  function flagsOf(index) {
-    const validity = value("validity", index);
-    return validity === null ? null : meta.flags.filter((flag) => validity & flag.mask);
-  }
-  function readout(index, pointed) {
-    const amplitude = coordinate("amplitude", index), mode = value("sliding_mode", index), flags = flagsOf(index);
-    const rows = [];
-    for (const i of [Y, X]) rows.push([dims[i].title.replace(/ \(.*\)$/, ""), withUnit(dims[i].name, coordinate(dims[i].name, index)), dims[i].name]);
-    if (meta.map.y === "amplitude") rows[0][1] += ` (${(amplitude / meta.g).toPrecision(4)} g)`;
-    else if (amplitude !== null) rows.splice(1, 0, ["peak ground acceleration", `${withUnit("amplitude", amplitude)} (${(amplitude / meta.g).toPrecision(4)} g)`, "amplitude"]);
-    rows.push(["permanent displacement", displacementText(value("permanent_displacement", index)), "displacement"]);
-    rows.push(["sliding mode", mode === null ? "not in the file" : meta.modes[mode], "mode"]);
-    rows.push(["flags", flags === null ? "not in the file" : flags.map((f) => `${f.kind} ${f.name}: ${f.text}`).join("; ") || "none", "flags"]);
-    const host = document.getElementById("readout");
+  function readout(index, title) {
+    const host = element("readout");
     host.replaceChildren();
-    for (const [title, text, id] of rows) {
+    for (const [name, text, id] of rows(index)) {
       const dt = document.createElement("dt"), dd = document.createElement("dd");
-      dt.textContent = title; dd.textContent = text; dd.className = id; dd.id = "readout-" + id;
+      dt.textContent = name; dd.textContent = text; dd.className = id;
+      if (id !== "flag") dd.id = "readout-" + id;
       host.append(dt, dd);
     }
     host.dataset.index = JSON.stringify(index);
-    document.getElementById("readout-title").textContent = pointed ? "Cell under the pointer" : "Chosen cell";
+    element("readout-title").textContent = title;
+  }
+  let speaking;
+  function speak(text) { // when the controls rest
+    clearTimeout(speaking);
+    speaking = setTimeout(() => { element("spoken").textContent = text; }, 400);
   }
 
   // ------------------------------------------------------------------------------ histories
-  function nearest(kept, dim, index) { // position in `kept` of the value nearest to that of `index`
-    const at = scaled(dim, dim.values[index]);
-    let best = 0;
-    kept.forEach((k, i) => {
-      if (Math.abs(scaled(dim, dim.values[k]) - at) < Math.abs(scaled(dim, dim.values[kept[best]]) - at)) best = i;
-    });
-    return best;
-  }
-  function history() {
-    const note = document.getElementById("history-note"), store = meta.histories;
-    if (!store) { note.textContent = "This page holds no time histories; see the notes below."; return; }
-    const index = chosen.slice();
+  const store = meta.histories;
+  function place(index) { // where the time history of a cell is, or -1
+    if (!store) return -1;
     let cell = 0;
     for (const [name, kept] of Object.entries(store.keep)) {
-      const at = nearest(kept, dims[position[name]], chosen[position[name]]);
-      index[position[name]] = kept[at];
+      const at = kept.indexOf(index[position[name]]);
+      if (at < 0) return -1;
       cell = cell * kept.length + at;
     }
-    const omega = 2 * Math.PI * coordinate("frequency", chosen), amplitude = coordinate("amplitude", index);
+    return Number.isNaN(arrays.history_scale.values[3 * cell]) ? -1 : cell;
+  }
+  function nearest(index) { // the cell with a time history that is nearest in the map, or null
+    const across = (edgesOf, k) => (edgesOf[k] + edgesOf[k + 1]) / 2 / (edgesOf[edgesOf.length - 1] - edgesOf[0]);
+    let best = null, least = Infinity;
+    for (let j = 0; j < dims[Y].values.length; j++) {
+      for (let i = 0; i < dims[X].values.length; i++) {
+        const far = Math.hypot(across(edgesX, i) - across(edgesX, index[X]), across(edgesY, j) - across(edgesY, index[Y]));
+        if (far < least && place(cellAt(i, j)) >= 0) { best = cellAt(i, j); least = far; }
+      }
+    }
+    return best;
+  }
+  function history(clicked) {
+    const cell = place(chosen), note = element("history-note"), map = [meta.map.y, meta.map.x];
+    const other = cell < 0 ? nearest(chosen) : null;
+    element("nearest").hidden = !other;
+    element("histories").hidden = cell < 0;
+    note.dataset.index = cell < 0 ? "" : JSON.stringify(chosen);
+    if (cell < 0) {
+      const missing = Object.entries(store.keep).filter(([name, kept]) => !map.includes(name) && !kept.includes(chosen[position[name]]));
+      const where = missing.map(([name, kept]) => `${known[name].symbol} = ${kept.map((k) => digits(dims[position[name]].values[k])).join(", ")}`);
+      note.textContent = where.length ? `No cell of this map has a time history in the page. There are some at ${where.join("; ")}.`
+        : other ? `This cell has no time history in the page. The nearest that has one: ${described(map, other)}.`
+          : "No cell of this map has a time history.";
+      return note.textContent;
+    }
+    const omega = 2 * Math.PI * coordinate("frequency", chosen), amplitude = coordinate("amplitude", chosen);
     const n = store.phase.length, scale = arrays.history_scale.values.subarray(3 * cell, 3 * cell + 3);
     const row = (quantity, factor) => {
       const start = (3 * cell + quantity) * n;
       return Array.from(arrays.histories.values.subarray(start, start + n), (x) => x * scale[quantity] * factor);
     };
-    const same = Object.keys(store.keep).every((name) => index[position[name]] === chosen[position[name]]);
-    const which = same ? "of this cell" : `of the nearest cell that has one in the page: ${described(Object.keys(store.keep), index)}`;
-    const empty = Number.isNaN(scale[2]);
     // exact: time enters the motion through the phase ωt only
-    figures.history.data = empty
-      ? { t: [], ground: [], block: [], v: [], u: [] }
-      : { t: store.phase.map((phase) => phase / omega), ground: store.ground.map((w) => w * amplitude), block: row(0, 1), v: row(1, 1 / omega), u: row(2, 1000 / omega ** 2) };
-    note.textContent = `${described([meta.map.y, meta.map.x], chosen)}. ` +
-      (empty ? `No history: the model gives no value (${(flagsOf(index) || []).filter((f) => f.mask & meta.valueless).map((f) => f.name).join(", ") || "see flags"}).`
-        : `First ${store.cycles} of ${store.of} cycles, ${which}.`);
-    note.dataset.index = JSON.stringify(index);
+    const data = {
+      t: store.phase.map((phase) => phase / omega), ground: store.ground.map((w) => w * amplitude), block: row(0, 1),
+      v: row(1, 1 / omega), u: row(2, 1000 / omega ** 2),
+    };
+    figures.history.data = data;
+    const moved = clicked ? `The cell that was clicked (${described(map, clicked)}) has none; this is the nearest that has one. ` : "";
+    note.textContent = `${moved}${described(map, chosen)}: the first ${store.cycles} of ${store.of} cycles.`;
+    element("history-summary").textContent =
+      `Acceleration of plane and block, velocity and displacement of the block relative to the plane. Largest velocity ${digits(Math.max(...data.v))} m/s; displacement at the end ${lengthText(data.u[n - 1] / 1000)}.`;
+    return note.textContent;
   }
 
-  function choose() {
+  // ----------------------------------------------------------------------------- controls
+  const shows = []; // write a control's position anew
+  function choose(clicked) {
+    shows.forEach((show) => show());
     figures.chosen.data = { x: [coordinate(meta.map.x, chosen)], y: [coordinate(meta.map.y, chosen)] };
-    history();
-    readout(chosen, false);
+    const note = store ? history(clicked) : "";
+    readout(chosen, "Chosen cell");
+    speak(`${rows(chosen).map(([name, text]) => `${name}: ${text}`).join(". ")}. ${note}`);
   }
-  function pointed(x, y) {
-    const i = find(edgesX, scaled(dims[X], x)), j = find(edgesY, scaled(dims[Y], y));
-    if (i < 0 || j < 0) return null;
-    const index = chosen.slice();
-    index[X] = i; index[Y] = j;
-    return index;
+  function pointed(event) { // the cell under the pointer, or null
+    const host = element("map").getBoundingClientRect(), { left, top, width, height } = frameBox();
+    const x = (event.clientX - host.left - left) / width, y = 1 - (event.clientY - host.top - top) / height;
+    const at = (i, share) => (share < 0 || share > 1 ? NaN : seen[i][0] + share * (seen[i][1] - seen[i][0]));
+    const i = find(edgesX, at(X, x)), j = find(edgesY, at(Y, y));
+    return i < 0 || j < 0 ? null : cellAt(i, j);
+  }
+  function click(event) { // to the nearest cell with a time history, if there are some in the map
+    const cell = pointed(event);
+    if (!cell) return;
+    const going = (place(cell) < 0 && nearest(cell)) || cell;
+    chosen.splice(0, chosen.length, ...going);
+    choose(going === cell ? null : cell);
   }
 
-  function sliders() {
-    const host = document.getElementById("sliders");
-    dims.forEach((dim, i) => {
-      if (i === X || i === Y) return;
-      const label = document.createElement("label"), input = document.createElement("input"), output = document.createElement("output");
-      label.textContent = dim.title; label.htmlFor = input.id = "slider-" + dim.name;
-      Object.assign(input, { type: "range", min: 0, max: dim.values.length - 1, step: 1, value: chosen[i], disabled: dim.values.length === 1 });
-      const show = () => { output.textContent = dim.labels.length ? dim.labels[chosen[i]] : withUnit(dim.name, dim.values[chosen[i]]); };
-      input.addEventListener("input", () => { chosen[i] = Number(input.value); show(); draw(); choose(); });
-      show();
-      host.append(label, input, output);
+  function zoom(by) { // about the chosen cell; 0: the whole map
+    for (const [i, edgesOf] of [[X, edgesX], [Y, edgesY]]) {
+      const [low, high] = ends(edgesOf), size = by ? Math.min((seen[i][1] - seen[i][0]) * by, high - low) : high - low;
+      const middle = (edgesOf[chosen[i]] + edgesOf[chosen[i] + 1]) / 2;
+      const from = Math.min(Math.max(middle - size / 2, low), high - size);
+      seen[i] = [from, from + size];
+    }
+    draw();
+  }
+  function follow() { // keep the chosen cell in what is seen
+    if ([[X, edgesX], [Y, edgesY]].some(([i, e]) => e[chosen[i]] < seen[i][0] || e[chosen[i] + 1] > seen[i][1])) zoom(1);
+  }
+
+  function control(dim, i) {
+    const host = document.createElement("div"), label = document.createElement("label"), output = document.createElement("output");
+    const input = document.createElement(dim.labels.length && i !== X ? "select" : "input");
+    label.textContent = dim.title; label.htmlFor = input.id = "slider-" + dim.name;
+    output.htmlFor = input.id;
+    output.setAttribute("aria-live", "off"); // the status tells it, with the values
+    if (input.tagName === "SELECT") dim.labels.forEach((text, k) => input.append(new Option(text, k)));
+    else Object.assign(input, { type: "range", min: 0, max: dim.values.length - 1, step: 1 });
+    input.disabled = dim.values.length === 1;
+    shows.push(() => {
+      const text = withUnit(dim.name, dim.values[chosen[i]]);
+      input.value = chosen[i];
+      host.hidden = !isShown(dim.name);
+      output.textContent = input.tagName === "SELECT" ? "" : text;
+      if (input.tagName === "INPUT") input.setAttribute("aria-valuetext", text.replace("m/s²", "metres per second squared"));
     });
+    input.addEventListener("input", () => {
+      chosen[i] = Number(input.value);
+      if (i === X || i === Y) follow(); else draw();
+      choose();
+    });
+    host.append(label, input, output);
+    return host;
+  }
+  function controls() {
+    const order = [...dims.keys()].filter((i) => i !== X && i !== Y), host = element("controls");
+    const maps = meta.layers.filter((about) => about.short);
+    if (maps.length > 1) {
+      const row = document.createElement("div"), label = document.createElement("label"), select = document.createElement("select");
+      label.textContent = "colours of the map"; label.htmlFor = select.id = "layer";
+      maps.forEach((about, k) => select.append(new Option(about.short, k)));
+      select.addEventListener("change", () => { layer = maps[Number(select.value)]; shade(); draw(); choose(); });
+      row.append(label, select);
+      host.append(row);
+    }
+    for (const i of [...order, Y, X]) host.append(control(dims[i], i));
+    element("nearest").addEventListener("click", () => {
+      chosen.splice(0, chosen.length, ...nearest(chosen));
+      follow();
+      choose();
+      element("slider-" + meta.map.y).focus(); // the button is gone
+    });
+    for (const [name, by] of [["in", 0.5], ["out", 2], ["whole", 0]]) element("zoom-" + name).addEventListener("click", () => zoom(by));
+    element("map").addEventListener("click", click);
+    element("map").addEventListener("pointermove", (event) => {
+      const index = event.pointerType === "touch" ? null : pointed(event);
+      if (index) readout(index, "Cell under the pointer");
+    });
+    element("map").addEventListener("pointerleave", () => readout(chosen, "Chosen cell"));
+  }
+  function shade() {
+    for (const scale of ["displacement", "probability"]) {
+      for (const part of ["colours-", "bar-"]) {
+        const found = figures.document.get_model_by_name(part + scale);
+        if (found) found.visible = scale === layer.scale;
+      }
+    }
   }
 
   function start() {
     // Bokeh builds its figures after the page has loaded
-    model = window.Bokeh.documents[0];
-    const names = ["colours", "marks", "chosen", "history", "x_range", "y_range"];
-    if (!model || names.some((name) => !model.get_model_by_name(name))) { setTimeout(start, 20); return; }
-    figures = Object.fromEntries(names.map((name) => [name, model.get_model_by_name(name)]));
-    sliders();
-    const { x, y, dw, dh } = draw();
-    for (const [range, from, by] of [[figures.x_range, x, dw], [figures.y_range, y, dh]]) {
-      range.setv({ start: from, end: from + by, reset_start: from, reset_end: from + by });
-    }
+    const model = window.Bokeh.documents[0];
+    const names = ["colours", "marks", "held", "chosen", "history", "x_range", "y_range", "map"];
+    if (!model || !model.is_idle || names.some((name) => !model.get_model_by_name(name))) { setTimeout(start, 20); return; }
+    figures = { document: model, ...Object.fromEntries(names.map((name) => [name, model.get_model_by_name(name)])) };
+    element("history").hidden = !store;
+    controls();
+    shade();
+    draw();
+    const first = place(chosen) < 0 ? nearest(chosen) : null;
+    if (first) chosen.splice(0, chosen.length, ...first);
     choose();
-    window.slipsweep = {
-      point(px, py) { const index = pointed(px, py); if (index) readout(index, true); },
-      leave() { readout(chosen, false); },
-      choose(px, py) { const index = pointed(px, py); if (index) { chosen.splice(0, chosen.length, ...index); choose(); } },
-    };
+    let resizing; // the pixels of the marks are those of the screen
+    new ResizeObserver(() => { clearTimeout(resizing); resizing = setTimeout(draw, 200); }).observe(element("map"));
     document.body.dataset.ready = "true";
   }
   start();

@@ -1,0 +1,191 @@
+"""The figures of a page, empty: Bokeh draws them, `page.js` fills them."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, is_acceleration, length_text, unit
+from slipsweep.explore.excerpt import Excerpt
+from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
+
+#: Height of the map, px; its width is that of the window.
+MAP_HEIGHT = 520
+
+
+def about(name: str) -> dict[str, Any]:
+    """What is known of a result or a dimension: its long name and unit."""
+    return (PARAMETERS | STATISTIC_COORDINATES | STATISTICS | RESULTS).get(name, {"long_name": name, "units": "1"})
+
+
+def scale_of(name: str) -> str:
+    """The colours of a result: those of a displacement or of a probability."""
+    return "displacement" if about(name).get("units") == "m" else "probability"
+
+
+def label(name: str) -> str:
+    """Long name, symbol and unit of a dimension."""
+    units = unit(name) if name in PARAMETERS else ""
+    symbol = SYMBOLS.get(name, "")
+    parts = [about(name)["long_name"], "" if len(symbol) > 4 else symbol, units and f"({units})"]
+    return " ".join(filter(None, parts))
+
+
+def decades(excerpt: Excerpt) -> tuple[int, int]:
+    """Powers of ten, in mm, that the colours span: those of nine cells in ten, five at most and from 1 mm up."""
+    lengths = [excerpt.table[name].values.ravel() for name in excerpt.layers if scale_of(name) == "displacement"]
+    values = np.concatenate([np.zeros(0), *lengths])
+    positive = values[np.isfinite(values) & (values > 0.0)]
+    if positive.size == 0:
+        return 0, 1
+    fifth, ninety_fifth = np.log10(np.percentile(positive, (5.0, 95.0)) * 1000.0)
+    low, high = math.floor(fifth), max(math.ceil(ninety_fifth), math.floor(fifth) + 1)
+    if high - low > 5:
+        low = min(max(low, 0), high - 5)
+    return low, min(high, low + 5)
+
+
+def figures(excerpt: Excerpt) -> dict[str, Any]:
+    """The map, and the three panels of a history."""
+    return {"map": _map(excerpt), **_panels(float(excerpt.table.attrs["g"]))}
+
+
+def _map(excerpt: Excerpt) -> Any:
+    from bokeh.models import ColumnDataSource, Range1d
+    from bokeh.plotting import figure
+
+    up, across = excerpt.map_dims
+    chart: Any = figure(  # its properties take more than their annotations say
+        name="map",
+        height=MAP_HEIGHT,
+        sizing_mode="stretch_width",
+        x_axis_type="log" if excerpt.is_log(across) else "linear",
+        y_axis_type="log" if excerpt.is_log(up) else "linear",
+        x_axis_label=label(across),
+        y_axis_label=label(up),
+        x_range=Range1d(start=1, end=2, name="x_range"),
+        y_range=Range1d(start=1, end=2, name="y_range"),
+        tools="",
+        toolbar_location=None,
+    )
+    chart.grid.visible = False
+    for axis, dim in ((chart.xaxis, across), (chart.yaxis, up)):
+        _plain_ticks(axis, excerpt.is_log(dim))
+    place: dict[str, Any] = {"x": "x", "y": "y", "dw": "dw", "dh": "dh"}
+    corner: dict[str, Any] = {"x": [1.0], "y": [1.0], "dw": [1.0], "dh": [1.0]}
+    colours = ColumnDataSource({"image": [np.zeros((1, 1), np.float32)], **corner}, name="colours")
+    marks = ColumnDataSource({"image": [np.zeros((1, 1), np.uint32)], **corner}, name="marks")
+    for scale in {scale_of(name): None for name in excerpt.layers}:
+        mapper, bar = _colours(scale, decades(excerpt))
+        chart.image(image="image", **place, color_mapper=mapper, source=colours, name=f"colours-{scale}")
+        chart.add_layout(bar, "above")
+    chart.image_rgba(image="image", **place, source=marks)
+    held = ColumnDataSource({"x": [], "y": []}, name="held")
+    chart.scatter(
+        "x", "y", source=held, size=3, marker="circle", fill_color="white", line_color="black", line_width=0.7
+    )
+    chosen = ColumnDataSource({"x": [1.0], "y": [1.0]}, name="chosen")
+    for colour, width in (("white", 5), ("black", 2)):
+        chart.scatter(
+            "x", "y", source=chosen, size=15, marker="circle", fill_color=None, line_color=colour, line_width=width
+        )
+    if is_acceleration(up):
+        _add_g(chart, float(excerpt.table.attrs["g"]), excerpt.is_log(up))
+    return chart
+
+
+def _plain_ticks(axis: Any, log: bool) -> None:
+    from bokeh.models import PrintfTickFormatter
+
+    axis.axis_label_text_font_style = "normal"
+    if log:
+        axis.formatter = PrintfTickFormatter(format="%g")
+
+
+def _colours(scale: str, span: tuple[int, int]) -> tuple[Any, Any]:
+    """A scale of colours and its bar."""
+    from bokeh.models import FixedTicker, LinearColorMapper, LogColorMapper
+    from bokeh.models.annotations import ColorBar
+    from matplotlib.colors import to_hex
+
+    from slipsweep.charts.maps import COLOURS
+
+    low, high = span
+    # three bands a decade: their edges are contours of displacement
+    bands = 3 * (high - low) if scale == "displacement" else 10
+    shared: dict[str, Any] = {
+        "palette": [to_hex(colour) for colour in COLOURS(np.linspace(0, 1, bands))],
+        "nan_color": "rgba(0, 0, 0, 0)",
+    }
+    if scale == "displacement":
+        mapper: Any = LogColorMapper(low=10.0**low, high=10.0**high, **shared)
+        ticks: dict[Any, Any] = {10.0**power: length_text(10.0 ** (power - 3)) for power in range(low, high + 1)}
+    else:
+        mapper = LinearColorMapper(low=0.0, high=1.0, **shared)
+        ticks = {tenths / 10: f"{tenths / 10:g}" for tenths in range(0, 11, 2)}
+    bar = ColorBar(
+        name=f"bar-{scale}",
+        color_mapper=mapper,
+        ticker=FixedTicker(ticks=[*ticks]),
+        major_label_overrides=ticks,
+        height=16,
+    )
+    return mapper, bar
+
+
+def _add_g(chart: Any, g: float, log: bool) -> None:
+    """An axis in g on the right, beside that in m/s²."""
+    from bokeh.models import CustomJS, LinearAxis, LinearScale, LogAxis, LogScale, Range1d
+
+    inside = Range1d(start=1.0 / g, end=2.0 / g)
+    chart.extra_y_ranges = {"g": inside}
+    chart.extra_y_scales = {"g": LogScale() if log else LinearScale()}
+    axis: Any = (LogAxis if log else LinearAxis)(y_range_name="g", axis_label="(g)")
+    _plain_ticks(axis, log)
+    chart.add_layout(axis, "right")
+    follow = CustomJS(
+        args={"inside": inside, "g": g}, code="inside.setv({start: cb_obj.start / g, end: cb_obj.end / g})"
+    )
+    for end in ("start", "end"):
+        chart.y_range.js_on_change(end, follow)
+
+
+def _panels(g: float) -> dict[str, Any]:
+    from bokeh.models import ColumnDataSource
+    from bokeh.plotting import figure
+
+    history = ColumnDataSource({name: [0.0] for name in ("t", "ground", "block", "v", "u")}, name="history")
+    panels: dict[str, Any] = {}
+    shared: Any = None
+    for name, text, height, lines in (
+        ("accelerations", "acceleration (m/s²)", 200, {"ground": "plane", "block": "block"}),
+        ("velocity", "velocity (m/s)", 150, {"v": ""}),
+        ("displacement", "displacement (mm)", 180, {"u": ""}),
+    ):
+        panel: Any = figure(
+            name=name,
+            sizing_mode="stretch_width",
+            height=height,
+            x_axis_label="time (s)" if name == "displacement" else None,
+            y_axis_label=text,
+            tools="",
+            toolbar_location=None,
+            min_border_left=75,
+            min_border_right=55,
+            **({"x_range": shared} if shared else {}),
+        )
+        shared = panel.x_range
+        panel.x_range.range_padding = 0
+        panel.axis.axis_label_text_font_style = "normal"
+        for column, legend in lines.items():
+            plane = column == "ground"
+            look = {"color": BLUE if plane else VERMILION, "line_dash": "dashed" if column == "block" else "solid"}
+            panel.line(
+                "t", column, source=history, line_width=1.8, **look, **({"legend_label": legend} if legend else {})
+            )
+        if name == "accelerations":
+            panel.legend.update(orientation="horizontal", padding=1, border_line_color=None)
+            panel.add_layout(panel.legend[0], "above")
+            _add_g(panel, g, False)
+        panels[name] = panel
+    return panels
