@@ -2,8 +2,37 @@
 
 
 class InputError(ValueError):
-    """Bad input: the message names the parameter or key, its value and what is allowed."""
+    """Bad input: the message names the parameter or key, its value and what is allowed.
+
+    See Also
+    --------
+    RunError : a failure for another reason than the input
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> slipsweep.sweep(theta=95, mu_s=0.4, amplitude=3.0, frequency=1.0)
+    Traceback (most recent call last):
+    slipsweep.errors.InputError: theta = 95: must be 0 <= theta < 90 degrees
+    """
 
 
 class RunError(RuntimeError):
-    """A run that failed for a reason outside its input (disk, memory, a rival process)."""
+    """A run that failed for a reason outside its input (disk, memory, a rival process).
+
+    See Also
+    --------
+    InputError : the input is at fault
+
+    Examples
+    --------
+    The model has no value on a slope that is steeper than the friction angle:
+
+    >>> import slipsweep
+    >>> suite = slipsweep.read_suite("sweeps/data/suite/rock*_H1.AT2")
+    >>> result = slipsweep.sweep(theta=30, mu_s=0.3, amplitude=[2.0, 4.0], excitation=suite)
+    >>> curve = slipsweep.HazardCurve(amplitude=[1.0, 5.0], rate=[1e-2, 1e-4])
+    >>> slipsweep.displacement_hazard(result, curve)
+    Traceback (most recent call last):
+    slipsweep.errors.RunError: no annual rate: the model gives no value under any motion at two amplitudes or more
+    """

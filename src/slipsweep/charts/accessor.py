@@ -19,7 +19,19 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("slipsweep")
 class SlipsweepAccessor:
-    """Charts and flags of a result of `slipsweep.sweep` or `sample`, or of a file of one opened with xarray."""
+    """Charts and flags of a result of `slipsweep.sweep` or `sample`, or of a file of one opened with xarray.
+
+    See Also
+    --------
+    slipsweep.flags : the function behind the method
+    slipsweep.open_result : a result from a file
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> result = slipsweep.sweep(theta=5, mu_s=0.4, amplitude=[3.0, 4.0, 5.0], frequency=[1.0, 2.0])
+    >>> result.slipsweep.chart("families").savefig("families.png")
+    """
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset

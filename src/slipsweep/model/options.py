@@ -11,7 +11,7 @@ Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
 @dataclass(frozen=True)
 class Mendez(Choice):
-    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12.
+    """The friction law of Mendez, Romo and Botero [1]_, Eqs. 1-12.
 
     Parameters
     ----------
@@ -28,9 +28,20 @@ class Mendez(Choice):
     InputError
         A value that is not allowed.
 
+    See Also
+    --------
+    Newmark : the classical block, whose friction does not decay
+
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
     Examples
     --------
-    >>> Mendez(recoupling="integrate")
+    >>> import slipsweep
+    >>> slipsweep.Mendez(recoupling="integrate")
     Mendez(rise='monotone', recoupling='integrate', g=9.81)
     """
 
@@ -42,7 +53,7 @@ class Mendez(Choice):
 
 @dataclass(frozen=True)
 class Newmark(Choice):
-    """Newmark's rigid block: its acceleration is Üy while it slides, and the plane's while it does not.
+    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the plane's while it does not.
 
     Parameters
     ----------
@@ -54,9 +65,19 @@ class Newmark(Choice):
     InputError
         A value that is not allowed.
 
+    See Also
+    --------
+    Mendez : the paper's block, whose friction decays with the loading rate
+
+    References
+    ----------
+    .. [1] N. M. Newmark (1965), "Effects of earthquakes on dams and embankments", Géotechnique 15, 139-160,
+       https://doi.org/10.1680/geot.1965.15.2.139
+
     Examples
     --------
-    >>> Newmark()
+    >>> import slipsweep
+    >>> slipsweep.Newmark()
     Newmark(g=9.81)
     """
 
@@ -68,9 +89,14 @@ class Newmark(Choice):
 class Cycle(Choice):
     """The solver that goes from event to event: exact to rounding for every excitation.
 
+    See Also
+    --------
+    Step : steps of fixed length
+
     Examples
     --------
-    >>> Cycle()
+    >>> import slipsweep
+    >>> slipsweep.Cycle()
     Cycle()
     """
 
@@ -93,9 +119,14 @@ class Step(Choice):
     InputError
         A value that is not allowed.
 
+    See Also
+    --------
+    Cycle : from event to event
+
     Examples
     --------
-    >>> Step(rule="simpson")
+    >>> import slipsweep
+    >>> slipsweep.Step(rule="simpson")
     Step(rule='simpson', steps_per_cycle=1024)
     """
 

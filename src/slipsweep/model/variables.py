@@ -17,7 +17,25 @@ REFERENCE = (
 
 
 class SlidingMode(IntEnum):
-    """Sliding mode of a cell (Eq. 7 and the yield acceleration)."""
+    """Sliding mode of a cell: by the yield acceleration and Eq. 7 of the paper [1]_.
+
+    See Also
+    --------
+    Validity : what else is to be known of a cell
+
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> result = slipsweep.sweep(theta=5, mu_s=0.4, amplitude=[1.0, 4.0, 9.0], frequency=2.0)
+    >>> [slipsweep.SlidingMode(code).name for code in result.sliding_mode.values]
+    ['STUCK', 'STICK_SLIP', 'CONTINUOUS']
+    """
 
     MISSING = -1
     STUCK = 0
@@ -26,7 +44,19 @@ class SlidingMode(IntEnum):
 
 
 class Validity(IntFlag):
-    """What is to be known of a cell's value, or why it has none (`FLAG_KINDS`); 0 means that no flag is raised."""
+    """What is to be known of a cell's value, or why it has none; 0 means that no flag is raised.
+
+    See Also
+    --------
+    flags : one boolean variable for each flag
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> result = slipsweep.sweep(theta=25, mu_s=0.38, amplitude=3.0, frequency=1.0)
+    >>> slipsweep.Validity(result.validity.item()).name
+    'STATICALLY_UNSTABLE'
+    """
 
     STATICALLY_UNSTABLE = 1
     UPLIFT = 2

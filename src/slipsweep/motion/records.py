@@ -65,6 +65,17 @@ class Record:
     ------
     InputError
         Fewer than two samples, times that do not increase, a number that is not finite.
+
+    See Also
+    --------
+    read_record : a record from a file
+    Suite : several records
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> slipsweep.Record.sampled([0.0, 1.0, -2.0, 0.5, 0.0], interval=0.1, name="short")
+    Record('short': 5 samples, 0.4 s, peak 2 m/s2)
     """
 
     times: Floats
@@ -168,13 +179,14 @@ def read_record(
     Parameters
     ----------
     path : str or Path
+        The file.
     units : {"m/s2", "g", "cm/s2", "gal"}, optional
         Unit of the file's accelerations.  Needed for CSV unless its header names one; a unit
         that contradicts the file's own is refused.  "g" is standard gravity, 9.80665 m/s².
     baseline : {"none", "mean", "linear"}
         What is taken off the accelerations.
     format : {"auto", "csv", "at2", "esm", "cosmos"}
-        "auto" looks into the file.
+        "auto" looks into the file; "cosmos" is the format of [1]_.
     channel : int, optional
         Which channel of acceleration in a COSMOS file, from 1; needed where it holds several.
 
@@ -186,6 +198,22 @@ def read_record(
     ------
     InputError
         The file cannot be read, or something in it is no record: with the number of the line.
+
+    See Also
+    --------
+    read_suite : several files
+    Record : a record from arrays
+
+    References
+    ----------
+    .. [1] Consortium of Organizations for Strong-Motion Observation Systems (2001), "COSMOS Strong Motion Data Format",
+       version 1.20.
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> slipsweep.read_record("sweeps/data/synthetic.csv")
+    Record('sweeps/data/synthetic.csv': 2001 samples, 20 s, peak 3.432 m/s2)
     """
     try:
         path = Path(path)

@@ -47,6 +47,19 @@ class Pair:
     ------
     InputError
         They are not sampled at the same times.
+
+    See Also
+    --------
+    read_suite : pairs from files
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> first, second = (
+    ...     slipsweep.Record.sampled(values, 0.1, name) for name, values in (("NS", [0, 3, 0]), ("EW", [0, 4, 0]))
+    ... )
+    >>> slipsweep.Pair(first, second).rotated(90)
+    Record('NS, EW at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
     """
 
     first: Record
@@ -124,6 +137,18 @@ class Suite:
     ------
     InputError
         No motion, records among pairs, or labels that are not as many and all different.
+
+    See Also
+    --------
+    read_suite : a suite from files
+    suite_statistics : displacements over its motions
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> record = slipsweep.read_record("sweeps/data/synthetic.csv")
+    >>> slipsweep.Suite((record,), ("synthetic",))
+    Suite('suite': 1 motion: synthetic)
     """
 
     motions: tuple[Motion, ...]
@@ -300,6 +325,18 @@ def read_suite(
     InputError
         Any file cannot be read, or is no record: all of them are named.  A pattern that fits no file, a folder
         without one, or a component without the other.
+
+    See Also
+    --------
+    read_record : one file
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
+    Suite('sweeps/data/suite/*_H1.AT2': 4 motions: rock-far_H1, rock-near_H1, soft-far_H1, stiff-pulse_H1)
+    >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
+    Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
     return suite_in(Path(), paths, pairs, Reading(units, baseline, format, channel))  # type: ignore[arg-type]
 

@@ -76,7 +76,28 @@ class Waveform(Choice):
 class Sine(Waveform):
     """sin φ.
 
-    Parameters are those of `Waveform`.
+    Parameters
+    ----------
+    cycles : int
+        Whole cycles of shaking, from rest; 10 by default.
+    ramp_in, ramp_out : float
+        Cycles at the beginning and at the end over which the shaking grows and fades linearly.
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    See Also
+    --------
+    Cosine, Triangle, Square, Harmonics : the other waveforms
+    Record, Suite : recorded motions
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> slipsweep.Sine(cycles=5)
+    Sine(cycles=5, ramp_in=0.0, ramp_out=0.0)
     """
 
     name: ClassVar[str] = "sine"
@@ -86,7 +107,25 @@ class Sine(Waveform):
 class Cosine(Waveform):
     """cos φ: it starts at its peak, to which the plane's acceleration jumps at t = 0.
 
-    Parameters are those of `Waveform`.
+    Parameters
+    ----------
+    cycles, ramp_in, ramp_out
+        As those of `Sine`.
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    See Also
+    --------
+    Sine : starts at zero
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> print(slipsweep.Cosine(cycles=3))
+    3 cycles of a cosine
     """
 
     name: ClassVar[str] = "cosine"
@@ -96,7 +135,25 @@ class Cosine(Waveform):
 class Triangle(Waveform):
     """Straight lines through 0, 1 at π/2, −1 at 3π/2, 0.
 
-    Parameters are those of `Waveform`.
+    Parameters
+    ----------
+    cycles, ramp_in, ramp_out
+        As those of `Sine`.
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    See Also
+    --------
+    Sine, Square : rounder, and fuller
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> print(slipsweep.Triangle(ramp_in=2, ramp_out=2))
+    10 cycles of a triangle wave, ramp in 2 cycles, ramp out 2 cycles
     """
 
     name: ClassVar[str] = "triangle"
@@ -106,7 +163,25 @@ class Triangle(Waveform):
 class Square(Waveform):
     """1 on (0, π), −1 on (π, 2π).
 
-    Parameters are those of `Waveform`.
+    Parameters
+    ----------
+    cycles, ramp_in, ramp_out
+        As those of `Sine`.
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
+
+    See Also
+    --------
+    Sine, Triangle : waves without jumps
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> print(slipsweep.Square(cycles=4))
+    4 cycles of a square wave
     """
 
     name: ClassVar[str] = "square"
@@ -141,9 +216,14 @@ class Harmonics(Waveform, _Terms):
     InputError
         A value that is not allowed; a sum that is 0.
 
+    See Also
+    --------
+    Sine : a single term
+
     Examples
     --------
-    >>> Harmonics([1, 0.3], [1, 3])
+    >>> import slipsweep
+    >>> slipsweep.Harmonics([1, 0.3], [1, 3])
     Harmonics(amplitudes=(1.0, 0.3), multiples=(1, 3), phases=(0.0, 0.0), cycles=10, ramp_in=0.0, ramp_out=0.0)
     """
 

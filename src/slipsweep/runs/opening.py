@@ -43,11 +43,17 @@ def open_result(path: str | os.PathLike[str]) -> "xr.Dataset":
     HDF5 has one lock for a process: threads read netCDF files one after the other, and reading is as fast as the
     disk.  The parts of a Zarr store are read and unpacked beside each other.
 
+    See Also
+    --------
+    sweep : returns results of grids that memory holds
+
     Examples
     --------
     >>> import slipsweep
-    >>> data = slipsweep.open_result("design_chart.nc")  # doctest: +SKIP
-    >>> data.permanent_displacement.mean().compute()  # doctest: +SKIP
+    >>> slipsweep.sweep(theta=5, mu_s=0.4, amplitude=[4.0, 6.0], frequency=2.0).to_netcdf("first.nc")
+    >>> result = slipsweep.open_result("first.nc")
+    >>> print(f"{result.permanent_displacement.max().compute().item():.3f} m")
+    0.445 m
     """
     import xarray as xr
 

@@ -58,6 +58,7 @@ def sweep(
 ) -> xr.Dataset:
     """Response of a sliding block over a grid of parameters.
 
+    The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.
     A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own
     name; the grid is the outer product of all of them.  A DataArray keeps its dimensions,
     so that several on one shared dimension are taken together instead of crossed.
@@ -130,6 +131,29 @@ def sweep(
     InputError
         A value that no physics allows, an unknown option, a grid that memory cannot hold.  A result that double
         precision does not hold (of inputs beyond 1e40, say) is refused when it is computed: with `chunks`, later.
+
+    See Also
+    --------
+    simulate : time history of one block
+    limit_amplitude : the amplitude at which a displacement is reached
+    sample : statistics under uncertain inputs
+    flags : the flags in `validity`
+
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> result = slipsweep.sweep(theta=[0, 5], mu_s=0.4, amplitude=[2.0, 4.0, 6.0], frequency=2.0)
+    >>> result.permanent_displacement.dims
+    ('theta', 'amplitude')
+    >>> result.permanent_displacement.round(3).values
+    array([[0.   , 0.   , 0.222],
+           [0.   , 0.081, 0.445]])
     """
     given = _inputs(locals())
     plan = plan_sweep(**_plain(given), excitation=excitation, model=model, solver=solver, variables=variables)
@@ -148,9 +172,16 @@ def friction_parameters(
     minimum_friction: Values | None = None,
     model: Model | str = "mendez",
 ) -> xr.Dataset:
-    """Friction parameters of the paper's Eqs. 7-11, and λ, over a grid.
+    """Friction parameters of the paper's [1]_ Eqs. 7-11, and λ, over a grid.
 
-    Parameters are those of `sweep`.
+    Parameters
+    ----------
+    theta, mu_s, amplitude : float, array or DataArray
+        Inclination (degrees), static friction coefficient and peak ground acceleration (m/s²), as in `sweep`.
+    yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
+        Those that are known, as in `sweep`; each replaces its estimate.
+    model : Mendez, Newmark or str
+        As in `sweep`.
 
     Returns
     -------
@@ -163,6 +194,28 @@ def friction_parameters(
     ------
     InputError
         A value that no physics allows.
+
+    See Also
+    --------
+    sweep : the displacements that follow from them
+    calibrate : measured ones, from a test on a shaking table
+
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
+    Examples
+    --------
+    The stick-slip test of the paper's Table 1:
+
+    >>> import slipsweep
+    >>> found = slipsweep.friction_parameters(theta=5, mu_s=0.38, amplitude=3.55, yield_acceleration=0.59)
+    >>> print(f"{found.limiting_acceleration.item():.2f} m/s2, {found.acceleration_ratio.item():.2f}")
+    4.43 m/s2, 0.80
+    >>> slipsweep.SlidingMode(found.sliding_mode.item()).name
+    'STICK_SLIP'
     """
     given = _inputs(locals())
     plan = plan_friction_parameters(**_plain(given), model=model)
@@ -221,6 +274,27 @@ def simulate(
     ------
     InputError
         As `sweep`; or times that are not increasing.
+
+    See Also
+    --------
+    sweep : many blocks, without their histories
+
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
+    Examples
+    --------
+    The stick-slip test of the paper [1]_, with its printed λ:
+
+    >>> import slipsweep
+    >>> history = slipsweep.simulate(
+    ...     5, 0.38, 3.55, 1.8, yield_acceleration=0.59, decay_rate=2.7, excitation=slipsweep.Sine(cycles=5)
+    ... )
+    >>> print(f"{history.permanent_displacement.item() * 1000:.0f} mm after {history.time.values[-1]:.2f} s")
+    331 mm after 2.78 s
     """
     given = _inputs(locals())
     table = history_table(
@@ -300,6 +374,18 @@ def limit_amplitude(
     ------
     InputError
         As `sweep`; or a displacement or a maximum amplitude that is not positive.
+
+    See Also
+    --------
+    sweep : the displacement at an amplitude
+    displacement_hazard : the annual rate at which a displacement is exceeded
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> limits = slipsweep.limit_amplitude(0.05, theta=5, mu_s=0.4, frequency=[1, 2])
+    >>> limits.limit_amplitude.round(3).values
+    array([3.34 , 3.756])
     """
     given = _inputs(locals())
     plan = plan_limits(
@@ -378,12 +464,12 @@ def sample(
     correlation : list of (str, str, float)
         Pairs of drawn parameters and the correlation of their normal scores (a Gaussian copula).
     sensitivity : bool
-        Compute Sobol indices of the displacement, too: from ``samples * (k + 2)`` further runs a grid point, of k
+        Compute Sobol indices [1]_ of the displacement, too: from ``samples * (k + 2)`` further runs a grid point, of k
         inputs.
+    yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
+        These and the remaining parameters as in `sweep`.
     progress : callable, optional
         Called with the number of samples just solved, from any thread.
-
-    The remaining parameters are those of `sweep`.
 
     Returns
     -------
@@ -410,6 +496,28 @@ def sample(
     ------
     InputError
         As `sweep`; a distribution that scipy.stats does not know, or draws that no physics allows.
+
+    See Also
+    --------
+    sweep : the displacements of known inputs
+    suite_statistics : statistics over recorded motions
+
+    References
+    ----------
+    .. [1] A. Saltelli et al. (2010), "Variance based sensitivity analysis of model output", Computer Physics
+       Communications 181, 259-270, https://doi.org/10.1016/j.cpc.2009.09.018
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> friction = {"distribution": "lognorm", "s": 0.1, "scale": 0.4}
+    >>> result = slipsweep.sample(
+    ...     theta=5, amplitude=[3.0, 5.0], frequency=2.0, uncertain={"mu_s": friction}, samples=1024
+    ... )
+    >>> result.exceedance_probability.sel(threshold=0.1).round(2).values
+    array([0.  , 0.97])
+    >>> result.displacement_quantile.sel(quantile=0.5).round(3).values
+    array([0.   , 0.265])
     """
     from slipsweep.studies.sampling import check_sampling
     from slipsweep.studies.uncertainty import plan_samples

@@ -15,7 +15,7 @@ _ORDER = list(FlagKind)
 def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     """Take a bit mask apart: one boolean variable a flag.
 
-    Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions, 3.5),
+    Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions, 3.5 [1]_),
     so that a file of any version is read by its own words.  Lazy data stay lazy.
 
     Parameters
@@ -35,6 +35,14 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     ------
     InputError
         There is no `validity`, it is no bit mask, or its values are not whole numbers.
+
+    See Also
+    --------
+    Validity : the flags by name
+
+    References
+    ----------
+    .. [1] B. Eaton et al., "NetCDF Climate and Forecast (CF) Metadata Conventions", https://cfconventions.org
 
     Examples
     --------

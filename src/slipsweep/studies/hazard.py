@@ -54,6 +54,17 @@ class HazardCurve:
     ------
     InputError
         The numbers are not such.
+
+    See Also
+    --------
+    displacement_hazard : annual rates of displacements, from such a curve
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> curve = slipsweep.HazardCurve(amplitude=[0.5, 1.0, 2.0, 4.0], rate=[2e-2, 7e-3, 2e-3, 4e-4])
+    >>> curve.rate_at([1.5]).round(4)
+    array([0.0034])
     """
 
     amplitude: Floats

@@ -29,7 +29,7 @@ def measured_friction(
     rest: tuple[float, float] | None = None,
     threshold: float | None = None,
 ) -> xr.Dataset:
-    """Friction coefficient that a test on a shaking table measured, by the paper's Eq. 1, and the slides in it.
+    """Friction coefficient that a test on a shaking table measured, by the paper's [1]_ Eq. 1, and the slides in it.
 
     Parameters
     ----------
@@ -64,6 +64,25 @@ def measured_friction(
     ------
     InputError
         A test that cannot be read, without a block acceleration, or a value that no physics allows.
+
+    See Also
+    --------
+    calibrate : the parameters of the model, from the same test
+
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> test = slipsweep.measured_friction("sweeps/data/shaking_test.csv", theta=5, mu_s=0.38)
+    >>> test.sizes["slide"]
+    8
+    >>> test.least_friction.round(2).values
+    array([0.07, 0.07, 0.06, 0.08, 0.06, 0.04, 0.06, 0.05])
     """
     table = friction_table(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
     return _dataset(table, {})
@@ -118,6 +137,25 @@ def calibrate(
     ------
     InputError
         A test that cannot be read or measured nothing of the block, or a value that no physics allows.
+
+    See Also
+    --------
+    measured_friction : the friction that the test shows, without a model
+    sample : displacements with the errors of the parameters
+
+    Examples
+    --------
+    A test of two cycles without noise, as `simulate` gives it:
+
+    >>> import numpy as np
+    >>> import slipsweep
+    >>> test = slipsweep.simulate(
+    ...     5, 0.38, 5.0, 2.0, yield_acceleration=1.8, decay_rate=2.0, delta_mu=0.1,
+    ...     excitation=slipsweep.Sine(cycles=2), times=np.arange(240) * 0.005,
+    ... )
+    >>> found = slipsweep.calibrate(test, theta=5, mu_s=0.38, cycles=False)
+    >>> print(f"{found.yield_acceleration.item():.2f} m/s2, {found.decay_rate.item():.2f}, {found.delta_mu.item():.2f}")
+    1.80 m/s2, 2.00, 0.10
     """
     table = calibration_table(
         test_of(test), theta, mu_s, model=model, offset=offset, drift=drift, noise=noise, cycles=cycles

@@ -57,6 +57,30 @@ def suite_statistics(
     ------
     InputError
         The result has no dimension `motion`, lacks `permanent_displacement` or `validity`, or a value is not allowed.
+
+    See Also
+    --------
+    displacement_hazard : with the seismic hazard of a site
+    sample : statistics under uncertain inputs
+
+    Notes
+    -----
+    A share of zero displacements beside the distribution of the others follows Bray and Travasarou [1]_.
+
+    References
+    ----------
+    .. [1] J. D. Bray and T. Travasarou (2007), "Simplified procedure for estimating earthquake-induced deviatoric slope
+       displacements", Journal of Geotechnical and Geoenvironmental Engineering 133, 381-392,
+       https://doi.org/10.1061/(ASCE)1090-0241(2007)133:4(381)
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
+    >>> result = slipsweep.sweep(5, 0.3, amplitude=[2.0, 4.0, 6.0], excitation=suite)
+    >>> found = slipsweep.suite_statistics(result, thresholds="50mm")
+    >>> found.exceedance_probability.sel(threshold=0.05).values
+    array([0.  , 0.25, 0.75])
     """
     table = suite_table(_table(result), thresholds=thresholds, quantiles=quantiles, zero=zero, over=over)
     return _dataset(table, {})
@@ -72,7 +96,7 @@ def displacement_hazard(
     """Mean annual rates of exceeding displacements, from a hazard curve and a suite's fragility along `amplitude`.
 
     P(u > d | A) is the share of the motions with a value that exceed d, straight in ln A between the amplitudes of the
-    result.  The hazard curve is straight in logarithms of both between its points.
+    result.  The hazard curve is straight in logarithms of both between its points.  The rate is that of Cornell [1]_.
 
     Parameters
     ----------
@@ -103,6 +127,26 @@ def displacement_hazard(
         As `suite_statistics`; the result has fewer than two amplitudes, or the curve does not overlap with them.
     RunError
         There is no rate at any grid point.
+
+    See Also
+    --------
+    HazardCurve : the hazard of a site
+    suite_statistics : without it
+
+    References
+    ----------
+    .. [1] C. A. Cornell (1968), "Engineering seismic risk analysis", Bulletin of the Seismological Society of America
+       58, 1583-1606.
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
+    >>> result = slipsweep.sweep(5, 0.3, amplitude=[2.0, 4.0, 6.0, 8.0], excitation=suite)
+    >>> curve = slipsweep.HazardCurve(amplitude=[0.5, 2.0, 8.0], rate=[2e-2, 2e-3, 6e-5])
+    >>> rates = slipsweep.displacement_hazard(result, curve, "50mm")
+    >>> print(f"{rates.annual_rate.item():.1e} a year")
+    3.7e-04 a year
     """
     table = _table(result)
     if not isinstance(curve, HazardCurve):

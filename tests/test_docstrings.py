@@ -1,0 +1,41 @@
+"""The examples in the docstrings of everything public run, and print what they say."""
+
+import doctest
+import shutil
+from pathlib import Path
+
+import pytest
+
+import slipsweep
+
+ROOT = Path(__file__).parents[1]
+OBJECTS = sorted(name for name in slipsweep.__all__ if not name.startswith("_"))
+
+
+def check(name: str, docstring: str) -> None:
+    """Run the examples of a docstring, with no name but their own."""
+    test = doctest.DocTestParser().get_doctest(docstring, {}, name, None, None)
+    assert test.examples, f"{name}: no examples"
+    printed: list[str] = []
+    doctest.DocTestRunner(optionflags=doctest.FAIL_FAST).run(test, out=printed.append)
+    assert not printed, "".join(printed)
+
+
+@pytest.fixture
+def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder with the data of a clone, to write to."""
+    shutil.copytree(ROOT / "sweeps", tmp_path / "sweeps")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("clone")
+@pytest.mark.parametrize("name", OBJECTS)
+def test_examples_of_docstrings_run(name: str) -> None:
+    check(name, getattr(slipsweep, name).__doc__)
+
+
+@pytest.mark.usefixtures("clone")
+def test_the_example_of_the_accessor_runs() -> None:
+    from slipsweep.charts.accessor import SlipsweepAccessor
+
+    check("Dataset.slipsweep", SlipsweepAccessor.__doc__ or "")
