@@ -64,6 +64,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "slipsweep"
 html_extra_path = ["site/root"]  # index.html, which leads to the first page
 html_show_sourcelink = False
+html_sidebars = {"docs/quickstart": [], "docs/site/gallery": []}  # pages of a section of their own
 html_theme_options = {
     "header_links_before_dropdown": 7,
     "navbar_align": "left",
