@@ -6,6 +6,7 @@ host.  Notebooks are executed.  The reference is made of the docstrings.
 
 import base64
 import json
+import os
 from pathlib import Path
 
 from pygments.lexers.special import TextLexer
@@ -48,7 +49,10 @@ suppress_warnings = ["myst.header"]
 # Every notebook runs anew: one that raises stops the build.  No cache: its age would decide what is shown.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
-nb_execution_timeout = 120
+nb_execution_timeout = 600  # s for a cell: ends one that hangs
+# The notebooks' kernels inherit it.  A calibration, small matrices, takes 2.4 s of processor time with it; without, 30 s
+# where other processes are at work: threads of linear algebra wait for each other in busy loops.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Signatures without types: the docstrings have them in words.
 autodoc_typehints = "none"
