@@ -50,15 +50,16 @@ suppress_warnings = ["myst.header"]
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600  # s for a cell: ends one that hangs
-# The notebooks' kernels inherit it.  A calibration, small matrices, takes 2.4 s of processor time with it; without, 30 s
-# where other processes are at work: threads of linear algebra wait for each other in busy loops.
+# The notebooks' kernels inherit it.  A calibration, of small matrices, takes 2.4 s of processor time with it.  Without
+# it takes 30 s where other processes are at work: threads of linear algebra wait for each other in busy loops.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Signatures without types: the docstrings have them in words.
 autodoc_typehints = "none"
+autodoc_member_order = "bysource"
 python_maximum_signature_line_length = 88
 autosummary_generate_overwrite = True
-numpydoc_show_class_members = False
+numpydoc_show_class_members = False  # the template of classes lists them
 # The parts that the docstring of every public object has.  Parameters that a function shares with `sweep` are
 # described there (so not PR01).
 numpydoc_validation_checks = {"GL08", "SS01", "SS03", "PR02", "PR07", "RT01", "SA01", "EX01"}
@@ -68,7 +69,10 @@ html_theme = "pydata_sphinx_theme"
 html_title = "slipsweep"
 html_extra_path = ["site/root"]  # index.html, which leads to the first page
 html_show_sourcelink = False
-html_sidebars = {"docs/quickstart": [], "docs/site/gallery": []}  # pages of a section of their own
+html_sidebars: dict[str, list[str]] = {
+    "docs/quickstart": [],
+    "docs/site/gallery": [],
+}  # pages of a section of their own
 html_theme_options = {
     "header_links_before_dropdown": 7,
     "navbar_align": "left",

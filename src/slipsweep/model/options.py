@@ -11,7 +11,9 @@ Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
 @dataclass(frozen=True)
 class Mendez(Choice):
-    """The friction law of Mendez, Romo and Botero [1]_, Eqs. 1-12.
+    """The friction law of Mendez, Romo and Botero (2012).
+
+    Eqs. 1-12 of the paper [1]_.
 
     Parameters
     ----------
@@ -53,7 +55,9 @@ class Mendez(Choice):
 
 @dataclass(frozen=True)
 class Newmark(Choice):
-    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the plane's while it does not.
+    """Newmark's rigid block: its acceleration is Üy while it slides, and the plane's while it does not.
+
+    It is the sliding block of [1]_.
 
     Parameters
     ----------

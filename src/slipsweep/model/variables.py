@@ -17,7 +17,9 @@ REFERENCE = (
 
 
 class SlidingMode(IntEnum):
-    """Sliding mode of a cell: by the yield acceleration and Eq. 7 of the paper [1]_.
+    """Sliding mode of a cell.
+
+    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of the paper [1]_.
 
     See Also
     --------
@@ -49,6 +51,7 @@ class Validity(IntFlag):
     See Also
     --------
     flags : one boolean variable for each flag
+    SlidingMode : the other code of a cell
 
     Examples
     --------

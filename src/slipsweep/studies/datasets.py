@@ -59,6 +59,7 @@ def sweep(
     """Response of a sliding block over a grid of parameters.
 
     The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.
+
     A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own
     name; the grid is the outer product of all of them.  A DataArray keeps its dimensions,
     so that several on one shared dimension are taken together instead of crossed.
@@ -172,7 +173,9 @@ def friction_parameters(
     minimum_friction: Values | None = None,
     model: Model | str = "mendez",
 ) -> xr.Dataset:
-    """Friction parameters of the paper's [1]_ Eqs. 7-11, and λ, over a grid.
+    """Friction parameters of the model over a grid.
+
+    They are those of Eqs. 7-11 of the paper [1]_, and λ.
 
     Parameters
     ----------

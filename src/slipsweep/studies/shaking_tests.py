@@ -29,7 +29,9 @@ def measured_friction(
     rest: tuple[float, float] | None = None,
     threshold: float | None = None,
 ) -> xr.Dataset:
-    """Friction coefficient that a test on a shaking table measured, by the paper's [1]_ Eq. 1, and the slides in it.
+    """Friction coefficient that a test on a shaking table measured, and the slides in it.
+
+    The coefficient is that of Eq. 1 of the paper [1]_.
 
     Parameters
     ----------
