@@ -397,7 +397,7 @@ def test_default_set_of_charts(grid: Path, tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     assert main(["chart", str(grid)]) == 0
     names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == sorted(f"grid-{kind}.png" for kind in kinds.SWEEP_KINDS)
+    assert names == sorted(f"grid-{kind}.png" for kind in kinds.SORTS["sweep"])
     for name in names:
         image = matplotlib.image.imread(tmp_path / name)
         assert image.shape[1] == 1050
@@ -508,7 +508,7 @@ def test_a_case_is_chosen_by_its_name(folder: Path) -> None:
         )
         with pytest.raises(InputError, match="must be a number or one of gentle, steep"):
             opened.places({"case": "stepe"})
-    assert (table["theta"].item(), table["mu_s"].item(), table.attrs["case"]) == (12.0, 0.5, "steep")
+    assert (table["theta"].item(), table["mu_s"].item(), table.attrs["picked"]["case"]) == (12.0, 0.5, "steep")
     direct = slipsweep.sweep(12.0, 0.5, table["amplitude"].values, table["frequency"].values)
     np.testing.assert_allclose(table["permanent_displacement"].values, direct.permanent_displacement, rtol=1e-13)
     figure = contours(table)
@@ -564,8 +564,8 @@ def test_what_can_be_drawn_is_drawn_and_the_rest_named(
     monkeypatch.chdir(tmp_path)
     assert main(["chart", "a.nc"]) == 0
     output = capsys.readouterr().out
-    there = {kind for kind in kinds.SWEEP_KINDS if (tmp_path / f"a-{kind}.png").exists()}
-    assert there == set(kinds.SWEEP_KINDS) - undrawn
+    there = {kind for kind in kinds.SORTS["sweep"] if (tmp_path / f"a-{kind}.png").exists()}
+    assert there == set(kinds.SORTS["sweep"]) - undrawn
     assert {line.split(":")[0] for line in output.splitlines() if ".png" not in line} == {f"no {k}" for k in undrawn}
     for kind in undrawn:
         assert main(["chart", "a.nc", "--kind", kind, "-o", "b.png"]) == 2
@@ -840,7 +840,8 @@ def test_acceleration_in_g(lined: Path) -> None:
 
 
 def test_levels(lined: Path, tmp_path: Path) -> None:
-    levels = kinds.levels_of("permanent_displacement", ["1cm", "50 mm", 0.3], 9.81)
+    with Result(lined) as opened:
+        levels = kinds.levels_of(opened, "permanent_displacement", ["1cm", "50 mm", 0.3])
     assert levels == (0.01, 0.05, 0.3)
     figure = drawn(lined, "contours", look=Look(levels=levels))
     assert [text.get_text() for text in figure.axes[-1].get_yticklabels()] == ["10 mm", "50 mm", "300 mm"]
@@ -850,7 +851,7 @@ def test_levels(lined: Path, tmp_path: Path) -> None:
     assert by_default.axes[-1].get_yticklabels()[-1].get_text() == "1 m"  # nobody designs for ten
 
 
-@pytest.mark.parametrize("kind", kinds.SWEEP_KINDS)
+@pytest.mark.parametrize("kind", kinds.SORTS["sweep"])
 def test_panels(lined: Path, kind: str) -> None:
     x = {"x": "theta"} if kind in ("contours", "modes", "newmark") else {}
     figure = drawn(lined, kind, panels=["mu_s"], at={"mu_s": "0.25,0.4"}, **x)
@@ -877,7 +878,7 @@ def test_cases_tell_curves_and_panels_apart(folder: Path) -> None:
         kinds.draw(opened, "contours", kinds.Wish(x="case"))
 
 
-@pytest.mark.parametrize("kind", kinds.SWEEP_KINDS)
+@pytest.mark.parametrize("kind", kinds.SORTS["sweep"])
 def test_nothing_is_cut_and_no_entry_is_without_its_mark(lined: Path, kind: str) -> None:
     for wish in ({"at": {"mu_s": 0.25}}, {"panels": ["mu_s"]}):
         figure = drawn(lined, kind, **wish)
@@ -918,7 +919,7 @@ def test_all_of_a_file_is_a_pdf_with_a_title_page(
     assert main(["chart", str(lined), "-o", "all.pdf"]) == 0
     assert capsys.readouterr().out == "all.pdf\n"
     pages = (tmp_path / "all.pdf").read_bytes().count(b"/Type /Page ")
-    assert pages == 1 + len(kinds.SWEEP_KINDS)
+    assert pages == 1 + len(kinds.SORTS["sweep"])
     with Result(lined) as opened:
         title = book.title_page(opened)
     for one in title.texts:

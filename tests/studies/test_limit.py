@@ -1,6 +1,7 @@
 """The inverse of the sweep: limit amplitudes against the sweep itself, closed forms and dense scans."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -331,7 +332,8 @@ def test_cases_keep_their_names(tmp_path: Path) -> None:
     }
     drawn = ["dry ± joint", r"_wet \$^joint^\$"]
     for frequency in ([1.0, 2.0, 3.0], 1.0):
-        figure = limit_chart(plan_limits(displacement=0.005, **zipped, frequency=frequency).solve(), names)
+        table = plan_limits(displacement=0.005, **zipped, frequency=frequency).solve()
+        figure = limit_chart(replace(table, attrs={**table.attrs, "labels": {"case": names}}))
         figure.savefig(tmp_path / "l.png")
         if frequency == 1.0:
             assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == drawn

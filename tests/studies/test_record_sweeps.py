@@ -296,7 +296,6 @@ def test_other_commands_on_the_result(folder: Path) -> None:
     assert first.startswith("0.0,0.3,0.5,1.0,1,")
     assert export.export(folder / "a.nc", folder / "samples.csv", variables=["record_acceleration"]) == 500
     for arguments, message in (
-        (("chart", folder / "a.nc"), "is the response to recorded motions; charts and pages"),
         (("run", folder / "a.toml", "-o", folder / "b.nc", "--solver", "step"), "--solver step: not allowed"),
     ):
         done = command(folder, *arguments)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
 import xarray as xr
@@ -12,14 +12,25 @@ from slipsweep.files.results import ResultFile, Where
 from slipsweep.studies.decoding import flags
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from slipsweep.charts.slices import Cut
 
+    class _Options(TypedDict, total=False):
+        at: Mapping[str, Cut] | None
+        x: str | None
+        y: str | None
+        panels: Sequence[str]
+        variable: str
+        levels: Sequence[float | str]
+        units: Literal["m/s2", "g"]
+        show_cautions: bool
+
 
 @xr.register_dataset_accessor("slipsweep")
 class SlipsweepAccessor:
-    """Charts and flags of a result of `slipsweep.sweep` or `sample`, or of a file of one opened with xarray.
+    """Charts and flags of a result of slipsweep, or of a file of one opened with xarray.
 
     See Also
     --------
@@ -40,9 +51,14 @@ class SlipsweepAccessor:
         """`slipsweep.flags` of the dataset."""
         return flags(self._dataset)
 
+    @overload
+    def chart(self, kind: str | None = None, *, ax: "Axes", **options: Unpack["_Options"]) -> "Axes": ...
+    @overload
+    def chart(self, kind: str | None = None, *, ax: None = None, **options: Unpack["_Options"]) -> "Figure": ...
+
     def chart(
         self,
-        kind: str = "contours",
+        kind: str | None = None,
         *,
         at: "Mapping[str, Cut] | None" = None,
         x: str | None = None,
@@ -52,47 +68,62 @@ class SlipsweepAccessor:
         levels: Sequence[float | str] = (),
         units: Literal["m/s2", "g"] = "m/s2",
         show_cautions: bool = False,
-    ) -> "Figure":
+        ax: "Axes | None" = None,
+    ) -> "Figure | Axes":
         """Draw a chart, as `slipsweep chart` does.
 
         Parameters
         ----------
-        kind : str
-            "contours", "modes", "families", "dimensionless", "newmark" or "spread"; of `sample` "fragility",
-            "quantiles" or "sensitivity".
+        kind : str, optional
+            Of a sweep "contours", "modes", "families", "dimensionless", "newmark" or "spread"; of a sweep under a suite
+            "motions", "fragility", "intensity" or "histogram", under one record "motions"; of statistics (`sample`,
+            `suite_statistics`) "fragility", "quantiles" or "sensitivity".  Results of `simulate` ("history"),
+            `limit_amplitude` ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
+            `measured_friction` ("friction") have one chart each.  By default the first one that a dataset has.
         at : mapping of axis to value, optional
-            Where to cut an axis: a number in its own unit, a text with another ("0.3g"), the label of a case;
-            by default its middle.  Several values choose the curves or panels of an axis.
+            Where to cut an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
+            by default its middle.  Several values choose the curves or panels of an axis, or the motions of a suite.
         x, y : str, optional
-            Axis to draw over; upright axis of a map, or the axis that tells curves apart.
+            Axis to draw over, or an intensity measure; upright axis of a map, or the axis that tells curves apart.
         panels : sequence of str
             One or two axes to draw panels over, across and down.
         variable : str
             What contours and families show.
         levels : sequence of float or str
-            Contours, in the variable's own unit or as texts with another ("5cm").
+            Contours, in the variable's own unit or as texts with another ("5cm"); of a suite's fragility the
+            displacements to exceed.
         units : {"m/s2", "g"}
             Unit of accelerations on the main axis and in the caption.
         show_cautions : bool
             Draw values flagged `not_recoupled` too, which are left out otherwise.
+        ax : matplotlib.axes.Axes, optional
+            What to draw a chart of one panel in; legend and caption go with it.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Write it with `savefig`; a notebook shows it.
+        matplotlib.figure.Figure or matplotlib.axes.Axes
+            The figure: write it with `savefig`; a notebook shows it.  With `ax`, that.
 
         Raises
         ------
         InputError
             The chart cannot be drawn of this dataset, or what is asked for is not there.
+
+        Examples
+        --------
+        >>> import slipsweep
+        >>> result = slipsweep.sweep(5, [0.3, 0.4], amplitude=[2.0, 4.0, 6.0], frequency=[1, 2])
+        >>> figure = result.slipsweep.chart("families", at={"frequency": 1})
+        >>> figure.axes[0].get_ylabel()
+        'permanent displacement, downslope (mm)'
         """
         from slipsweep.charts import kinds
-        from slipsweep.charts.slices import Result
         from slipsweep.charts.style import Look
 
-        with Result(DatasetSource(self._dataset)) as result:
-            look = Look(units, show_cautions, kinds.levels_of(variable, levels, result.g))
-            return kinds.draw(result, kind, kinds.Wish(x, y, at or {}, variable, panels, look=look))
+        with kinds.opened(DatasetSource(self._dataset)) as result:
+            look = Look(units, show_cautions, kinds.levels_of(result, variable, levels))
+            figure = kinds.draw(result, kind, kinds.Wish(x, y, at or {}, variable, panels, axes=ax, look=look))
+        return figure if ax is None else ax
 
 
 class DatasetSource(ResultFile):

@@ -15,7 +15,17 @@ from slipsweep.charts.maps import HATCHES
 from slipsweep.charts.sheet import LEFT_OUT
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import SYMBOLS, drawn_text, model_text, plain, unit
-from slipsweep.model.variables import FLAG_KINDS, PARAMETERS, REFERENCE, RESULTS, STATISTICS, VALIDITY_TEXT
+from slipsweep.model.variables import (
+    FLAG_KINDS,
+    PARAMETERS,
+    RECORD_RESULTS,
+    REFERENCE,
+    RESULTS,
+    STATISTICS,
+    VALIDITY_TEXT,
+)
+
+_LONG_NAMES = RECORD_RESULTS | RESULTS | STATISTICS
 
 #: Characters in a line, after a heading.
 _WIDTH, _INDENT = 96, 2
@@ -31,19 +41,21 @@ def write(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
     attributes = result.attrs
+    recorded = result.sort in ("record", "suite")
     hatched = [
         f"{(flag.name or '').lower()} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}"
         + ("; left out of contours and curves unless their caption says that it is drawn" if flag in LEFT_OUT else "")
         for flag in HATCHES
     ]
     sections: Mapping[str, list[str]] = {
-        "Results": [f"{name}: {(RESULTS | STATISTICS)[name]['long_name']}" for name in result.variables],
+        "Results": [f"{name}: {_LONG_NAMES[name]['long_name']}" for name in result.variables],
         "Inputs": [*_inputs(result), *filter(None, [drawn_text(attributes)])],
         "Model and estimates": model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": [
-            "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
+            "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz",
+            *(["none under recorded motions: the rules for them extend the paper"] if recorded else []),
         ],
-        "Flags that the charts hatch": hatched,
+        **({} if recorded else {"Flags that the charts hatch": hatched}),
         "Origin": [
             plain(f"{result.path}"),
             f"solved by {attributes.get('source', 'slipsweep')}",
@@ -76,6 +88,6 @@ def _inputs(result: Result) -> list[str]:
         if len(values) > 1:
             ends = f"{values[0]:.4g} to {values[-1]:.4g}{space}{units}, {len(values)} values"
         texts.append(f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}: {ends}")
-    if result.labels:
-        texts.append(f"cases: {plain(', '.join(result.labels))}")
+    for dim, names in result.labels.items():
+        texts.append(f"{dim}s: {plain(', '.join(names))}")
     return texts

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from slipsweep.charts.sheet import new_panels
 from slipsweep.charts.style import BLUE, VERMILION
 from slipsweep.grid.tables import Table
 from slipsweep.model.variables import HISTORY
@@ -19,7 +20,7 @@ _LABELS = {
 }
 
 
-def friction(table: Table) -> Figure:
+def friction(table: Table, axes: Axes | None = None) -> Figure:
     """Draw measured friction in the manner of the paper's Fig. 7.
 
     Parameters
@@ -32,8 +33,8 @@ def friction(table: Table) -> Figure:
     matplotlib.figure.Figure
         Panels over time: accelerations of table and block; μ(t)/μs.  Slides are shaded, from onset to stop.
     """
-    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
-    accelerations, ratio = figure.subplots(2, sharex=True)
+    figure, panels = new_panels(axes, 2, 1, (7.0, 4.5), sharey=False)
+    accelerations, ratio = panels.ravel()
     time = table["time"].values
     accelerations.plot(time, table["ground_acceleration"].values, color=BLUE, label="table")
     accelerations.plot(time, table["block_acceleration"].values, color=VERMILION, linewidth=1.0, label="block")
@@ -44,9 +45,9 @@ def friction(table: Table) -> Figure:
     ratio.set_ylabel("friction coefficient\nμ(t) / μs")
     ratio.set_xlabel("time (s)")
     stops = np.where(np.isnan(table["slide_stop"].values), time[-1], table["slide_stop"].values)
-    for axes in (accelerations, ratio):
+    for panel in (accelerations, ratio):
         for onset, stop in zip(table["slide_onset"].values, stops, strict=True):
-            axes.axvspan(onset, stop, color="0.92", zorder=0)
+            panel.axvspan(onset, stop, color="0.92", zorder=0)
     _finish(figure, (accelerations, ratio))
     figure.supxlabel(
         f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}; shaded: slides, relative acceleration "
@@ -56,7 +57,7 @@ def friction(table: Table) -> Figure:
     return figure
 
 
-def calibration(table: Table) -> Figure:
+def calibration(table: Table, axes: Axes | None = None) -> Figure:
     """Draw measured against computed motion in the manner of the paper's Figs. 8 and 9.
 
     Parameters
@@ -70,21 +71,21 @@ def calibration(table: Table) -> Figure:
         Panels over time: the table's acceleration, then each channel of the block, measured or not, with its misfit;
         parameters with their intervals in a caption.
     """
-    figure = Figure(figsize=(7.0, 7.5), layout="constrained")
-    panels = figure.subplots(4, sharex=True)
+    figure, grid = new_panels(axes, 4, 1, (7.0, 7.5), sharey=False)
+    panels = tuple(grid.ravel())
     time, measured = table["time"].values, json.loads(table.attrs["channels"])
     ground = panels[0]
     ground.plot(time, table["measured_ground_acceleration"].values, ".", color=_GREY, markersize=2, label="measured")
     ground.plot(time, table["computed_ground_acceleration"].values, color=BLUE, label="smooth")
     ground.set_ylabel("acceleration of\nthe table (m/s²)")
     ground.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
-    for axes, (name, label) in zip(panels[1:], _LABELS.items(), strict=True):
+    for panel, (name, label) in zip(panels[1:], _LABELS.items(), strict=True):
         factor = 1000.0 if name == "relative_displacement" else 1.0
         if name in measured:
             values = factor * table[f"measured_{name}"].values
-            axes.plot(time, values, ".", color=_GREY, markersize=2, label="measured")
-        axes.plot(time, factor * table[f"computed_{name}"].values, color=VERMILION, linewidth=1.2, label="computed")
-        axes.set_ylabel(label)
+            panel.plot(time, values, ".", color=_GREY, markersize=2, label="measured")
+        panel.plot(time, factor * table[f"computed_{name}"].values, color=VERMILION, linewidth=1.2, label="computed")
+        panel.set_ylabel(label)
         if name in measured:
             unit = "mm" if name == "relative_displacement" else HISTORY[name]["units"].replace(" s-2", "/s²")
             unit = unit.replace(" s-1", "/s")
@@ -93,7 +94,7 @@ def calibration(table: Table) -> Figure:
             text = f"misfit {misfit:.2g} {unit} ({share:.1%} of the largest)"
         else:
             text = "not measured"
-        axes.set_title(text, fontsize="small", loc="left")
+        panel.set_title(text, fontsize="small", loc="left")
     panels[1].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
     panels[-1].set_xlabel("time (s)")
     _finish(figure, panels)

@@ -3,25 +3,33 @@
 The command line and `Dataset.slipsweep.chart` both come here.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slipsweep.charts import curves, maps, sensitivity_figures, uncertainty_figures
+from slipsweep.charts import curves, maps, sensitivity_figures, suite_figures, uncertainty_figures
 from slipsweep.charts.sheet import DRIVES, Sheet
-from slipsweep.charts.slices import Cut, Result
+from slipsweep.charts.slices import NAMED, Cut, Result
 from slipsweep.charts.style import Look
+from slipsweep.charts.whole import DRAWN_WHOLE, WholeResult, whole_kind
 from slipsweep.errors import InputError
+from slipsweep.files.results import ResultFile, result_file
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import RESULTS
+from slipsweep.model.variables import INTENSITY_MEASURES, RESULTS, STRENGTHS
 
 #: Most curves of a family, frequencies shown to collapse, and panels across and down, that a page can show.
 _CURVES, _FREQUENCIES, _PANELS = 6, 3, 3
 
 _CODES = ("sliding_mode", "validity")
+
+#: Displacements of a fragility under a suite where none are asked for, m.
+_THRESHOLDS = (0.01, 0.1, 1.0)
 
 #: Axes of statistics that are no parameters.
 _OWN = ("quantile", "threshold")
@@ -43,6 +51,8 @@ class Wish:
         Axes that panels lie along, across and down.
     whole : bool
         Show more of the result: panels lie along axes that would be cut otherwise.
+    axes : Axes, optional
+        What to draw the one panel of a chart in, instead of a new figure.
     look : Look
     """
 
@@ -52,25 +62,42 @@ class Wish:
     variable: str = "permanent_displacement"
     panels: Sequence[str] = ()
     whole: bool = False
+    axes: Axes | None = None
     look: Look = field(default_factory=Look)
 
 
 def check_kind(kind: str) -> str:
     """`kind` if there is such a chart (InputError otherwise)."""
-    if kind not in KINDS:
-        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, tuple(KINDS))}")
+    known = (*KINDS, *DRAWN_WHOLE)
+    if kind not in known:
+        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, known)}")
     return kind
 
 
-def fitting(result: Result) -> tuple[str, ...]:
+@contextmanager
+def opened(source: Path | ResultFile) -> Iterator[Result | WholeResult]:
+    """Open what can be drawn: a result that slices are drawn of, or one that is drawn whole.
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    with ExitStack() as stack:
+        file = stack.enter_context(result_file(source)) if isinstance(source, Path) else source
+        kind = whole_kind(file)
+        yield Result(file) if kind is None else WholeResult(file, kind)
+
+
+def fitting(result: Result | WholeResult) -> tuple[str, ...]:
     """The kinds that a result's sort has."""
-    if "exceedance_probability" not in result.variables:
-        return SWEEP_KINDS
-    return tuple(kind for kind in STATISTIC_KINDS if kind != "sensitivity" or "total_index" in result.variables)
+    if isinstance(result, WholeResult):
+        return (result.kind,)
+    return tuple(kind for kind in SORTS[result.sort] if kind != "sensitivity" or "total_index" in result.variables)
 
 
-def draw(result: Result, kind: str, wish: Wish) -> Figure:
-    """Draw one chart of a result.
+def draw(result: Result | WholeResult, kind: str | None, wish: Wish) -> Figure:
+    """Draw one chart of a result, the first of those that it has if none is named.
 
     Raises
     ------
@@ -79,11 +106,28 @@ def draw(result: Result, kind: str, wish: Wish) -> Figure:
     """
     if len(wish.panels) > 2:
         raise InputError(f"--panels {','.join(wish.panels)}: must be one axis or two")
-    return KINDS[check_kind(kind)](result, wish)
+    kind = fitting(result)[0] if kind is None else check_kind(kind)
+    allowed = (result.kind,) if isinstance(result, WholeResult) else SORTS[result.sort]
+    if kind not in allowed:
+        what = _SORT_TEXT[result.kind if isinstance(result, WholeResult) else result.sort]
+        one_of = "one of " if len(allowed) > 1 else ""
+        raise InputError(f"{result.path}: --kind {kind}: is {what}: must be {one_of}{', '.join(allowed)}")
+    if isinstance(result, WholeResult):
+        _check_unused(result, wish)
+        return result.draw(wish.axes)
+    return KINDS[kind](result, wish)
+
+
+def _check_unused(result: WholeResult, wish: Wish) -> None:
+    """Refuse what says how a slice is drawn, where the whole is drawn (InputError)."""
+    given = {"--at": wish.at, "--x": wish.x, "--y": wish.y, "--panels": wish.panels, "--levels": wish.look.levels}
+    for option, value in given.items():
+        if value:
+            raise InputError(f"{result.path}: {option}: not with {result.kind}, which is drawn as a whole")
 
 
 def draw_all(
-    result: Result, kinds: Iterable[str], wish: Wish, *, strict: bool
+    result: Result | WholeResult, kinds: Iterable[str], wish: Wish, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
     """Draw several charts; where not `strict`, those that cannot be drawn are named with the reason.
 
@@ -92,12 +136,13 @@ def draw_all(
     InputError
         As `draw`; or none can be drawn.
     """
-    if not result.wide:
+    if isinstance(result, Result) and result.sort != "suite" and not result.wide:
         raise InputError(
             f"{result.path}: no chart can be drawn: it has no axis of two values or more (its dimensions: "
             f"{', '.join(f'{dim}, {values.size}' for dim, values in result.axes.items()) or 'none'})"
         )
-    result.places(wish.at)
+    if isinstance(result, Result):
+        result.places(wish.at)
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
     for kind in kinds:
@@ -113,8 +158,8 @@ def draw_all(
     return figures, left_out
 
 
-def levels_of(name: str, levels: Sequence[float | str], g: float) -> tuple[float, ...]:
-    """Contour levels of a result in its own unit, in order.
+def levels_of(result: Result | WholeResult, name: str, levels: Sequence[float | str]) -> tuple[float, ...]:
+    """Contour levels in a variable's own unit, in order; under a suite the displacements to exceed.
 
     Raises
     ------
@@ -123,13 +168,15 @@ def levels_of(name: str, levels: Sequence[float | str], g: float) -> tuple[float
     """
     own = RESULTS.get(name, {}).get("units") == "m"
     found = [
-        quantity("levels", one, "displacement_amplitude" if own else "mu_s", g) if isinstance(one, str) else float(one)
+        quantity("levels", one, "displacement_amplitude" if own else "mu_s", result.g)
+        if isinstance(one, str)
+        else float(one)
         for one in levels
     ]
     for level in found:
         if not 0 < level < float("inf"):
             raise InputError(f"levels: {level:g}: must be > 0")
-    if levels and len(set(found)) < 2:
+    if len(set(found)) == 1 and not (isinstance(result, Result) and result.sort == "suite"):
         raise InputError(f"levels: {', '.join(map(str, levels))}: must be two different values or more")
     return tuple(sorted(set(found)))
 
@@ -217,7 +264,7 @@ def _sheet(
     for name in (*panels, *([y] if y and family else [])):
         at.pop(name, None)
     across, down, *_ = (*panels, None, None)
-    return Sheet(result.select(names, keep, at), x, y, wish.look, across, down)
+    return Sheet(result.select(names, keep, at), x, y, wish.look, across, down, wish.axes)
 
 
 # ---------------------------------------------------------------------------- the charts
@@ -303,12 +350,92 @@ def _statistic_axes(result: Result, wish: Wish, variable: str, family: str | Non
     if x is None or x not in free or x in _OWN:
         raise InputError(f"{result.path}: {variable} needs an axis of two values or more that --at does not cut")
     chosen = wish.y or (family if family in free else None)
-    if chosen == x or (chosen is not None and chosen not in (*free, "case")):
+    if chosen == x or (chosen is not None and chosen not in (*free, *NAMED)):
         raise InputError(f"{result.path}: --y {chosen}: must be another axis that {variable} has, and that is not cut")
     return x, chosen
 
 
+# ------------------------------------------------------------------- under recorded motions
+
+
+def _recorded(result: Result, wish: Wish, x: str, *, y: str | None = None, more: Sequence[str] = ()) -> Sheet:
+    """The slice of a chart of recorded motions: those of a suite stay, all of them but where some are asked for."""
+    names = [result.result(name) for name in ("permanent_displacement", "validity", *more)]
+    suite = [dim for dim in suite_figures.SUITE if dim in result.axes] if result.sort == "suite" else []
+    chosen: dict[str, Any] = {dim: places for dim, places in result.places(wish.at).items() if dim in suite}
+    others = {name: cut for name, cut in wish.at.items() if name not in suite}
+    also = {dim: chosen.get(dim, slice(None)) for dim in suite}
+    return _sheet(result, replace(wish, at=others), names, x, y, family=y is not None, also=also)
+
+
+def _record_axis(result: Result, wish: Wish) -> str:
+    """What a chart of recorded motions is drawn over: how strong they are, else the yield acceleration, or any axis."""
+    dims = result.dims(result.result("permanent_displacement"))
+    free = [dim for dim in _free(result, wish, dims) if dim != wish.y and dim not in suite_figures.SUITE]
+    preferred = (*STRENGTHS, "yield_acceleration", "yield_coefficient", *free)
+    x = result.axis(wish.x) if wish.x else next((dim for dim in preferred if dim in free), None)
+    if x is None or x not in free:
+        raise InputError(
+            f"{result.path}: --x {x}: must be an axis of two values or more that --at does not cut: "
+            f"{', '.join(free) or 'there is none'}"
+        )
+    return x
+
+
+def _check_no_family(result: Result, wish: Wish, kind: str) -> None:
+    if wish.y is not None:
+        raise InputError(f"{result.path}: --y {wish.y}: not with {kind} of a suite; --panels draws panels over an axis")
+
+
+def _motions(result: Result, wish: Wish) -> Figure:
+    x = _record_axis(result, wish)
+    if result.sort == "suite":
+        _check_no_family(result, wish, "motions")
+        beside = [name for name in ("newmark_displacement",) if name in result.variables]
+        return suite_figures.motions(_recorded(result, wish, x, more=beside))
+    dims = result.dims("permanent_displacement")
+    free = [dim for dim in (*_several(result, wish), *_free(result, wish, dims)) if dim != x]
+    family = result.axis(wish.y) if wish.y else next(iter(free), None)
+    if family == x:
+        raise InputError(f"{result.path}: --y {family}: must be an axis other than {x}")
+    return suite_figures.curves(_recorded(result, wish, x, y=family))
+
+
+def _intensity(result: Result, wish: Wish) -> Figure:
+    _check_no_family(result, wish, "intensity")
+    measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.coordinates]
+    default = "arias_intensity" if "pgv" in result.axes else "pgv"
+    measure = wish.x or default
+    if measure not in measures:
+        raise InputError(
+            f"{result.path}: --x {measure}: must be an intensity measure of the motions: "
+            f"{', '.join(measures) or 'the file has none'}"
+        )
+    factor = [] if "scale" in result.coordinates else ["motion_factor"]
+    return suite_figures.intensity(_recorded(result, wish, "motion", more=factor), measure)
+
+
+def _histogram(result: Result, wish: Wish) -> Figure:
+    _check_no_family(result, wish, "histogram")
+    if wish.x is not None:
+        raise InputError(f"{result.path}: --x {wish.x}: not with histogram, which is drawn over the displacement")
+    return suite_figures.histogram(_recorded(result, wish, "motion"))
+
+
+def _suite_fragility(result: Result, wish: Wish) -> Figure:
+    _check_no_family(result, wish, "fragility")
+    sheet = _recorded(result, wish, _record_axis(result, wish))
+    return suite_figures.fragility(sheet, wish.look.levels or _THRESHOLDS)
+
+
+# ----------------------------------------------------------------------- of uncertain inputs
+
+
 def _fragility(result: Result, wish: Wish) -> Figure:
+    if result.sort == "suite":
+        return _suite_fragility(result, wish)
+    if wish.look.levels:
+        raise InputError(f"{result.path}: levels: not with statistics, whose thresholds are those in the file")
     result.result("valueless_share")
     result.require("threshold")
     x, family = _statistic_axes(result, wish, "exceedance_probability", "threshold")
@@ -353,8 +480,28 @@ KINDS: dict[str, Callable[[Result, Wish], Figure]] = {
     "fragility": _fragility,
     "quantiles": _quantiles,
     "sensitivity": _sensitivity,
+    "motions": _motions,
+    "intensity": _intensity,
+    "histogram": _histogram,
 }
 
-#: Those of a sweep, and of a sweep with uncertain inputs.
-STATISTIC_KINDS = ("fragility", "quantiles", "sensitivity")
-SWEEP_KINDS = tuple(kind for kind in KINDS if kind not in STATISTIC_KINDS)
+#: Those of a sweep under harmonic motion, of statistics, and of a sweep under recorded motions.
+SORTS: dict[str, tuple[str, ...]] = {
+    "sweep": ("contours", "modes", "families", "dimensionless", "newmark", "spread"),
+    "statistics": ("fragility", "quantiles", "sensitivity"),
+    "suite": ("motions", "fragility", "intensity", "histogram"),
+    "record": ("motions",),
+}
+
+#: What a result is, in messages.
+_SORT_TEXT = {
+    "sweep": "a sweep under harmonic motion",
+    "statistics": "statistics of displacements",
+    "suite": "a sweep under a suite of motions",
+    "record": "a sweep under a recorded motion",
+    "history": "a time history",
+    "limit": "limit amplitudes",
+    "friction": "measured friction",
+    "calibration": "a calibration",
+    "hazard": "annual rates",
+}

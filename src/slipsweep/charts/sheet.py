@@ -5,6 +5,7 @@ Figures are made without pyplot, hence without a window system or state between 
 """
 
 import itertools
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -46,6 +47,9 @@ LINES: dict[str, tuple[str, dict[str, Any]]] = {
 
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
+
+#: Characters of a caption in an inch.
+_CHARACTERS = 18
 
 #: Markers on a curve.
 _MARKED = 7
@@ -125,8 +129,8 @@ def validity_has(validity: Variable, flags: Validity) -> Variable:
 
 def member_text(table: Table, dim: str, index: int, look: Look) -> str:
     """A value of an axis that tells curves or panels apart: ``θ = 5°``, or a case by its label."""
-    if dim == "case":
-        return plain(table.attrs["labels"][index])
+    if dim in table.attrs["labels"]:
+        return plain(table.attrs["labels"][dim][index])
     value = float(table[dim].values[index])
     if dim == "threshold":
         return f"d = {length_text(value)}"
@@ -151,6 +155,8 @@ class Sheet:
     ----------
     table : Table
         The slice of all panels.
+    axes : Axes, optional
+        What to draw the one panel in, instead of a new figure.
     figure : Figure
     panels : list of Panel
     legend, remarks : dict of str to Artist
@@ -165,6 +171,7 @@ class Sheet:
     look: Look
     across: str | None = None
     down: str | None = None
+    axes: Axes | None = None
     figure: Figure = field(init=False)
     panels: list[Panel] = field(init=False)
     legend: dict[str, Artist] = field(default_factory=dict)
@@ -174,14 +181,14 @@ class Sheet:
     def __post_init__(self) -> None:
         columns, rows = (self.table[dim].values.size if dim else 1 for dim in (self.across, self.down))
         size = (7.0, 5.3) if rows == columns == 1 else (max(7.0, 2.0 + 2.7 * columns), 2.0 + 2.5 * rows)
-        self.figure = Figure(figsize=size, layout="constrained")
-        grid = self.figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        self.figure, grid = new_panels(self.axes, rows, columns, size)
         self.panels = []
         for (row, column), axes in np.ndenumerate(grid):
             where = {dim: at for dim, at in ((self.across, column), (self.down, row)) if dim}
             self.panels.append(Panel(axes, self.table.pick(where), self.x, self.y, self.look))
             title = ", ".join(member_text(self.table, dim, at, self.look) for dim, at in where.items())
-            axes.set_title(title, fontsize="medium")
+            if title:
+                axes.set_title(title, fontsize="medium")
 
     def set_axis(self, side: str, name: str) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
@@ -192,6 +199,7 @@ class Sheet:
             getattr(panel.axes, f"set_{side}label")(axis_label(name, self.look))
             place = panel.axes.get_subplotspec()
             outer = place is None or (place.is_last_col() if side == "y" else place.is_first_row())
+            outer = outer or self.axes is not None
             if is_acceleration(name) and outer:
                 second_scale(panel.axes, side, g, self.look)
 
@@ -228,24 +236,23 @@ class Sheet:
     def finish(self, loc: Any = "outside upper center") -> Figure:
         """Draw legend and caption."""
         for panel in self.panels:
-            panel.axes.label_outer()
+            if self.axes is None:
+                panel.axes.label_outer()
             if len(self.panels) > 1:  # long names beside small panels
                 for axis in (panel.axes.xaxis, panel.axes.yaxis):
                     axis.label.set_fontsize("small")
                 for axes in (panel.axes, *panel.axes.child_axes):
                     axes.tick_params(labelsize="small")
         if legend := self.legend | self.remarks:
-            self.figure.legend(
-                list(legend.values()), list(legend), loc=loc, ncols=3 if "center" in loc else 1,
-                frameon=False, fontsize="small", handlelength=3.2,
-            )  # fmt: skip
+            columns = 3 if "center" in loc and self.axes is None else 1
+            add_legend(self.figure, self.axes, legend, loc, ncols=columns, handlelength=3.2)
         self._add_caption()
         return self.figure
 
     def _add_caption(self) -> None:
-        case = f"case {plain(self.table.attrs['case'])}: " if "case" in self.table.attrs else ""
-        text = f"{case}{caption(self.table, self.look)}; {self.table.attrs.get('source', 'slipsweep')}"
-        self.figure.supxlabel("\n".join([text, *self._cases(), *self.notes]), fontsize="small", wrap=True)
+        picked = "".join(f"{dim} {plain(label)}: " for dim, label in self.table.attrs["picked"].items())
+        text = f"{picked}{caption(self.table, self.look)}; {self.table.attrs.get('source', 'slipsweep')}"
+        add_caption(self.figure, self.axes, [text, *self._cases(), *self.notes])
 
     def _cases(self) -> list[str]:
         """What the cases are that tell curves or panels apart."""
@@ -257,6 +264,46 @@ class Sheet:
             values = ", ".join(member_text(self.table, name, at, self.look) for name in own)
             texts.append(f"{member_text(self.table, 'case', at, self.look)}: {values}.")
         return texts
+
+
+# ------------------------------------------------------- a figure of its own, or a panel of another
+
+
+def new_panels(
+    axes: Axes | None, rows: int, columns: int, size: tuple[float, float], **shared: Any
+) -> tuple[Figure, NDArray[Any]]:
+    """Panels of a new figure, or the one that is given, with its figure (InputError if one is not enough)."""
+    if axes is None:
+        figure = Figure(figsize=size, layout="constrained")
+        return figure, figure.subplots(rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False)
+    root = axes.get_figure(root=True) if isinstance(axes, Axes) else None
+    if root is None:
+        raise InputError(f"ax = {axes!r}: must be the axes of a matplotlib figure")
+    if rows * columns > 1:
+        raise InputError(f"ax: is one panel, and this chart has {rows * columns}; leave ax away")
+    return root, np.array([[axes]], dtype=object)
+
+
+def add_legend(figure: Figure, axes: Axes | None, entries: Mapping[str, Any], loc: Any, **options: Any) -> None:
+    """A legend beside the panels of a figure, or inside of the one panel that is given."""
+    look: dict[str, Any] = {"fontsize": "small", "frameon": False, **options}
+    if axes is None:
+        figure.legend(list(entries.values()), list(entries), loc=loc, **look)
+    else:
+        axes.legend(list(entries.values()), list(entries), **look)
+
+
+def add_caption(figure: Figure, axes: Axes | None, texts: Sequence[str]) -> None:
+    """A caption under a figure, or under the one panel that is given, as wide as that."""
+    if axes is None:
+        figure.supxlabel("\n".join(texts), fontsize="small", wrap=True)
+        return
+    characters = max(20, int(_CHARACTERS * axes.get_window_extent().width / figure.dpi))
+    lines = [line for text in texts for one in text.splitlines() for line in textwrap.wrap(one, characters)]
+    axes.annotate(
+        "\n".join(lines), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
+        ha="center", va="top", fontsize="x-small", annotation_clip=False,
+    )  # fmt: skip
 
 
 def ratios(ours: Variable, theirs: Variable, table: Table) -> Floats:
@@ -311,6 +358,14 @@ def second_scale(axes: Axes, side: str, g: float, look: Look) -> None:
 
 
 # ----------------------------------------------------------------------------------- curves
+
+
+def log_axis_of(axes: Axes, values: Floats, least: float) -> float:
+    """A logarithmic ordinate of values some of which are zero; returns what is drawn for them, below its end."""
+    log_axis(axes, values, least)
+    if (values <= 0).any() and axes.get_ylim()[1] > 10 * least:
+        axes.set_ylim(bottom=least / 1.2)
+    return axes.get_ylim()[0] / 10
 
 
 def plot_curve(axes: Axes, xs: Floats, ys: Floats, offset: float = 0.0, **look: Any) -> Any:

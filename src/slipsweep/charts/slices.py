@@ -21,14 +21,25 @@ from slipsweep.errors import InputError
 from slipsweep.files.results import ResultFile, Where, result_file
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS
-from slipsweep.model.variables import HISTORY, PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.model.variables import (
+    HISTORY,
+    MOTION_COORDINATES,
+    PARAMETERS,
+    RECORD_RESULTS,
+    RESULTS,
+    STATISTIC_COORDINATES,
+    STATISTICS,
+)
 from slipsweep.motion.waveforms import WAVEFORMS
 
 Floats = NDArray[np.float64]
 
 #: What a result may hold along its axes, and on them.
-_COORDINATES = PARAMETERS | STATISTIC_COORDINATES
-_RESULTS = RESULTS | STATISTICS
+_COORDINATES = PARAMETERS | STATISTIC_COORDINATES | MOTION_COORDINATES
+_RESULTS = RECORD_RESULTS | RESULTS | STATISTICS
+
+#: Dimensions whose places have names, and no order.
+NAMED = ("case", "motion")
 
 #: Codes of cells, and what stands for a missing one.
 CODES = {"sliding_mode": -1, "validity": 0}
@@ -59,9 +70,11 @@ class Result:
     attrs : dict
         Global attributes.
     axes : dict of str to ndarray
-        Dimensions and their values; those of ``case`` are 1, 2, ...
-    labels : list of str
-        Names of the cases; empty without them.
+        Dimensions and their values; those of ``case`` and ``motion`` are 1, 2, ...
+    labels : dict of str to list of str
+        Names of the cases, and of the motions, where there are any.
+    sort : str
+        What it is a result of: "sweep", "statistics", "record" or "suite".
 
     Raises
     ------
@@ -73,7 +86,6 @@ class Result:
         with ExitStack() as stack:
             self._file: ResultFile = stack.enter_context(result_file(source)) if isinstance(source, Path) else source
             path = self.path = self._file.path
-            check_harmonic(self._file)
             check_sweep(self._file)
             self.attrs: dict[str, Any] = self._file.attrs
             #: Names of the results in the file.
@@ -90,7 +102,9 @@ class Result:
             self._places = {dim: places for dim, (_, places) in found.items()}
             if not all(values.size for values in self.axes.values()):
                 raise InputError(f"{path}: holds no cells")
-            self.labels: list[str] = self._file.labels
+            labels = {"case": self._file.labels, "motion": self._file.texts("motion")}
+            self.labels: dict[str, list[str]] = {dim: names for dim, names in labels.items() if names}
+            self.sort = self._sort()
             #: Names of the uncertain inputs that Sobol indices are of.
             self.inputs: list[str] = self._file.texts("input")
             self._open = stack.pop_all()
@@ -102,6 +116,13 @@ class Result:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._open.close()
+
+    def _sort(self) -> str:
+        if any(name in STATISTICS for name in self.variables):
+            return "statistics"
+        if not is_recorded(self._file):
+            return "sweep"
+        return "suite" if "motion" in self.axes else "record"
 
     @property
     def g(self) -> float:
@@ -134,8 +155,8 @@ class Result:
 
     @property
     def groups(self) -> list[str]:
-        """Axes whose values can tell curves or panels apart: also the cases, which have no order."""
-        return [*self.wide, *(["case"] if self.axes.get("case", np.zeros(1)).size > 1 else [])]
+        """Axes whose values can tell curves or panels apart: also cases and motions, which have no order."""
+        return [*self.wide, *(dim for dim in NAMED if self.axes.get(dim, np.zeros(1)).size > 1)]
 
     def require(self, *names: str) -> None:
         """Refuse a file that has lost a parameter (InputError)."""
@@ -145,7 +166,7 @@ class Result:
                 raise InputError(f"{self.path}: {name}: not in the file, but this chart needs it")
 
     def axis(self, name: str) -> str:
-        """`name` if it is an axis with more than one value (`case` is one of groups).
+        """`name` if it is an axis with more than one value (`case` and `motion` are of groups).
 
         Raises
         ------
@@ -172,7 +193,7 @@ class Result:
         Parameters
         ----------
         at : mapping of axis name to value or values
-            In the axis's own unit, or a text with another ("0.3g"); for ``case`` its number or label.
+            In the axis's own unit, or a text with another ("0.3g"); a case or motion by its number or label.
             A text may hold several, with commas.  A parameter that is one number for the whole result may be
             named too, with that number.
 
@@ -193,7 +214,7 @@ class Result:
             known = [*self.axes, *(c for c in self.coordinates if not self.dims(c))]
             if name not in known:
                 raise InputError(f"{self.path}: {name} = {cut}: no such axis; {_suggest(name, known)}")
-            if isinstance(cut, str) and not (name == "case" and cut in self.labels):
+            if isinstance(cut, str) and cut not in self.labels.get(name, ()):
                 cut = cut.split(",")
             each = [cut] if isinstance(cut, str) or np.ndim(cut) == 0 else list(cut)  # type: ignore[arg-type]
             numbers = np.array([self._number(name, one) for one in each])  # type: ignore[arg-type]
@@ -220,8 +241,10 @@ class Result:
 
     def _unsolvable(self, dim: str) -> str:
         """Why no slice at another value of an axis can be solved; empty where it can."""
-        if any(name in STATISTICS for name in self.variables):
+        if self.sort == "statistics":
             return "statistics are not drawn anew for a chart"
+        if self.sort in ("record", "suite"):
+            return "the response to recorded motions is not solved anew for a chart"
         if dim not in PARAMETERS:
             return "nothing lies between them"
         derived = {"amplitude"} if dim in ("displacement_amplitude", "frequency") else set()
@@ -230,13 +253,14 @@ class Result:
 
     def _number(self, name: str, value: float | str) -> float:
         """A value on an axis in the axis's own unit."""
-        if name == "case" and value in self.labels:
-            return 1.0 + self.labels.index(str(value))
+        labels = self.labels.get(name, [])
+        if value in labels:
+            return 1.0 + labels.index(str(value))
         try:
             return float(value)
         except ValueError:
-            if name == "case":
-                allowed = f"a number or one of {', '.join(self.labels)}"
+            if name in NAMED:
+                allowed = f"a number or one of {', '.join(labels)}"
                 raise InputError(f"{self.path}: {name} = {value}: must be {allowed}") from None
         from slipsweep.model.units import quantity
 
@@ -259,7 +283,7 @@ class Result:
             The axes that stay, and what of them to read; they may be missing from a result.  Of values
             (an array of numbers that are not indices) one at least is not on the axis.
         at : mapping of axis to value
-            Where to cut the other axes.  Those not named are cut in the middle.
+            Where to cut the other axes.  Those not named are cut in the middle, `polarity` at its largest, 1.
 
         Returns
         -------
@@ -283,7 +307,8 @@ class Result:
             if len(places) > 1:
                 raise InputError(f"{self.path}: {dim} = {at[dim]}: several values tell curves or panels apart only")
         for dim, values in self.axes.items():
-            middle = 0 if dim == "case" else (values.size - 1) // 2
+            # of the polarities the record as it is
+            middle = 0 if dim in NAMED else values.size - 1 if dim == "polarity" else (values.size - 1) // 2
             found: Any = keep[dim] if dim in keep else cuts.get(dim, [middle])
             if isinstance(found, np.ndarray):
                 exact[dim] = found if dim in keep else found[0]
@@ -299,13 +324,15 @@ class Result:
         coords |= {dim: Variable(coords[dim].dims, values, coords[dim].attrs) for dim, values in exact.items()}
         if {"displacement_amplitude", "frequency"} <= coords.keys() and ("amplitude" not in coords or exact):
             coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
-        attrs = {**self.attrs}
-        if "case" in keep:
-            numbers = self.axes["case"][where["case"]]
-            coords["case"] = Variable(("case",), numbers)
-            attrs["labels"] = [self.labels[int(n) - 1] if self.labels else f"{n:g}" for n in numbers]
-        elif self.labels:
-            attrs["case"] = self.labels[where["case"]]
+        attrs: dict[str, Any] = {**self.attrs, "labels": {}, "picked": {}}
+        for dim in NAMED:
+            names_there = self.labels.get(dim, [])
+            if dim in keep and dim in self.axes:
+                numbers = self.axes[dim][where[dim]]
+                coords[dim] = Variable((dim,), numbers)
+                attrs["labels"][dim] = [names_there[int(n) - 1] if names_there else f"{n:g}" for n in numbers]
+            elif names_there:
+                attrs["picked"][dim] = names_there[where[dim]]
         anew = [name for name in names if exact or name not in self.variables]
         solved = solve(Table(coords, {}, attrs), anew) if anew else {}
         return Table(coords, {name: solved[name] if name in solved else variable(name) for name in names}, attrs)
@@ -336,12 +363,17 @@ def check_drawable(path: Path, name: str, values: NDArray[Any], most: float = _M
         raise InputError(f"{path}: {name}: holds {beyond.flat[0]:.4g}; what is drawn must be within +-{most:g}")
 
 
+def is_recorded(file: ResultFile) -> bool:
+    """Whether a result is the response to recorded motions."""
+    return not {"record", "suite"}.isdisjoint(file.attrs)
+
+
 def check_harmonic(file: ResultFile) -> None:
     """Refuse the response to recorded motions (InputError)."""
-    if {"record", "suite"} & file.attrs.keys():
+    if is_recorded(file):
         raise InputError(
-            f"{file.path}: is the response to recorded motions; charts and pages are drawn of harmonic sweeps only "
-            "(slipsweep export makes a table of it)"
+            f"{file.path}: is the response to recorded motions; pages are made of harmonic sweeps only "
+            "(slipsweep chart draws it, slipsweep export makes a table of it)"
         )
 
 
@@ -364,8 +396,7 @@ def check_sweep(file: ResultFile) -> None:
     options = (
         "model",
         "g",
-        "cycles",
-        "waveform",
+        *(() if is_recorded(file) else ("cycles", "waveform")),
         *(("rise", "recoupling") if file.attrs.get("model") == "mendez" else ()),
     )
     for name in options:  # none has its default: what has been solved is not known any more
@@ -373,7 +404,8 @@ def check_sweep(file: ResultFile) -> None:
             raise InputError(f"{file.path}: attribute {name!r}: missing; it says what was solved")
     try:
         MODELS.from_attributes(file.attrs)
-        WAVEFORMS.from_attributes(file.attrs)
+        if not is_recorded(file):
+            WAVEFORMS.from_attributes(file.attrs)
         drawn_text(file.attrs)
     except (ValueError, TypeError) as error:  # InputError, and what numpy says of arrays
         raise InputError(f"{file.path}: {error}") from None

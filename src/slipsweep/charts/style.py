@@ -26,9 +26,13 @@ SYMBOLS = {
     "delta_mu": "Δμ",
     "minimum_friction": "μmin",
     "structure_frequency": "fs",
+    "yield_coefficient": "ky",
     "scale": "scale",
+    "pgv": "PGV",
+    "arias_intensity": "Ia",
     "time_scale": "time scale",
     "polarity": "polarity",
+    "azimuth": "azimuth",
 }
 
 _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
@@ -68,13 +72,19 @@ def is_acceleration(name: str) -> bool:
 
 def unit(name: str) -> str:
     """The unit of a parameter or result as people write it; nothing for a pure number."""
-    units = (PARAMETERS.get(name) or RESULTS[name]).get("units", "1")
+    return unit_text((PARAMETERS.get(name) or RESULTS[name]).get("units", "1"))
+
+
+def unit_text(units: str) -> str:
+    """A unit of a file as people write it."""
     return _UNITS.get(units, units)
 
 
 def axis_label(name: str, look: Look | None = None) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
-    text = f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}"
+    text = PARAMETERS[name]["long_name"]
+    if SYMBOLS[name] != name.replace("_", " "):
+        text = f"{text} {SYMBOLS[name]}"
     units = (look or Look()).unit(name)
     return f"{text} ({units})" if units else text
 

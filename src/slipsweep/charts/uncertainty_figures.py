@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slipsweep.charts.sheet import Sheet, broadcast, check_positive, curve_looks, log_axis, plot_curve
+from slipsweep.charts.sheet import Sheet, broadcast, check_positive, curve_looks, log_axis_of, plot_curve
 from slipsweep.charts.style import BLUE, length_text
 
 #: Least displacement of a logarithmic axis, mm, where the largest is far above.
@@ -62,11 +62,7 @@ def quantile_bands(sheet: Sheet) -> Figure:
     sheet.set_axis("x", sheet.x)
     quantiles = np.atleast_1d(sheet.table["quantile"].values)
     for panel in sheet.panels:
-        log_axis(panel.axes, everything, _LEAST)
-        if (everything <= 0).any() and panel.axes.get_ylim()[1] > 10 * _LEAST:
-            panel.axes.set_ylim(bottom=_LEAST / 1.2)
-        # what is zero lies below any logarithmic axis, not nowhere
-        floor = panel.axes.get_ylim()[0] / 10
+        floor = log_axis_of(panel.axes, everything, _LEAST)
         dims = ("quantile", panel.x)
         values = broadcast(panel.table["displacement_quantile"], panel.table, dims) * 1000.0
         shown, xs = np.where(np.isnan(values), np.nan, np.maximum(values, floor)), panel.values(panel.x)

@@ -20,7 +20,8 @@ def chart(
             "-k",
             metavar="KIND",
             help="contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility, "
-            "quantiles or sensitivity; may be repeated (default: all that fit).",
+            "quantiles or sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated "
+            "(default: all that fit).",
             rich_help_panel="Chart",
         ),
     ] = None,
@@ -33,7 +34,12 @@ def chart(
             rich_help_panel="Chart",
         ),
     ] = None,
-    x: Annotated[str | None, typer.Option(metavar="NAME", help="Axis to draw over.", rich_help_panel="Axes")] = None,
+    x: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Axis to draw over; of intensity the measure: pgv, cav.", rich_help_panel="Axes"
+        ),
+    ] = None,
     y: Annotated[
         str | None,
         typer.Option(
@@ -57,7 +63,7 @@ def chart(
         str | None,
         typer.Option(
             metavar="LEVEL,...",
-            help="Contours: 1cm,5cm,30cm (default: round ones).",
+            help="Contours, or displacements of a suite's fragility: 1cm,5cm,30cm.",
             rich_help_panel="Look",
         ),
     ] = None,
@@ -93,20 +99,20 @@ def chart(
     from slipsweep.files import outputs
 
     asked = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
-    together = bool(given) and len(asked) != 1
-    for path in given:
-        if together and path.suffix != ".pdf":
-            raise InputError(f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several")
-    if levels is not None and asked and "contours" not in asked:
-        raise InputError(f"--levels {levels}: only with --kind contours")
-    with Result(file) as result:
+    if levels is not None and asked and {"contours", "fragility"}.isdisjoint(asked):
+        raise InputError(f"--levels {levels}: only with --kind contours or fragility")
+    with kinds.opened(file) as result:
         chosen = asked or list(kinds.fitting(result))
+        together = bool(given) and len(chosen) > 1
+        for path in given:
+            if together and path.suffix != ".pdf":
+                raise InputError(f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several")
         wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in chosen}
         outputs.check_outputs(given or [wanted[name][0] for name in chosen], overwrite, reads=[file])
-        look = Look(units, show_cautions, kinds.levels_of(variable, levels.split(",") if levels else (), result.g))
-        wish = kinds.Wish(x, y, cuts(at), variable, panels.split(",") if panels else (), together, look)
+        look = Look(units, show_cautions, kinds.levels_of(result, variable, levels.split(",") if levels else ()))
+        wish = kinds.Wish(x, y, cuts(at), variable, panels.split(",") if panels else (), together, look=look)
         figures, left_out = kinds.draw_all(result, chosen, wish, strict=bool(asked))
-        if together:
+        if together and isinstance(result, Result):  # what is drawn whole has one chart, hence no book
             for path in given:
                 with outputs.complete_or_absent(path, overwrite) as temporary:
                     book.write(temporary, result, figures.values())

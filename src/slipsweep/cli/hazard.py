@@ -1,9 +1,7 @@
 """`slipsweep hazard`: the mean annual rate at which a displacement is exceeded."""
 
-import itertools
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -81,7 +79,9 @@ def hazard(
     if paths:
         from slipsweep.charts import hazard_figures
 
-        figure = hazard_figures.hazard_chart(table, rates, given, _points(rates))
+        marked = rates["threshold"].values
+        drawn = hazard_table(table, given, thresholds=hazard_figures.drawn_thresholds(table, marked))
+        figure = hazard_figures.hazard_chart(drawn, marked=marked)
         for path in paths:
             write_figure(figure, path, overwrite)
     if not quiet:
@@ -120,24 +120,10 @@ def _cut(table: "Table", given: list[str]) -> "Table":
     return table.pick(where)
 
 
-def _points(rates: "Table") -> list[str]:
-    """What each grid point is called, in the order of the rates."""
-    grid = rates["valueless_share"].sizes
-
-    def names(dim: str) -> Iterator[str]:
-        for i in range(grid[dim]):
-            label: Any = i + 1
-            if dim in rates:
-                label = rates[dim].values[i]
-            elif "label" in rates and rates["label"].dims == (dim,):
-                label = rates["label"].values[i]
-            yield f"{dim} = {label:.6g}" if getattr(label, "dtype", None) is not None else f"{dim} = {label}"
-
-    return [", ".join(parts) for parts in itertools.product(*(names(dim) for dim in grid))]
-
-
 def _summarize(rates: "Table", g: float) -> None:
     import numpy as np
+
+    from slipsweep.studies.suite_statistics import point_names
 
     attrs = rates.attrs
     typer.echo(f"P(u > d | PGA): share over {attrs['suite_dimensions'].replace(' ', ' and ')}")
@@ -148,7 +134,7 @@ def _summarize(rates: "Table", g: float) -> None:
     thresholds = rates["threshold"].values
     columns = [rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate", "omitted_rate")]
     shares = rates["valueless_share"].values.reshape(-1)
-    for number, point in enumerate(_points(rates)):
+    for number, point in enumerate(point_names(rates, rates["valueless_share"].sizes)):
         if point:
             typer.echo(point)
         if shares[number] > 0.0:

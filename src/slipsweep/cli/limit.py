@@ -1,5 +1,6 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from slipsweep.grid.tables import Table
 
 EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
+
+#: Most grid points whose quantiles under a suite are printed, and limits that are printed one by one.
+_MOST_POINTS, _MOST_MOTIONS = 12, 60
 
 
 def limit(
@@ -109,7 +113,7 @@ def limit(
     if figures:
         from slipsweep.charts.limit_figures import limit_chart
 
-        figure = limit_chart(table, job.labels)
+        figure = limit_chart(replace(table, attrs={**table.attrs, "labels": {"case": job.labels}}))
         for path in figures:
             write_figure(figure, path, overwrite)
     if not quiet:
@@ -150,8 +154,37 @@ def _summarize(table: "Table") -> None:
     highest = taken_as({"amplitude": float(table.attrs["maximum_amplitude"])}, g).removeprefix("amplitude ")
     typer.echo(f"displacement {wanted} m, searched up to {highest}")
     typer.echo(f"inputs: {table.attrs['friction_inputs']}")
+    if limits.sizes.get("motion", 1) > 1:
+        _summarize_suite(table, g)
     typer.echo("status (limit_status):")
     for one in LimitStatus:
         share = np.count_nonzero(status == one) / status.size
         if share:
             typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
+
+
+def _summarize_suite(table: "Table", g: float) -> None:
+    """Print the limit of each motion, and the suite's quantiles, at every grid point."""
+    from slipsweep.studies.suite_statistics import limit_quantiles, point_names
+
+    limits = table["limit_amplitude"]
+    found = limit_quantiles(table, (0.16, 0.5, 0.84))
+    grid, suite = found["value_count"].sizes, [dim for dim in ("motion", "polarity") if dim in limits.dims]
+    order = [limits.dims.index(dim) for dim in (*grid, *suite)]
+    each = limits.values.transpose(order).reshape(found["value_count"].values.size, -1)
+    names = point_names(table, {dim: limits.sizes[dim] for dim in suite})
+    width = max(24, *map(len, names))
+    typer.echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is above all others:")
+    for number, point in enumerate(point_names(table, grid)[:_MOST_POINTS]):
+        quantiles = found["limit_quantile"].values.reshape(-1, 3)[number]
+        count, beyond = (found[name].values.reshape(-1)[number] for name in ("value_count", "not_reached_count"))
+        of = f"of {count}" + (f", {beyond} of them not reached" if beyond else "")
+        typer.echo(f"  {point + ': ' if point else ''}{', '.join(_limit_text(one, g) for one in quantiles)} {of}")
+        for name, value in zip(names, each[number], strict=True) if each.size <= _MOST_MOTIONS else ():
+            typer.echo(f"    {name.removeprefix('motion = '):<{width}}{_limit_text(value, g)}")
+    if each.shape[0] > _MOST_POINTS:
+        typer.echo(f"  and {each.shape[0] - _MOST_POINTS} grid points more")
+
+
+def _limit_text(value: float, g: float) -> str:
+    return f"{value:.6g} ({value / g:.4g})" if abs(value) < float("inf") else "none"

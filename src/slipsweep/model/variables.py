@@ -460,6 +460,7 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
 #: dtype of each result; everything else is float64.
 RESULT_DTYPES: dict[str, str] = {
     "sliding_mode": "int8",
+    "half_wave_mode": "int8",
     "validity": "int16",
     "limit_status": "int8",
     "sensitivity_status": "int8",
@@ -488,6 +489,17 @@ HISTORY: dict[str, dict[str, Any]] = {
     "friction_coefficient": {"units": "1", "long_name": "instantaneous friction coefficient"},
     "relative_velocity": {"units": "m s-1", "long_name": "relative velocity of the block"},
     "relative_displacement": {"units": "m", "long_name": "relative displacement of the block"},
+}
+
+#: The positive half waves of the record that a time history is of, along `half_wave`.
+HALF_WAVES: dict[str, dict[str, Any]] = {
+    "half_wave_start": {"units": "s", "long_name": "time at which the acceleration of the plane rises through zero"},
+    "half_wave_end": {"units": "s", "long_name": "time at which it falls through zero"},
+    "half_wave_peak": {"units": "m s-2", "long_name": "largest acceleration of the plane between"},
+    "half_wave_mode": {
+        "long_name": "sliding mode that the peak decides; stuck where it does not exceed the yield acceleration",
+        **{name: RESULTS["sliding_mode"][name] for name in ("flag_values", "flag_meanings")},
+    },
 }
 
 #: What Eq. 1 makes of a test on a shaking table, along time.

@@ -17,9 +17,12 @@ from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history, record_history
+from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import MOST_POINTS, check_numbers, check_whole, number_text
-from slipsweep.model.variables import HISTORY, VALUELESS, SlidingMode
+from slipsweep.model.variables import HALF_WAVES, HISTORY, VALUELESS, SlidingMode
 from slipsweep.motion.cutting import wave_of, wave_of_record
+from slipsweep.motion.intensity import strength_factor
+from slipsweep.motion.pieces import END, START
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
@@ -69,7 +72,7 @@ def history_table(
             phases = grid / one.unit
         if not np.isfinite(phases[[0, -1]]).all():
             raise InputError(f"times = ..., {number_text(float(grid[-1]))}: too many cycles for double precision")
-    columns = one.columns(phases)
+    columns = one.columns(phases) | one.half_waves()
     return Table(
         {**summary.coords, "time": Variable(("time",), grid, {"units": "s", "long_name": "time"})},
         columns | summary.data_vars,
@@ -141,6 +144,31 @@ class _History:
         return {
             name: Variable(("time",), np.ascontiguousarray(table[:, at]), HISTORY[name]) for name, at in known.items()
         }
+
+    def half_waves(self) -> dict[str, Variable]:
+        """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
+        record = self.problem.excitation
+        if not isinstance(record, Record):
+            return {}
+        wave = wave_of_record(record, float(self.inputs["polarity"]))
+        with np.errstate(over="ignore"):
+            peak = wave.height * float(strength_factor(record, self.inputs))
+        limited = () if isinstance(self.problem.model, Newmark) else ("limiting_acceleration",)
+        block = {**{name: np.atleast_1d(values) for name, values in self.inputs.items()}, "amplitude": np.zeros(1)}
+        known = engine.friction_parameters(Request(self.problem, (1,), block, ("yield_acceleration", *limited)))
+        mode = np.where(peak > known["yield_acceleration"], SlidingMode.STICK_SLIP, SlidingMode.STUCK)
+        for limit in (known[name] for name in limited):
+            mode = np.where((mode != SlidingMode.STUCK) & (peak > limit), SlidingMode.CONTINUOUS, mode)
+        if self._valueless:
+            mode = np.full(peak.shape, SlidingMode.MISSING)
+        first, after = wave.stretch.T
+        found = {
+            "half_wave_start": self.unit * wave.pieces[first, START],
+            "half_wave_end": self.unit * wave.pieces[after - 1, END],
+            "half_wave_peak": peak,
+            "half_wave_mode": mode.astype(np.int8),
+        }
+        return {name: Variable(("half_wave",), values, HALF_WAVES[name]) for name, values in found.items()}
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""

@@ -1,6 +1,7 @@
 """Statistics of the displacement over the motions of a suite, at every other grid point."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.parameters import check_list, shown
-from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, Validity
+from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
 from slipsweep.studies.sampling import check_quantiles, check_thresholds
 
 Floats = NDArray[np.float64]
@@ -63,6 +64,62 @@ def suite_table(table: Table, *, thresholds: Any, quantiles: Any, zero: Any, ove
     }
     attrs = {**table.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
     return Table(coords, results, attrs)
+
+
+def limit_quantiles(table: Table, quantiles: Any) -> Table:
+    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point.
+
+    A motion that does not reach the displacement up to the maximum amplitude has a limit above all others.  Motions
+    without a value are left out.
+
+    Parameters
+    ----------
+    table : Table
+        Limit amplitudes with the dimension `motion`, and their status.
+    quantiles : float or array
+
+    Returns
+    -------
+    Table
+        `limit_quantile` (m/s², dimension `quantile`; infinite where so many motions do not reach it, NaN where none has
+        a value), `value_count` and `not_reached_count`.
+    """
+    limits = table["limit_amplitude"]
+    dims = _suite_dims(limits, None)
+    grid = {dim: size for dim, size in limits.sizes.items() if dim not in dims}
+    order = [limits.dims.index(dim) for dim in (*grid, *dims)]
+    values, status = (
+        table[name].values.transpose(order).reshape((*grid.values(), -1))
+        for name in ("limit_amplitude", "limit_status")
+    )
+    beyond = status == LimitStatus.NOT_REACHED
+    ordered = np.sort(np.where(beyond, np.inf, values), axis=-1)
+    count = np.count_nonzero(~np.isnan(ordered), axis=-1)
+    wanted = check_quantiles("quantiles", quantiles)
+    found = _quantiles(ordered, np.zeros_like(count), count, wanted)
+    coords = {name: one for name, one in table.coords.items() if not {*dims} & {*one.dims, name}}
+    results = {
+        "limit_quantile": Variable((*grid, "quantile"), found, {"units": "m s-2"}),
+        "value_count": Variable(tuple(grid), count),
+        "not_reached_count": Variable(tuple(grid), np.count_nonzero(beyond, axis=-1)),
+    }
+    return Table({**coords, "quantile": Variable(("quantile",), wanted)}, results, table.attrs)
+
+
+def point_names(table: Table, sizes: Mapping[str, int]) -> list[str]:
+    """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
+
+    def names(dim: str) -> Iterator[str]:
+        for i in range(sizes[dim]):
+            label: Any = i + 1
+            if dim in table:
+                label = table[dim].values[i]
+            elif "label" in table and table["label"].dims == (dim,):
+                label = table["label"].values[i]
+            numeric = getattr(label, "dtype", np.dtype(object)).kind in "iuf"
+            yield f"{dim} = {label:.6g}" if numeric else f"{dim} = {label}"
+
+    return [", ".join(parts) for parts in itertools.product(*(names(dim) for dim in sizes))]
 
 
 def _suite_dims(displacement: Variable, over: Any) -> tuple[str, ...]:
@@ -128,10 +185,13 @@ def _statistics(
 def _quantiles(ordered: Floats, first: NDArray[Any], count: NDArray[Any], wanted: Floats) -> Floats:
     """Quantiles of `count` values that begin at `first`, linear between them (numpy's default); NaN of none."""
     most = ordered.shape[-1] - 1
+    # infinite values, those above all others, have no straight line to them
     place = wanted * np.maximum(count - 1, 0)[..., None]
     below = np.floor(place).astype(np.intp)
     last = np.maximum(first + count - 1, 0)[..., None]
     at = np.minimum(first[..., None] + below, most)
     low = np.take_along_axis(ordered, at, axis=-1)
     high = np.take_along_axis(ordered, np.minimum(at + 1, np.maximum(last, 0)), axis=-1)
-    return np.asarray(np.where(count[..., None] > 0, low + (place - below) * (high - low), np.nan))
+    with np.errstate(invalid="ignore"):
+        between = np.where((high == low) | (place == below), low, low + (place - below) * (high - low))
+    return np.asarray(np.where(count[..., None] > 0, between, np.nan))

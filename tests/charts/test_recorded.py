@@ -1,0 +1,292 @@
+"""Charts of recorded motions, and what is drawn as a whole: beside numpy and the public functions."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+import slipsweep
+from slipsweep.charts.suite_figures import SCALING
+from slipsweep.cli import main
+from slipsweep.errors import InputError
+from slipsweep.model.variables import INTENSITY_MEASURES
+from slipsweep.motion.intensity import intensity_measures
+
+SWEEPS = Path(__file__).parents[2] / "sweeps"
+
+#: Peak ground accelerations at which no motion slides, some do, and all do, m/s².
+AMPLITUDES = np.array([1.0, 2.5, 4.0, 6.0])
+
+
+@pytest.fixture(scope="module")
+def suite() -> slipsweep.Suite:
+    return slipsweep.read_suite(str(SWEEPS / "data" / "suite" / "*.AT2"))
+
+
+@pytest.fixture(scope="module")
+def result(suite: slipsweep.Suite) -> xr.Dataset:
+    return slipsweep.sweep(
+        [5.0, 20.0], [0.3, 0.4], AMPLITUDES, excitation=suite, polarity="both", model="newmark",
+        variables=["permanent_displacement", "validity", "newmark_displacement", "motion_factor"],
+    )  # fmt: skip
+
+
+def labelled(figure: Figure, gid: str) -> list[Any]:
+    """Artists of a chart's first axes with a name."""
+    return [child for child in figure.axes[0].get_children() if child.get_gid() == gid]
+
+
+def caption(figure: Figure) -> str:
+    return str(figure.get_supxlabel())
+
+
+def displacements(result: xr.Dataset, **where: float) -> xr.DataArray:
+    return result.permanent_displacement.sel(where).stack(each=["motion", "polarity"]) * 1000.0
+
+
+# ------------------------------------------------------------------------------- suites
+
+
+@pytest.mark.parametrize("x", ["amplitude", "mu_s"])
+def test_median_and_band_are_quantiles_of_all_motions(result: xr.Dataset, x: str) -> None:
+    at = {"theta": 5.0, "mu_s": 0.3} if x == "amplitude" else {"theta": 5.0, "amplitude": 6.0}
+    figure = result.slipsweep.chart("motions", x=x, at=at)
+    values = displacements(result, **at)
+    expected = np.quantile(values, [0.16, 0.5, 0.84], axis=values.dims.index("each"))
+    (median,), edges, lines = (labelled(figure, gid) for gid in ("median", "edge", "motion"))
+    low = figure.axes[0].get_ylim()[0]
+    for line, row in zip((edges[0], median, edges[1]), expected, strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), result[x])
+        seen = row >= low
+        assert seen.any()
+        np.testing.assert_allclose(line.get_ydata()[seen], row[seen], rtol=1e-12)
+        assert (line.get_ydata()[~seen] < low).all()  # zero lies below the axis, not nowhere
+    drawn = np.sort([line.get_ydata() for line in lines], axis=0)
+    shown = np.sort(values.transpose("each", x), axis=0)
+    np.testing.assert_allclose(drawn[shown >= low], shown[shown >= low], rtol=1e-12)
+    zeros = (values == 0).sum("each").max().item()
+    text = caption(figure)
+    assert "8 motions in 2 polarities; all have a value." in text
+    assert ("Zero displacement: up to" in text) == (zeros > 0)
+    assert "Üy by Coulomb" in text
+    (theirs,) = labelled(figure, "newmark")  # the result is of Newmark's block itself
+    np.testing.assert_array_equal(theirs.get_ydata(), median.get_ydata())
+
+
+def test_motions_without_a_value_are_counted_by_reason(suite: slipsweep.Suite) -> None:
+    """Scaled by 6, strong motions take the plane away from under the block."""
+    result = slipsweep.sweep(35.0, 0.9, excitation=suite, scale=[1.0, 2.0, 6.0])
+    missing = result.permanent_displacement.isnull()
+    most = int(missing.sum("motion").max())
+    assert 0 < most < 8
+    figure = result.slipsweep.chart()
+    assert f"up to {most} of 8 have no value and are left out (uplift {most})" in caption(figure)
+    (median,) = labelled(figure, "median")
+    expected = 1000.0 * np.asarray(np.nanquantile(result.permanent_displacement, 0.5, axis=1))
+    seen = expected > figure.axes[0].get_ylim()[0]
+    assert seen.any()
+    np.testing.assert_allclose(median.get_ydata()[seen], expected[seen], rtol=1e-12)
+
+
+@pytest.mark.parametrize("measure", list(INTENSITY_MEASURES))
+def test_intensity_is_that_of_the_motion_as_it_shakes_the_block(suite: slipsweep.Suite, measure: str) -> None:
+    """Against the measures of a record that is scaled and stretched before they are taken."""
+    stretched = 1.0 if measure == "mean_period" else 1.25  # it is of frequencies that time does not change
+    result = slipsweep.sweep(5.0, 0.3, 5.0, excitation=suite, time_scale=stretched)
+    figure = result.slipsweep.chart("intensity", x=measure)
+    factors = result.motion_factor.values
+    expected = []
+    for label, factor in zip(suite.labels, factors, strict=True):
+        one = suite[label]
+        assert isinstance(one, slipsweep.Record)
+        shaken = slipsweep.Record(one.times * stretched, one.acceleration * factor)
+        expected.append(intensity_measures(shaken)[measure])
+    (points,) = labelled(figure, "a motion")
+    values = result.permanent_displacement.values * 1000.0
+    low = figure.axes[0].get_ylim()[0]
+    shown = values >= low
+    assert shown.sum() > 3
+    np.testing.assert_allclose(points.get_xdata(), np.array(expected)[shown], rtol=1e-9)
+    np.testing.assert_allclose(points.get_ydata(), values[shown], rtol=1e-12)
+    text = caption(figure)
+    assert ("the square of the motion's factor" in text) == (measure == "arias_intensity")
+    assert ("the motion's factor" in text) == (SCALING[measure][0] > 0)
+
+
+def test_histogram_counts_every_motion_that_slides(result: xr.Dataset) -> None:
+    at = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0}
+    values = displacements(result, **at).values
+    zeros = np.count_nonzero(values == 0)
+    assert 0 < zeros < values.size
+    figure = result.slipsweep.chart("histogram", at=at)
+    (bars,) = labelled(figure, "histogram")
+    counts, edges, _ = bars.get_data()
+    np.testing.assert_array_equal(counts, np.histogram(values[values > 0], edges)[0])
+    assert counts.sum() == values.size - zeros
+    assert f"zero: {zeros / values.size:.0%}" in [text.get_text() for text in figure.axes[0].texts]
+    assert f"Zero displacement: {zeros} of {values.size}" in caption(figure)
+
+
+def test_fragility_is_the_share_of_motions_that_exceed(result: xr.Dataset) -> None:
+    at = {"theta": 5.0, "mu_s": 0.3}
+    figure = result.slipsweep.chart("fragility", at=at, levels=["1mm", "5cm"])
+    values = displacements(result, **at)
+    for line, threshold in zip(figure.axes[0].lines[:2], (1.0, 50.0), strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), (values > threshold).mean("each"))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["d = 1 mm", "d = 50 mm"]
+    # the same of the statistics themselves
+    found = slipsweep.suite_statistics(result, thresholds=["1mm", "5cm"])
+    again = found.slipsweep.chart("fragility", at=at)
+    for one, other in zip(figure.axes[0].lines[:2], again.axes[0].lines[:2], strict=True):
+        np.testing.assert_array_equal(one.get_ydata(), other.get_ydata())
+
+
+def test_some_motions_of_a_suite(result: xr.Dataset, suite: slipsweep.Suite) -> None:
+    chosen = suite.labels[:2]
+    figure = result.slipsweep.chart("motions", at={"motion": chosen, "polarity": -1, "theta": 5, "mu_s": 0.3})
+    assert len(labelled(figure, "motion")) == 2
+    (median,) = labelled(figure, "median")
+    values = result.permanent_displacement.sel(motion=list(chosen), polarity=-1, theta=5, mu_s=0.3)
+    assert median.get_ydata()[-1] == pytest.approx(1000.0 * values.isel(amplitude=-1).median().item(), rel=1e-12)
+
+
+def test_what_is_refused_of_recorded_motions(result: xr.Dataset) -> None:
+    for arguments, message in (
+        (("contours",), "--kind contours: is a sweep under a suite of motions: must be one of motions, fragility"),
+        (("motions", {"at": {"mu_s": 0.35}}), "recorded motions is not solved anew.*neighbours are 0.3 and 0.4"),
+        (("motions", {"at": {"motion": "none"}}), "motion = none: must be a number or one of rock-far_H1"),
+        (("motions", {"y": "mu_s"}), "--y mu_s: not with motions of a suite; --panels"),
+        (("intensity", {"x": "mu_s"}), "--x mu_s: must be an intensity measure of the motions: pga, pgv"),
+        (("motions", {"panels": ["mu_s"], "ax": Figure().subplots()}), "ax: is one panel, and this chart has 2"),
+    ):
+        kind, options = (*arguments, {})[:2]
+        with pytest.raises(InputError, match=message):
+            result.slipsweep.chart(kind, **options)
+
+
+def test_the_book_of_a_suite(result: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a file, as from a dataset."""
+    monkeypatch.chdir(tmp_path)
+    text = (SWEEPS / "suite.toml").read_text().replace("data/suite", str(SWEEPS / "data" / "suite"))
+    Path("suite.toml").write_text(text.replace("num = 15", "num = 4").replace("num = 5", "num = 2"))
+    assert main(["run", "suite.toml", "-q"]) == 0
+    assert main(["chart", "suite.nc", "-o", "suite.pdf"]) == 0
+    assert Path("suite.pdf").read_bytes().count(b"/Type /Page ") == 5
+    assert main(["chart", "suite.nc"]) == 0
+    kinds = ("fragility", "histogram", "intensity", "motions")
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == [f"suite-{kind}.png" for kind in kinds]
+
+
+def test_a_single_record() -> None:
+    record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
+    result = slipsweep.sweep(5.0, [0.3, 0.4], excitation=record, scale=[1.0, 1.5, 2.0], polarity="both")
+    figure = result.slipsweep.chart(show_cautions=True)
+    for line, mu_s in zip(figure.axes[0].lines, result.mu_s, strict=True):
+        expected = result.permanent_displacement.sel(mu_s=mu_s, polarity=1) * 1000.0  # the record as it is
+        np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
+
+
+# --------------------------------------------------------------------- drawn as a whole
+
+
+def test_limits_of_a_suite(suite: slipsweep.Suite, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Some motions do not reach the displacement: their limits are above all others."""
+    limits = slipsweep.limit_amplitude(0.05, 5.0, [0.3, 0.4], excitation=suite, maximum_amplitude=7.2, model="newmark")
+    missing = limits.limit_amplitude.isnull().sum("motion").values
+    assert 0 < missing[-1] < 4
+    figure = limits.slipsweep.chart()
+    (median,) = labelled(figure, "median")
+    ordered = np.sort(limits.limit_amplitude.fillna(np.inf).values, axis=-1)
+    np.testing.assert_allclose(median.get_ydata(), ordered[:, 3:5].mean(axis=1) / 9.81, rtol=1e-12)
+    assert len(labelled(figure, "motion")) == 8
+    assert f"{missing.sum()} of 16 limits are above" in caption(figure)
+    # where nothing varies but the motion, they lie along the abscissa
+    axes = Figure().subplots()
+    assert limits.isel(mu_s=0).slipsweep.chart(ax=axes) is axes
+    assert [text.get_text() for text in axes.get_xticklabels()] == list(suite.labels)
+    # and in the table of the command line
+    (tmp_path / "a.toml").write_text(
+        f'[excitation]\nrecords = "{SWEEPS}/data/suite/*.AT2"\n[model]\nfriction = "newmark"\n'
+        "[axes.theta]\nvalues = [5]\n[axes.mu_s]\nvalues = [0.3, 0.4]\n[axes.amplitude]\nvalues = [1]\n"
+    )
+    assert main(["limit", str(tmp_path / "a.toml"), "-d", "5cm", "--maximum-amplitude", "7.2"]) == 0
+    told = capsys.readouterr().out
+    low, middle = (f"{ordered[0, 3:5].mean():.6g}", f"{ordered[1, 3:5].mean():.6g}")
+    assert low in told
+    assert middle in told
+    assert f"of 8, {missing[-1]} of them not reached" in told
+    assert all(label in told for label in suite.labels)
+
+
+def test_every_half_wave_of_a_history_has_its_mode() -> None:
+    """As many of each mode as the solver counted, and the times are zeros of the record."""
+    record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
+    given: dict[str, Any] = {"excitation": record, "scale": 2.5, "time_scale": 2.0, "polarity": -1}
+    history = slipsweep.simulate(5.0, 0.35, **given)
+    modes = history.half_wave_mode.values
+    assert np.count_nonzero(modes == 1) == history.stick_slip_pulses
+    assert np.count_nonzero(modes == 2) == history.continuous_pulses
+    assert min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
+    for name in ("half_wave_start", "half_wave_end"):
+        at = np.interp(history[name], 2.0 * record.times, -2.5 * record.acceleration)
+        np.testing.assert_allclose(at[1:-1], 0.0, atol=1e-12)
+    within = [
+        history.ground_acceleration.sel(time=slice(*ends)).max()
+        for ends in zip(history.half_wave_start, history.half_wave_end, strict=True)
+    ]
+    np.testing.assert_allclose(history.half_wave_peak, within, rtol=1e-12)
+    figure = history.slipsweep.chart("history")
+    for name, mode in (("stuck", 0), ("stick_slip", 1), ("continuous", 2)):
+        (boxes,) = labelled(figure, name)
+        spans = np.array([path.get_extents().intervalx for path in boxes.get_paths()])
+        np.testing.assert_allclose(spans[:, 0], history.half_wave_start[modes == mode], rtol=1e-12)
+        np.testing.assert_allclose(spans[:, 1], history.half_wave_end[modes == mode], rtol=1e-12)
+    newmark = slipsweep.simulate(5.0, 0.35, model="newmark", **given)
+    assert set(newmark.half_wave_mode.values) == {0, 1}
+    assert np.count_nonzero(newmark.half_wave_mode == 1) == newmark.stick_slip_pulses
+
+
+def test_the_command_line_draws_what_the_accessor_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a history: by `simulate`, of its file by `chart`, and of its dataset."""
+    monkeypatch.chdir(tmp_path)
+    given = ["--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8"]
+    assert main(["simulate", *given, "-o", "a.nc", "-o", "a.png", "-q"]) == 0
+    assert main(["chart", "a.nc", "-o", "b.png"]) == 0
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+    figure = slipsweep.simulate(5.0, 0.38, 3.55, 1.8).slipsweep.chart()
+    figure.savefig("c.png", dpi=150)
+    assert Path("a.png").read_bytes() == Path("c.png").read_bytes()
+    assert main(["chart", "a.nc", "--kind", "modes"]) == 2
+    assert main(["chart", "a.nc", "--at", "theta=5", "-o", "d.png"]) == 2
+    assert not Path("d.png").exists()
+
+
+def test_annual_rates(result: xr.Dataset) -> None:
+    curve = slipsweep.HazardCurve(np.array([0.5, 10.0]), np.array([1e-2, 1e-5]))
+    rates = slipsweep.displacement_hazard(result.sel(theta=5.0), curve, [0.001, 0.01, 0.1])
+    axes = Figure().subplots()
+    assert rates.slipsweep.chart(ax=axes) is axes
+    marks = [line for line in axes.lines if line.get_marker() not in ("", "None", None)]
+    for line, mu_s in zip(marks, rates.mu_s, strict=True):
+        expected = rates.annual_rate.sel(mu_s=mu_s).values
+        np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
+
+
+def test_a_chart_in_axes_of_another_figure() -> None:
+    """Map and curves of a sweep, side by side, each with its legend and caption."""
+    sweep = slipsweep.sweep([2.0, 5.0], 0.4, np.linspace(2, 8, 9), [1.0, 2.0, 4.0], excitation=slipsweep.Sine(cycles=3))
+    figure = Figure(figsize=(12, 5), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    assert sweep.slipsweep.chart("contours", ax=left, at={"theta": 5}) is left
+    assert sweep.slipsweep.chart("families", ax=right, at={"theta": 5}, y="frequency") is right
+    assert [line for line in right.lines if str(line.get_label()).startswith("f = ")]
+    for axes in (left, right):
+        assert axes.get_legend() is not None
+        assert any("Mendez et al. 2012" in text.get_text() for text in axes.texts)
+    assert not figure.legends
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in (left, right)]
+    assert boxes[0].x1 <= boxes[1].x0  # nothing of one lies in the other
