@@ -231,7 +231,7 @@ def test_every_half_wave_of_a_history_has_its_mode() -> None:
     assert np.count_nonzero(modes == 2) == history.continuous_pulses
     assert min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
     for name in ("half_wave_start", "half_wave_end"):
-        at = np.interp(history[name], 2.0 * record.times, -2.5 * record.acceleration)
+        at = np.asarray(np.interp(history[name], 2.0 * record.times, -2.5 * record.acceleration))
         np.testing.assert_allclose(at[1:-1], 0.0, atol=1e-12)
     within = [
         history.ground_acceleration.sel(time=slice(*ends)).max()

@@ -123,10 +123,10 @@ def _draw_motions(entries: dict[str, Any], panel: Axes, table: Table, abscissa: 
         panel.set_xlim(*across)
         del entries["a motion"]
         points = limits.values.transpose([limits.dims.index(dim) for dim in SUITE if dim in limits.dims])
-        for row, marker in zip(points.reshape(x.size, -1).T / g, "os", strict=False):
-            (entries["a motion"],) = panel.plot(
-                x, row, linestyle="", marker=marker, markerfacecolor="white", color="0.2"
-            )
+        names = [f"polarity {one:g}" for one in table["polarity"].values] if points.ndim > 1 else ["a motion"]
+        look: dict[str, Any] = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
+        for name, row, marker in zip(names, points.reshape(x.size, -1).T / g, "os", strict=False):
+            (entries[name],) = panel.plot(x, row, marker=marker, **look)
         return
     lines = limits.values.transpose([limits.dims.index(dim) for dim in (*SUITE, abscissa) if dim in limits.dims])
     draw_suite(entries, panel, x, lines.reshape(-1, x.size) / g, quantiles, None)
