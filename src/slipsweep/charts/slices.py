@@ -389,10 +389,8 @@ def check_sweep(file: ResultFile) -> None:
     others = {"limit_amplitude", *HISTORY}
     if others & file.variables.keys() or not any(name in _RESULTS for name in file.results):
         raise InputError(f'{file.path}: not a result of "slipsweep run"')
-    for name, attributes in [*_COORDINATES.items(), *_RESULTS.items()]:
-        found = file[name].attrs.get("units") if name in file else None
-        if found and found != attributes.get("units", found):
-            raise InputError(f'{file.path}: {name}: units = "{found}"; must be "{attributes["units"]}"')
+    check_units(file, _COORDINATES)
+    check_units(file, _RESULTS)
     options = (
         "model",
         "g",
@@ -409,6 +407,14 @@ def check_sweep(file: ResultFile) -> None:
         drawn_text(file.attrs)
     except (ValueError, TypeError) as error:  # InputError, and what numpy says of arrays
         raise InputError(f"{file.path}: {error}") from None
+
+
+def check_units(file: ResultFile, described: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse a file whose values another program has put into other units (InputError)."""
+    for name, attributes in described.items():
+        found = file[name].attrs.get("units") if name in file else None
+        if found and found != attributes.get("units", found):
+            raise InputError(f'{file.path}: {name}: units = "{found}"; must be "{attributes["units"]}"')
 
 
 def _units_of(name: str) -> str:

@@ -84,7 +84,7 @@ def axis_label(name: str, look: Look | None = None) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
     text = PARAMETERS[name]["long_name"]
     if SYMBOLS[name] != name.replace("_", " "):
-        text = f"{text} {SYMBOLS[name]}"
+        text = f"{text.split(',')[0].split(' that ')[0]} {SYMBOLS[name]}"
     units = (look or Look()).unit(name)
     return f"{text} ({units})" if units else text
 

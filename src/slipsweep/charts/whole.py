@@ -8,9 +8,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from slipsweep.charts import calibration_figures, figures, hazard_figures, limit_figures
+from slipsweep.charts.slices import check_units
 from slipsweep.errors import InputError
 from slipsweep.files.results import ResultFile, read_table
 from slipsweep.grid.tables import Table
+from slipsweep.model.variables import (
+    CALIBRATION_SERIES,
+    HALF_WAVES,
+    HAZARD_RESULTS,
+    HISTORY,
+    LIMIT_RESULTS,
+    PARAMETERS,
+    SLIDES,
+    STATISTIC_COORDINATES,
+)
 
 #: A variable that only a result of the kind has, and what draws it.
 DRAWN_WHOLE: dict[str, tuple[str, Callable[[Table, Axes | None], Figure]]] = {
@@ -19,6 +30,18 @@ DRAWN_WHOLE: dict[str, tuple[str, Callable[[Table, Axes | None], Figure]]] = {
     "friction": ("friction_ratio", calibration_figures.friction),
     "hazard": ("annual_rate", hazard_figures.hazard_chart),
     "history": ("relative_displacement", figures.history),
+}
+
+#: Variables that the charts take in the units that slipsweep writes.
+_DESCRIBED = {
+    **PARAMETERS,
+    **STATISTIC_COORDINATES,
+    **HISTORY,
+    **HALF_WAVES,
+    **LIMIT_RESULTS,
+    **HAZARD_RESULTS,
+    **SLIDES,
+    **CALIBRATION_SERIES,
 }
 
 #: Samples of the record that a file carries: no chart shows them.
@@ -44,11 +67,17 @@ class WholeResult:
     path : Path
     g : float
         Gravity, m/s².
+
+    Raises
+    ------
+    InputError
+        Another program has put values into other units.
     """
 
     def __init__(self, file: ResultFile, kind: str) -> None:
         self.path: Path = file.path
         self.kind = kind
+        check_units(file, _DESCRIBED)
         self.g = float(file.attrs.get("g", 9.81))
         dims = set(file[DRAWN_WHOLE[kind][0]].dims)
         names = [
