@@ -126,6 +126,11 @@ def test_histogram_counts_every_motion_that_slides(result: xr.Dataset) -> None:
     counts, edges, _ = bars.get_data()
     np.testing.assert_array_equal(counts, np.histogram(values[values > 0], edges)[0])
     assert counts.sum() == values.size - zeros
+    for amplitude in AMPLITUDES[2:]:  # the largest lies in the last bar, however its logarithm is rounded
+        for mu_s in (0.3, 0.4):
+            at = {"theta": 5.0, "mu_s": mu_s, "amplitude": amplitude}
+            (bars,) = labelled(result.slipsweep.chart("histogram", at=at), "histogram")
+            assert bars.get_data()[0].sum() == np.count_nonzero(displacements(result, **at) > 0)
     assert f"zero: {zeros / values.size:.0%}" in [text.get_text() for text in figure.axes[0].texts]
     assert f"Zero displacement: {zeros} of {values.size}" in caption(figure)
 

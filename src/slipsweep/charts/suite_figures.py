@@ -182,7 +182,10 @@ def histogram(sheet: Sheet) -> Figure:
     """
     everything = _millimetres(sheet.table)
     check_positive("permanent displacement", everything)
-    edges = 10.0 ** np.histogram_bin_edges(np.log10(everything[everything > 0]), "sturges")
+    slid = everything[everything > 0]
+    edges = 10.0 ** np.histogram_bin_edges(np.log10(slid), "sturges")
+    # powers of logarithms are rounded: the least and the largest displacement must not lie outside
+    edges[0], edges[-1] = min(edges[0], slid.min()), max(edges[-1], slid.max())
     for panel in sheet.panels:
         values = _millimetres(panel.table)
         counts, _ = np.histogram(values[values > 0], edges)
