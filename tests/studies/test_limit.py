@@ -157,7 +157,7 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
         "yield_acceleration": [0.0515279329701465, 0.10852104853669972, 0.6496015442182281, 0.471275, 0.370525],
         "displacement": [1.9511674594282442, 5.5909408592753485, 3.7266584270787724, 2.280030173177515, 3.500075],
     }
-    given = {name: xr.DataArray(values, dims="case") for name, values in cases.items()}
+    given: dict[str, Any] = {name: xr.DataArray(values, dims="case") for name, values in cases.items()}
     target = given.pop("displacement")
     limits = slipsweep.limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
     amplitudes = np.geomspace(0.05, 5.0, 20_001)
