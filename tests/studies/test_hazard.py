@@ -184,9 +184,10 @@ def test_the_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--at", "mu_s=0.45"), "--at mu_s=0.45: must be one of the values of mu_s: 1, 2"),
-        (("--at", "theta=5"), "--at theta=5: must be NAME=VALUE, of mu_s"),
-        (("--at", "mu_s=1", "--at", "mu_s=2"), "--at mu_s=2: mu_s is given twice"),
+        (("--at", "mu_s=0.35"), "--at mu_s=0.35: not among the values of the file; its neighbours are 0.3 and 0.4"),
+        (("--at", "theta=5"), "--at theta=5: no such axis here"),
+        (("--at", "mu_s=0.3", "--at", "mu_s=0.4"), "--at mu_s=0.4: mu_s is given twice"),
+        (("--at", "mu_s=0.3,0.4"), "--at mu_s: 2 values; must be one"),
         (("-d", "5 s"), '--displacement = "5 s": must be a number'),
         (("-d", "-1"), "--displacement = -1: must be"),
         (("-o", "h.csv"), "h.csv: the name must end in one of .png, .svg, .pdf"),
@@ -195,6 +196,7 @@ def test_the_command(tmp_path: Path) -> None:
 )
 def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], message: str) -> None:
     result = suite_result(np.full((2, 3, 4), 0.1), np.zeros((2, 3, 4)), ("mu_s", "amplitude", "motion"))
+    result = result.assign_coords(mu_s=[0.3, 0.4])
     result.attrs |= ATTRIBUTES
     result.to_netcdf(tmp_path / "a.nc")
     (tmp_path / "hazard.csv").write_text(CURVE)

@@ -368,15 +368,6 @@ def is_recorded(file: ResultFile) -> bool:
     return not {"record", "suite"}.isdisjoint(file.attrs)
 
 
-def check_harmonic(file: ResultFile) -> None:
-    """Refuse the response to recorded motions (InputError)."""
-    if is_recorded(file):
-        raise InputError(
-            f"{file.path}: is the response to recorded motions; pages are made of harmonic sweeps only "
-            "(slipsweep chart draws it, slipsweep export makes a table of it)"
-        )
-
-
 def check_sweep(file: ResultFile) -> None:
     """Refuse a file that is no result of a sweep, or does not say any more what was solved.
 

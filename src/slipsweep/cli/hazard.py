@@ -5,16 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, write_figure
+from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, write_figure
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
     from slipsweep.grid.tables import Table
 
 EXAMPLE = "Example: slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 0.3 -o hazard.png"
-
-#: Values as near as this, of the largest on the axis, are the same: single precision keeps seven digits.
-_SAME = 1e-7
 
 
 def hazard(
@@ -60,6 +57,7 @@ def hazard(
     for path in paths:
         check_ending(path, FIGURES)
     from slipsweep.files import outputs, results
+    from slipsweep.files.cuts import stored_places
 
     outputs.check_outputs(paths, overwrite, reads=[file, curve])
     from slipsweep.model.parameters import check_values
@@ -68,13 +66,18 @@ def hazard(
 
     with results.result_file(file) as opened:
         table = results.read_table(opened, ("permanent_displacement", "validity"))
+        axes = [dim for dim in table["permanent_displacement"].dims if dim not in ("amplitude", "motion")]
+        places = stored_places(opened, cuts(at), axes)
+    for name, found in places.items():
+        if found.size > 1:
+            raise InputError(f"{file}: --at {name}: {found.size} values; must be one")
     if "g" not in table.attrs:
         raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
     g = float(table.attrs["g"])
     lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
     check_values("displacement", lengths, "--displacement")
     given = read_hazard_curve(curve, g)
-    table = _cut(table, at or [])
+    table = table.pick({name: int(found[0]) for name, found in places.items()})
     rates = hazard_table(table, given, thresholds=lengths)
     if paths:
         from slipsweep.charts import hazard_figures
@@ -88,36 +91,6 @@ def hazard(
         _summarize(rates, g)
         for path in paths:
             typer.echo(path)
-
-
-def _cut(table: "Table", given: list[str]) -> "Table":
-    """The result at one value of each axis that is named."""
-    import numpy as np
-
-    from slipsweep.model.units import quantity
-
-    where: dict[str, int] = {}
-    axes = [dim for dim in table["permanent_displacement"].dims if dim not in ("amplitude", "motion")]
-    for text in given:
-        name, _, value = text.partition("=")
-        name = name.strip()
-        if name not in axes or not value:
-            raise InputError(f"--at {text}: must be NAME=VALUE, of {', '.join(axes) or 'no axis: there is none'}")
-        if name in where:
-            raise InputError(f"--at {text}: {name} is given twice")
-        if name in table and table[name].values.dtype.kind in "iuf":
-            values = table[name].values
-            wanted = quantity(f"--at {name}", value, name, float(table.attrs["g"]))
-            near = np.flatnonzero(np.abs(values - wanted) <= _SAME * np.abs(values).max())
-        else:
-            labels = table["label"].values if "label" in table else np.arange(1, table.sizes[name] + 1)
-            values = np.array([str(one) for one in labels])
-            near = np.flatnonzero(values == value.strip())
-        if near.size != 1:
-            there = ", ".join(f"{one:.6g}" if isinstance(one, float) else str(one) for one in values[:20].tolist())
-            raise InputError(f"--at {text}: must be one of the values of {name}: {there}")
-        where[name] = int(near[0])
-    return table.pick(where)
 
 
 def _summarize(rates: "Table", g: float) -> None:
