@@ -78,14 +78,26 @@ def test_what_kernels_load_is_found(tmp_path: Path) -> None:
     assert needed <= set(reached(known_sources(sources.PACKAGE), sources.MACHINE_CODE))
 
 
+def every_source() -> dict[str, Source]:
+    """All sources of the package, whether keys depend on them or not."""
+    texts = {path.relative_to(sources.PACKAGE).as_posix(): path.read_bytes() for path in sources.PACKAGE.rglob("*.py")}
+    return {name: parsed(name, text, texts, sources.PACKAGE.name) for name, text in texts.items()}
+
+
+def test_what_counts_is_known() -> None:
+    every, known = every_source(), known_sources(sources.PACKAGE)
+    assert known.items() <= every.items()
+    assert keys_of(known) == keys_of(every)
+
+
 def test_kernels_are_made_where_machine_code_comes_from() -> None:
-    for name, source in known_sources(sources.PACKAGE).items():
+    for name, source in every_source().items():
         if "jit/cache.py" in source.imports and not name.startswith("jit/"):
             assert name.startswith(sources.MACHINE_CODE), f"{name} may make a kernel whose sources nobody looks at"
 
 
 def test_code_changes_the_right_keys() -> None:
-    known = known_sources(sources.PACKAGE)
+    known = every_source()
     results, machine_code = (set(reached(known, start)) for start in (sources.RESULTS, sources.MACHINE_CODE))
     assert not [name for name in results | machine_code if name.startswith(APART)]
     before = keys_of(known)
