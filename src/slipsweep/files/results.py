@@ -608,15 +608,6 @@ def _motions_text(file: ResultFile) -> tuple[str, ...]:
     return tuple("  ".join(row) for row in rows)
 
 
-def stored_tally(path: Path) -> Tally:
-    """Count what is in a file that slipsweep has just written, or in the files of a folder."""
-    tally = Tally()
-    for name in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with ResultFile(name) as file:
-            tally.merge(_count(file))
-    return tally
-
-
 def _count(file: ResultFile) -> Tally:
     tally = Tally()
     codes = {name: missing for name, missing in (("sliding_mode", -1), ("validity", 0)) if name in file.results}

@@ -100,6 +100,19 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[PSI + j] = lanes[BEGAN + j]
         lanes[X + j] = 0.0 if stops else 1.0
     settle(HELD_STOP, PSI, X, 1.0, options.g, lanes)
+    lane_repeated(later, lanes)
+    if later <= _MOST_PULSES:
+        for j in range(count):
+            if lanes[CONVERGED + j] < 0.0:
+                follow_pulses(options, lanes, j)
+
+
+@scalar
+def lane_repeated(later: float, lanes: np.ndarray) -> None:
+    """W and the largest V of `later` more cycles: whole periods, and what remains.  CONVERGED is −1 without a period.
+
+    docs/numerics.md#pulses-entered-in-motion
+    """
     for j in range(STRIP):
         began, psi, left, gain, most = (
             lanes[BEGAN + j],
@@ -128,10 +141,6 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         # -1: each pulse has to be followed
         lanes[CONVERGED + j] = 1.0 if repeats else -1.0
         lanes[CODE + j] = NOT_RECOUPLED
-    if later <= _MOST_PULSES:
-        for j in range(count):
-            if lanes[CONVERGED + j] < 0.0:
-                follow_pulses(options, lanes, j)
 
 
 @scalar
