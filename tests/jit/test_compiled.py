@@ -88,11 +88,11 @@ def double(value: float) -> float:
 # -------------------------------------------------------------------------- many processes
 
 
-def test_eight_processes_compile_once(tmp_path: Path) -> None:
-    outputs = [finish(process) for process in [start(PROGRAM, tmp_path / "cache") for _ in range(8)]]
+def test_four_processes_compile_once(tmp_path: Path) -> None:
+    outputs = [finish(process) for process in [start(PROGRAM, tmp_path / "cache") for _ in range(4)]]
     results, compiling = zip(*(output.split() for output in outputs), strict=True)
     assert len(set(results)) == 1
-    assert sorted(compiling) == ["False"] * 7 + ["True"]
+    assert sorted(compiling) == ["False"] * 3 + ["True"]
     assert len(files(tmp_path / "cache")) == 1
     assert finish(start(PROGRAM, tmp_path / "cache")).split() == [results[0], "False"]
 
@@ -226,12 +226,14 @@ def test_kernels_of_a_factory_are_told_apart(cache: Path) -> None:
 def test_numba_is_left_as_it_was(cache: Path) -> None:
     """Also by a kernel that cannot be compiled."""
     from numba.core.cpu import CPUContext
+    from numba.core.ir import Inst
     from numba.core.types.functions import Function
     from numba.core.typing.context import Context
 
     def methods() -> list[object]:
         return [
             Function.get_call_type,
+            Inst._rec_list_vars,
             Context.load_additional_registries,
             CPUContext.load_additional_registries,
         ]

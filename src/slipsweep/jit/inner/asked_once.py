@@ -5,6 +5,7 @@ Seconds are of processor, of the 8 that the first `slipsweep run sweeps/design_c
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from numba.core.cpu import CPUContext
@@ -28,6 +29,13 @@ _PLAIN = (Number, Boolean, Array)
 
 #: Most of what else an instruction consists of.
 _NO_VARIABLES = {Loc, Const, Global, FreeVar, Arg, str, int, float, bool, type(None)}
+
+#: Modules of numba that compile what kernels consist of.
+_OF_KERNELS = (
+    *("cpython.builtins", "cpython.enumimpl", "cpython.iterators", "cpython.mathimpl", "cpython.numbers"),
+    *("cpython.rangeobj", "cpython.slicing", "cpython.tupleobj", "core.optional", "misc.literal"),
+    *("np.arrayobj", "np.npyimpl"),
+)
 
 
 @contextmanager
@@ -82,16 +90,18 @@ def few_registries() -> Iterator[None]:
     With all that it can compile come scipy's linear algebra and more (0.3 s).  That is loaded as soon as anything
     but a kernel is compiled.
     """
+    whole = CPUContext.load_additional_registries
 
     def load(self: Any) -> None:
-        from numba.core import optional  # noqa: F401
-        from numba.cpython import builtins, enumimpl, iterators, mathimpl, numbers, rangeobj, slicing, tupleobj  # noqa: F401
-        from numba.misc import literal  # noqa: F401
-        from numba.np import arrayobj, npyimpl  # noqa: F401
-
+        try:
+            modules = [import_module(f"numba.{name}") for name in _OF_KERNELS]
+        except ImportError:  # of another make: then everything
+            whole(self)
+            return
         rtsys.initialize(self)
-        for registry in (mathimpl.registry, npyimpl.registry):
-            self.install_registry(registry)
+        for module in modules:
+            if hasattr(module, "registry"):
+                self.install_registry(module.registry)
 
     with _instead(CPUContext, "load_additional_registries", load):
         yield

@@ -38,7 +38,6 @@ need(
     _function_pass_manager="self kwargs",
     _module_pass_manager="self kwargs",
     set_env="self env_name env",
-    _data_layout=None,
 )
 need(Compiler, __init__="self typingctx targetctx library args return_type flags locals", define_pipelines="self")
 need(DefaultPassBuilder, define_nopython_pipeline="state name")
@@ -83,7 +82,6 @@ class _Library(JITCodeLibrary):
 
     def _optimize_functions(self, module: Any) -> None:
         # one level of passes, not three, and none on what is only declared here (0.3 s)
-        module.data_layout = self._codegen._data_layout
         for function in module.functions:
             if not function.is_declaration:
                 passes, builder = self._codegen._function_pass_manager(opt=1)
