@@ -5,12 +5,10 @@ Seconds are of processor, of the 8 that the first `slipsweep run sweeps/design_c
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any
 
 from numba.core.cpu import CPUContext
 from numba.core.ir import Arg, Const, FreeVar, Global, Inst, Loc, Var
-from numba.core.runtime.nrt import rtsys
 from numba.core.types import Array, Boolean, Number
 from numba.core.types.functions import Function
 from numba.core.typing.context import Context
@@ -21,7 +19,6 @@ need(Function, get_call_type="self context args kws", typing_key=None)
 need(Context, load_additional_registries="self")
 need(CPUContext, load_additional_registries="self", install_registry="self registry", _registries=None)
 need(Inst, _rec_list_vars="self val", list_vars="self")
-need(type(rtsys), initialize="self ctx")
 
 #: Modules of functions, and types of their arguments, of which nothing but the types decides on what comes out.
 _MODULES = ("_operator", "builtins")
@@ -29,13 +26,6 @@ _PLAIN = (Number, Boolean, Array)
 
 #: Most of what else an instruction consists of.
 _NO_VARIABLES = {Loc, Const, Global, FreeVar, Arg, str, int, float, bool, type(None)}
-
-#: Modules of numba that compile what kernels consist of.
-_OF_KERNELS = (
-    *("cpython.builtins", "cpython.enumimpl", "cpython.iterators", "cpython.mathimpl", "cpython.numbers"),
-    *("cpython.rangeobj", "cpython.slicing", "cpython.tupleobj", "core.optional", "misc.literal"),
-    *("np.arrayobj", "np.npyimpl"),
-)
 
 
 @contextmanager
@@ -80,30 +70,6 @@ def asked_once() -> Iterator[None]:
         _instead(Context, "load_additional_registries", typing_is_loaded),
         _instead(CPUContext, "load_additional_registries", only_what_is_new),
     ):
-        yield
-
-
-@contextmanager
-def few_registries() -> Iterator[None]:
-    """Have numba load in the block what kernels are made of.
-
-    With all that it can compile come scipy's linear algebra and more (0.3 s).  That is loaded as soon as anything
-    but a kernel is compiled.
-    """
-    whole = CPUContext.load_additional_registries
-
-    def load(self: Any) -> None:
-        try:
-            modules = [import_module(f"numba.{name}") for name in _OF_KERNELS]
-        except ImportError:  # of another make: then everything
-            whole(self)
-            return
-        rtsys.initialize(self)
-        for module in modules:
-            if hasattr(module, "registry"):
-                self.install_registry(module.registry)
-
-    with _instead(CPUContext, "load_additional_registries", load):
         yield
 
 

@@ -14,7 +14,7 @@ from numba import njit
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, JitEngine
 from numba.core.compiler import Compiler
 
-from slipsweep.jit.inner.asked_once import asked_once, few_registries
+from slipsweep.jit.inner.asked_once import asked_once
 from slipsweep.jit.inner.need import need
 from slipsweep.jit.interrupts import heard_later
 
@@ -45,8 +45,7 @@ class _Compiler(Compiler):
     def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
         library = _Library(targetctx.codegen(), "kernel")
         library.enable_object_caching()
-        with few_registries():
-            super().__init__(typingctx, targetctx, library, *arguments)
+        super().__init__(typingctx, targetctx, library, *arguments)
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         with asked_once():
