@@ -1,6 +1,7 @@
 """Zarr stores: what they hold, who reads them, workers that write them, and addresses of an S3 server on loopback."""
 
 import json
+import pickle
 import shutil
 import socket
 from collections.abc import Iterator
@@ -238,6 +239,14 @@ def test_commands_read_a_store_as_a_file(results: Path, tmp_path: Path, capsys: 
             assert (tmp_path / f"{name}.nc{suffix}").read_bytes() == (tmp_path / f"{name}.zarr{suffix}").read_bytes()
 
 
+def test_limits_go_into_a_store_as_into_a_file(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(CASES, encoding="utf-8")
+    for name in ("a.nc", "a.zarr"):
+        assert main(["limit", str(tmp_path / "a.toml"), "-d", "1cm", "-o", str(tmp_path / name), "-q"]) == 0
+    assert verify(tmp_path / "a.zarr").damaged == []
+    assert_same(slipsweep.open_result(tmp_path / "a.nc"), slipsweep.open_result(tmp_path / "a.zarr"))
+
+
 # ------------------------------------------------------------------------------- workers
 
 
@@ -252,12 +261,15 @@ def test_workers_write_their_chunks_themselves(results: Path, tmp_path: Path, mo
         return came[-1]
 
     monkeypatch.setattr(cluster._Run, "_result", counted)
+    nbytes = (results / "grid.nc").stat().st_size
     for name, split in (("a.zarr", False), ("a", True)):
         came.clear()
         with cluster.cluster(workers=2) as solved:
             run(tmp_path / name, split=split, shared=True, solved=solved)
         assert len(came) == 60
         assert {type(one).__name__ for one in came} == {"Delivered"}
+        # however many cells a chunk has: names, a checksum and counts
+        assert sum(len(pickle.dumps(one)) for one in came) < 60 * 1000 < nbytes / 30
         assert verify(tmp_path / name).damaged == []
         assert_same(slipsweep.open_result(tmp_path / name), slipsweep.open_result(results / "grid.nc"))
 

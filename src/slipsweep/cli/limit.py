@@ -15,10 +15,12 @@ from slipsweep.cli.common import (
     Quiet,
     Resume,
     Scheduler,
+    Shared,
     Split,
     Workers,
     check_ending,
     echo_found,
+    place_of,
     progress_bar,
     taken_as,
     write_figure,
@@ -28,6 +30,7 @@ from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
 if TYPE_CHECKING:
     from slipsweep.files.spec import SweepSpec
+    from slipsweep.files.zarr_store import Place
     from slipsweep.grid.tables import Table
 
 EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
@@ -52,12 +55,12 @@ def limit(
         ),
     ],
     output: Annotated[
-        list[Path] | None,
+        list[str] | None,
         typer.Option(
             "--output",
             "-o",
-            metavar="FILE",
-            help="Write .nc, .png, .svg or .pdf; may be repeated.",
+            metavar="FILE|URL",
+            help="Write .nc, .zarr, .png, .svg or .pdf; may be repeated.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -74,18 +77,23 @@ def limit(
     memory: Memory = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    shared: Shared = False,
 ) -> None:
     """Find the limiting PGA for a tolerable displacement.
 
     Over all other axes of a sweep; solved anew to rounding, not interpolated from the result.
     """
-    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler)
-    results: list[Path] = []
+    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler, shared)
+    results: list[Place] = []
     figures: list[Path] = []
-    for path in output or []:
+    for text in output or []:
+        path = Path(text)
         if not (split and not path.suffix):  # the folder of a split result needs no ending
-            check_ending(path, (".nc", *FIGURES))
-        (figures if path.suffix in FIGURES else results).append(path)
+            check_ending(path, (".nc", ".zarr", *FIGURES))
+        if path.suffix in FIGURES:
+            figures.append(path)
+        else:
+            results.append(place_of(text))
     for option in chunks.given() if not results else []:
         raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
 
@@ -93,8 +101,9 @@ def limit(
     from slipsweep.runs.jobs import limit_job
 
     if len(results) > 1:
-        outputs.check_outputs(results, overwrite, reads=())  # one name given twice is refused as such
-        raise InputError(f"{results[1]}: a second netCDF output, beside {results[0]}; give one")
+        files = [one for one in results if isinstance(one, Path)]
+        outputs.check_outputs(files, overwrite, reads=())  # one name given twice is refused as such
+        raise InputError(f"{results[1]}: a second result, beside {results[0]}; give one")
     checked = spec.load(sweep)
     outputs.check_outputs(figures, overwrite, reads=checked.files)
     job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
@@ -118,8 +127,8 @@ def limit(
             write_figure(figure, path, overwrite)
     if not quiet:
         _summarize(table)
-        for path in output or []:
-            typer.echo(path)
+        for text in output or []:
+            typer.echo(text)
 
 
 def _asked(
