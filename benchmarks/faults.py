@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.machine import arguments, measured_on, table
-from tests.support.fault_rounds import FAULTS, can_be_done, damaged, damaged_store, rounds, run, values
+from tests.support.fault_rounds import FAULTS, OUTPUTS, can_be_done, damaged, rounds
 
 #: Rounds of each kind; those in this process are cheap.
 ROUNDS, CHEAP_ROUNDS = 10, 200
@@ -17,27 +17,28 @@ ROUNDS, CHEAP_ROUNDS = 10, 200
 
 def main() -> None:
     """Do all rounds, write faults.md."""
-    given = arguments(__doc__)
+    given = arguments(__doc__, counts={"rounds": ROUNDS})
     seed = 1 if given.tiny else random.randrange(2**31)
     print(f"seed {seed}", flush=True)
-    names = [name for name in FAULTS if FAULTS[name] in (damaged, damaged_store) or not given.tiny]
-    rows = []
+    names = [name for name in FAULTS if FAULTS[name] is damaged or not given.tiny]
+    rows, total = [], dict.fromkeys(OUTPUTS, 0)
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        place.chmod(0o755)  # for the faults done as another user
-        run(place / "undisturbed.nc", chunk_cells=10**9)
-        expected = values(place / "undisturbed.nc")
+        Path(folder).chmod(0o755)  # for the faults done as another user
         for name in names:
-            reason = can_be_done(name)
-            count = (3 if given.tiny else CHEAP_ROUNDS) if FAULTS[name] in (damaged, damaged_store) else ROUNDS
-            done = 0 if reason else rounds([name], place, seed, count, expected)[name]
-            rows.append([name, str(done), str(done), reason or "–"])
-            print(*rows[-1][:2], flush=True)
-    total = sum(int(row[1]) for row in rows)
-    rows.append(["all", str(total), str(total), ""])
-    text = table(["fault", "tried", "survived", "why not here"], rows)
-    head = f"{measured_on(('numpy', 'numba', 'netCDF4', 'distributed'))} Written by `python -m benchmarks.faults`.\n"
-    (given.folder / "faults.md").write_text(f"{head}\n{text}")
+            count = given.rounds if FAULTS[name] is not damaged else 3 if given.tiny else CHEAP_ROUNDS
+            row, reason = [name], can_be_done(name)
+            for kind, output in OUTPUTS.items():
+                done = 0 if reason else rounds(name, Path(folder), seed, count, output)
+                total[kind] += done
+                row += [str(done), str(done)]
+            rows.append([*row, reason or "–"])
+            print(*rows[-1], flush=True)
+    rows.append(["all", *(str(total[kind]) for kind in OUTPUTS for _ in range(2)), ""])
+    header = ["fault", *(f"{kind}: {word}" for kind in OUTPUTS for word in ("tried", "survived")), "why not here"]
+    head = (
+        f"{measured_on(('numpy', 'numba', 'netCDF4', 'zarr', 'distributed'))} Written by `python -m benchmarks.faults`."
+    )
+    (given.folder / "faults.md").write_text(f"{head}\n\n{table(header, rows)}")
 
 
 if __name__ == "__main__":

@@ -275,43 +275,38 @@ def test_split_opens_as_one_dataset_and_resumes(tmp_path: Path, undisturbed: dic
             assert dataset[name].values.tobytes() == undisturbed[name], name
 
 
-def one_round(name: str, folder: Path, undisturbed: dict[str, bytes], count: int = 1) -> int:
-    """Do a kind of fault; how many of it were done, and survived."""
-    if reason := fault_rounds.can_be_done(name):
-        pytest.skip(reason)
-    return fault_rounds.rounds([name], folder, 7, count, undisturbed)[name]
-
-
-#: Kinds of faults that are done once in every run of the tests, and what stands in where one cannot be.
-OFTEN = (
-    fault_rounds.killed,
-    fault_rounds.interrupted,
-    fault_rounds.worker_killed,
-    fault_rounds.full_file_system,
-    fault_rounds.revoked_rights,
-    fault_rounds.damaged,
-    fault_rounds.damaged_store,
-    fault_rounds.competitor,
-)
+#: Kinds of faults that are done once in every run of the tests, in a format, and what stands in where one cannot be.
+OFTEN: dict[fault_rounds.Fault, str] = {
+    fault_rounds.killed: "a.nc",
+    fault_rounds.interrupted: "a.zarr",
+    fault_rounds.worker_killed: "a.zarr",
+    fault_rounds.full_file_system: "a.nc",
+    fault_rounds.revoked_rights: "a.nc",
+    fault_rounds.damaged: "a.zarr",
+    fault_rounds.competitor: "a.nc",
+}
 STANDS_IN: dict[fault_rounds.Fault, fault_rounds.Fault] = {
     fault_rounds.full_file_system: fault_rounds.limited_file_size
 }
+NAMES = {fault: name for name, fault in fault_rounds.FAULTS.items()}
 
 
 @pytest.mark.parametrize("fault", OFTEN, ids=lambda fault: fault.__name__)
-def test_a_fault_is_survived(folder: Path, undisturbed: dict[str, bytes], fault: fault_rounds.Fault) -> None:
-    names = {other: name for name, other in fault_rounds.FAULTS.items()}
-    if fault_rounds.can_be_done(names[fault]):
-        fault = STANDS_IN.get(fault, fault)
-    assert one_round(names[fault], folder, undisturbed)
+def test_a_fault_is_survived(folder: Path, fault: fault_rounds.Fault) -> None:
+    done = STANDS_IN.get(fault, fault) if fault_rounds.can_be_done(NAMES[fault]) else fault
+    if reason := fault_rounds.can_be_done(NAMES[done]):
+        pytest.skip(reason)
+    assert fault_rounds.rounds(NAMES[done], folder, 7, 1, OFTEN[fault])
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("output", fault_rounds.OUTPUTS.values())
 @pytest.mark.parametrize("name", fault_rounds.FAULTS)
-def test_many_faults_are_survived(folder: Path, undisturbed: dict[str, bytes], name: str) -> None:
-    cheap = (fault_rounds.damaged, fault_rounds.damaged_store)
-    count = 100 if fault_rounds.FAULTS[name] in cheap else 10
-    print(f"{one_round(name, folder, undisturbed, count)} times {name}: all survived")
+def test_many_faults_are_survived(folder: Path, name: str, output: str) -> None:
+    if reason := fault_rounds.can_be_done(name):
+        pytest.skip(reason)
+    count = 100 if fault_rounds.FAULTS[name] is fault_rounds.damaged else 10
+    print(f"{fault_rounds.rounds(name, folder, 7, count, output)} times {name}, {output}: all survived")
 
 
 def test_a_disk_that_fills_up_keeps_the_finished_chunks(
