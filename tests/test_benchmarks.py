@@ -21,6 +21,7 @@ WRITES = {
     "waveforms": ["waveforms.md"],
     "variables": ["variables.md"],
     "stores": ["stores.md"],
+    "writers": ["writers.md"],
     "calibration": ["calibration.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
@@ -36,7 +37,7 @@ def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     # half a minute of processes and clusters
     "name",
-    [pytest.param(name, marks=pytest.mark.slow if name == "large_sweeps" else ()) for name in WRITES],
+    [pytest.param(name, marks=pytest.mark.slow if name in ("large_sweeps", "writers") else ()) for name in WRITES],
 )
 def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if name == "records":
