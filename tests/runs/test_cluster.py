@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -22,6 +23,7 @@ from slipsweep.files import spec
 from slipsweep.runs import cluster, store
 from slipsweep.runs.jobs import sweep_job
 from slipsweep.runs.parts import installation
+from tests.support import fault_rounds, namespaces
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -268,6 +270,87 @@ def test_a_killed_scheduler_leaves_a_run_that_can_be_gone_on_with(
             assert_same_bits(file, tmp_path / "a.nc" / file.name)
     else:
         assert_same_bits(tmp_path / "here.nc", tmp_path / "a.nc")
+
+
+# ---------------------------------------------------------------------------- by real means
+
+
+@pytest.mark.slow
+def test_machines_without_a_common_folder_one_killed_and_one_cut_off(tmp_path: Path) -> None:
+    """Scheduler, client and two workers in network namespaces of their own, over TLS."""
+    if reason := namespaces.cannot():
+        pytest.skip(reason)
+    pytest.importorskip("cryptography")
+    home, keys = tmp_path / "home", tmp_path / "keys"
+    home.mkdir()
+    keys.mkdir()
+    # a worker that is silent for so long is given up
+    short = {"DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "10s", "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "5s"}
+    environment = {**os.environ, **namespaces.certified(keys), **short}
+    text = SLOW.replace("1024", "4096").replace("num = 10\n", "num = 50\n")  # 480 chunks
+    (home / "a.toml").write_text(text)
+    journal = home / "a.nc.parts" / "journal"
+
+    def finished() -> int:
+        return journal.read_text().count("\n") if journal.exists() else 0
+
+    with namespaces.machines(4) as (first, desk, one, other), contextlib.ExitStack() as stack:
+
+        def start(machine: namespaces.Machine, *words: str, without: Path | None = home) -> "subprocess.Popen[str]":
+            errors = subprocess.DEVNULL if without else subprocess.PIPE
+            command = machine.command(sys.executable, *words, without=without)
+            process = stack.enter_context(
+                subprocess.Popen(command, env=environment, cwd="/", text=True, stdout=subprocess.DEVNULL, stderr=errors)
+            )
+            stack.callback(process.kill)
+            return process
+
+        address = f"tls://{first.address}:8786"
+        start(first, "-m", "dask", "scheduler", "--protocol", "tls", "--host", first.address, "--no-dashboard")
+        # what a worker imports while it is asked would keep it silent
+        options = ("--nthreads", "1", "--no-dashboard", "--preload", "slipsweep.runs.cluster")
+        worker = ("-m", "dask", "worker", address, *options, "--host")
+        killed = start(one, *worker, one.address, "--no-nanny")
+        start(other, *worker, other.address)
+        command = ("run", str(home / "a.toml"), "-q", "-o", str(home / "a.nc"), "--scheduler", address)
+        client = start(desk, "-c", fault_rounds.COMMAND, "25700", *command, without=None)
+        fault_rounds.wait_for(client, lambda: finished() >= 20)
+        killed.kill()
+        fault_rounds.wait_for(client, lambda: finished() >= 60)
+        other.link("down")
+        time.sleep(15)
+        silent = finished()
+        time.sleep(1)
+        assert client.poll() is None
+        assert 60 <= silent == finished() < 480  # nobody is left
+        other.link("up")
+        assert fault_rounds.ended(client) == (0, "")
+        came = desk.received()
+    run(text, tmp_path / "here.nc")
+    assert_same_bits(tmp_path / "here.nc", home / "a.nc")
+    assert came > 0.9 * (home / "a.nc").stat().st_size  # all results went to the client, and by this link
+
+
+@pytest.mark.slow
+def test_a_thousand_million_cells_written_by_workers(tmp_path: Path) -> None:
+    if shutil.disk_usage(tmp_path).free < 6e9:
+        pytest.skip("needs 6 GB of disk")
+    axes = {"theta": (0, 20, 100), "mu_s": (0.2, 0.9, 100), "amplitude": (0.5, 13, 1000), "frequency": (0.1, 20, 100)}
+    text = "".join(f"[axes.{name}]\nstart = {a}\nstop = {b}\nnum = {n}\n" for name, (a, b, n) in axes.items())
+    (tmp_path / "a.toml").write_text(
+        f'{text}[output]\nvariables = ["permanent_displacement"]\ndtype = "float32"\n', encoding="utf-8"
+    )
+    output = str(tmp_path / "a.zarr")
+    assert main(["run", str(tmp_path / "a.toml"), "-o", output, "--workers", "2"]) == 0
+    assert main(["verify", output]) == 0
+    data = slipsweep.open_result(output).permanent_displacement
+    assert data.size == 10**9
+    part = {"theta": [37], "mu_s": [42, 99], "amplitude": [0, 500, 999]}
+    there = data.isel(part)
+    inputs = {name: there[name].values for name in axes}
+    here = slipsweep.sweep(**inputs, variables=["permanent_displacement"]).permanent_displacement
+    assert there.values.tobytes() == here.values.astype("f4").tobytes()
+    shutil.rmtree(output)
 
 
 # ------------------------------------------------------------------------- what is refused
