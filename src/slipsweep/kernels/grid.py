@@ -12,7 +12,7 @@ import numpy as np
 
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels import record
+from slipsweep.kernels import newmark, record
 from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
 from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
@@ -239,11 +239,11 @@ def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room, lines = room_of(0), record.lines_of(wave, options)
+    room, own = room_of(0), newmark.record_of(wave, options)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        record.solve_cells(tile.cells, count, options, wave, lines, room, tile.motion, tile.codes)
+        record.solve_cells(tile.cells, count, options, wave, own, room, tile.motion, tile.codes)
         note_unsolved(begin, count, tile.codes[3], results)
         scatter(grid, tile, runs, periods, results)
         spread_codes(grid, tile, runs, 0, results.codes[0])

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
+from slipsweep.kernels import newmark
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
@@ -39,7 +40,7 @@ from slipsweep.kernels.cycle.continuous import follow_through
 from slipsweep.kernels.cycle.legs import Room
 from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import phase_at
-from slipsweep.kernels.linear import held_integrals, held_stop
+from slipsweep.kernels.newmark import add
 from slipsweep.kernels.pulse import (
     DISPLACEMENT,
     HELD,
@@ -51,7 +52,7 @@ from slipsweep.kernels.pulse import (
     first_pulse,
 )
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, LAST, TOP, Wave
+from slipsweep.motion.pieces import BEGIN, END, LAST, TOP, Wave
 
 
 @scalar
@@ -197,116 +198,13 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
 
 
 @scalar
-def lines_of(wave: Wave, options: Options) -> np.ndarray:
-    """The first, the last and the larger value of each piece and its length, side by side, for `newmark` only."""
-    lines = np.empty((wave.pieces.shape[0] if options.rise == NEWMARK else 0, 4))
-    for p in range(lines.shape[0]):
-        lines[p, 0], lines[p, 1] = wave.pieces[p, FIRST], wave.pieces[p, LAST]
-        lines[p, 2] = max(wave.pieces[p, FIRST], wave.pieces[p, LAST])
-        lines[p, 3] = wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]
-    return lines
-
-
-@in_lanes
-def add(total: float, lost: float, term: float) -> tuple[float, float]:
-    """A sum and what rounding has lost of it, with a term more: a record has up to a million of them."""
-    now = total + term
-    without = now - total
-    rounded = (total - (now - without)) + (term - without)
-    return now, lost + (rounded if math.isfinite(now) else 0.0)
-
-
-@in_lanes
-def slide(
-    lines: np.ndarray, p: int, threshold: float, velocity: float, displacement: float, peak: float
-) -> tuple[int, float, float, float]:
-    """Slide on with b = `threshold` from the beginning of piece p to the stop, or to the end of the record.
-
-    The piece it has come to, V, W and the largest V.  A loop each above and below Üy: a piece then takes no more than
-    its sums, and what can end the loop.
-    """
-    pieces = lines.shape[0]
-    while p < pieces:
-        while p < pieces and lines[p, 0] >= threshold and lines[p, 1] >= threshold:
-            rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
-            displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
-            velocity += 0.5 * (rate + rate_end) * step
-            p += 1
-        if p == pieces:
-            break
-        rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
-        if rate >= 0.0:
-            peak = max(peak, velocity + 0.5 * rate * (rate / (rate - rate_end)) * step)
-        gained = 0.5 * (rate + rate_end) * step
-        while rate_end < 0.0 < velocity + gained:
-            displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
-            velocity += gained
-            p += 1
-            if p == pieces:
-                return p, velocity, displacement, peak
-            rate, rate_end, step = lines[p, 0] - threshold, lines[p, 1] - threshold, lines[p, 3]
-            gained = 0.5 * (rate + rate_end) * step
-        # V falls to zero within the piece if it would at its end, or perhaps before it turns up again
-        slope = (rate_end - rate) / step
-        stop = held_stop(velocity, rate, slope)
-        if rate_end < 0.0 or stop <= step:
-            stop = min(stop, step)
-            displacement += velocity * stop + held_integrals(rate, slope, stop)[1]
-            # a rise may begin the next slide on the same piece
-            return p if rate_end > 0.0 else p + 1, 0.0, displacement, peak
-        displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * step) * step
-        velocity += gained
-        p += 1
-    return p, velocity, displacement, max(peak, velocity)
-
-
-@scalar
-def newmark(
-    cell: Cell, options: Options, wave: Wave, lines: np.ndarray, codes: np.ndarray, j: int
-) -> tuple[float, float]:
-    """`respond` for Newmark's block, whose one rule is that b = Üy from every Üg = Üy on to the stop.
-
-    `cycle.pulse` gives the same in ten times the time, most of which goes to the rules it has to look
-    at; a slide along straight pieces is a sum of three terms a piece.  In units of the scale (`cell.amplitude`).
-    """
-    scale = cell.amplitude
-    block = block_of(cell, NEWMARK, options.g)
-    codes[3, j] = block.validity & STATICALLY_UNSTABLE
-    codes[0, j] = codes[1, j] = codes[2, j] = -1 if codes[3, j] else 0
-    if codes[3, j]:
-        return math.nan, math.nan
-    threshold = block.yield_acceleration / scale
-    velocity, displacement, lost, peak, p, slips, pulses = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
-    for k in range(wave.height.size):
-        if wave.height[k] <= threshold:
-            continue
-        pulses += 1
-        p, end = max(p, wave.stretch[k, 0]), wave.stretch[k, 1]
-        while p < end:
-            if lines[p, 2] <= threshold:
-                p += 1
-                continue
-            slips += 1
-            velocity, moved, rate, rate_end = 0.0, 0.0, lines[p, 0] - threshold, lines[p, 1] - threshold
-            if rate <= 0.0:
-                rising = lines[p, 3] * (rate_end / (rate_end - rate))
-                velocity, moved = 0.5 * rate_end * rising, rate_end * rising * rising / 6.0
-                p += 1
-            p, velocity, moved, peak = slide(lines, p, threshold, velocity, moved, peak)
-            displacement, lost = add(displacement, lost, moved)
-    codes[0, j], codes[1, j] = slips, pulses
-    # the record may have ended before the slide: then the plane is at rest
-    displacement, lost = add(displacement, lost, eq.attenuated_displacement(velocity, threshold, math.inf))
-    return scale * (displacement + lost), scale * max(peak, velocity)
-
-
-@scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, lines: np.ndarray, room: Room, motion: np.ndarray,
-    codes: np.ndarray,
+    cells: np.ndarray, count: int, options: Options, wave: Wave, record: newmark.Record, room: Room,
+    motion: np.ndarray, codes: np.ndarray,
 ) -> None:  # fmt: skip
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and the codes of `respond`."""
-    for j in range(count if options.rise == NEWMARK else 0):
-        motion[0, j], motion[1, j] = newmark(cell_of(cells, j), options, wave, lines, codes, j)
-    for j in range(count if options.rise != NEWMARK else 0):
+    if options.rise == NEWMARK:
+        newmark.solve_cells(cells, count, options, wave, record, motion, codes)
+        return
+    for j in range(count):
         motion[0, j], motion[1, j] = respond(cell_of(cells, j), options, wave, room, codes, j)
