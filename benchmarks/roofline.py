@@ -5,6 +5,7 @@ else.  Operations are counted from the formulas, not from the code: what is left
 everything that is not the mathematics costs nothing.
 """
 
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -68,6 +69,17 @@ def _triad(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> None:
 def _fill(a: np.ndarray) -> None:
     for i in range(a.size):
         a[i] = 1.0
+
+
+def slot(tiny: bool) -> float:
+    """Processor time of one multiply-add in registers on one core, s: a slot, in which machines compare."""
+    values, turns, times = np.ones(1024), 10 if tiny else 20_000, []
+    _multiply_add(values, 1)  # compiled before the clock starts
+    for _ in range(5):
+        start = time.process_time()
+        _multiply_add(values, turns)
+        times.append((time.process_time() - start) / (values.size * 16 * turns))
+    return min(times)  # a ceiling is the best that was seen
 
 
 def _on_all_cores(work: Callable[[int], object]) -> Callable[[], object]:

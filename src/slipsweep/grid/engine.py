@@ -19,6 +19,7 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
 from slipsweep.kernels import block as physics
+from slipsweep.kernels import newmark as newmark_kernels
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import (
     PARAMETER_KERNEL,
@@ -377,11 +378,14 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
     if isinstance(motion, Record):
         recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
 
-        def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets, tile_of(grid))
+        own = newmark_kernels.record_of(recorded, options)
 
-        # some 2 µs against 0.1, and more for a long record
-        return call, max(32, recorded.pieces.shape[0] // 64)
+        def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+            tile, lanes = tile_of(grid), newmark_kernels.room_of()
+            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, own, targets, tile, lanes)
+
+        # some 1 µs against 0.1, and more for a long record
+        return call, max(16, recorded.pieces.shape[0] // 128)
     assert isinstance(motion, Waveform)
     if _is_plain_sine(motion) and not isinstance(solver, Step):
 

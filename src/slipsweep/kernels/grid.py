@@ -13,7 +13,7 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import newmark, record
-from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
+from slipsweep.kernels.block import FRICTION_ESTIMATED, NEWMARK, TILE, UNSOLVED, Options, block_of, cell_of
 from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
 from slipsweep.kernels.sine import cells as sine
@@ -237,13 +237,16 @@ def _wave_grid(
 
 def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results, tile: Tile,
+    wave: Wave, own: newmark.Record, results: Results, tile: Tile, lanes: newmark.Room,
 ) -> None:  # fmt: skip
-    room, own = room_of(0), newmark.record_of(wave, options)
+    room = room_of(0)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        record.solve_cells(tile.cells, count, options, wave, own, room, tile.motion, tile.codes)
+        if options.rise == NEWMARK:
+            newmark.solve_cells(tile.cells, count, options, wave, own, lanes, tile.motion, tile.codes)
+        else:
+            record.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
         note_unsolved(begin, count, tile.codes[3], results)
         scatter(grid, tile, runs, periods, results)
         spread_codes(grid, tile, runs, 0, results.codes[0])

@@ -2,7 +2,7 @@
 
 Its one rule is that b = Üy from every Üg = Üy on to the stop.  A slide along straight pieces is a sum of three terms
 a piece, the same for all lanes but for Üy; only where one of them begins, turns or stops is there more to do.
-`lines` is (pieces, 4): the first, the last and the larger value of each piece, and its length.  Cells of a tile are
+Cells of a tile are
 sorted by Üy, so that those of a strip begin and stop on the same pieces, or on pieces near each other.
 docs/numerics.md#newmarks-block-under-a-record
 """
@@ -27,36 +27,37 @@ LANES_SIZE = 9 * LANES
 
 
 class Record(NamedTuple):
-    """A record as Newmark's block takes it, and room for the blocks of a tile; empty for any other model.
+    """A record as Newmark's block takes it; empty for any other model.
 
-    `lines` and `height` are in units of `unit`, a power of two near the record's peak: squares of such accelerations
-    are doubles.  `onsets` is Üy over the scale in the same unit, cell by cell, and `order` has the cells by it.
+    `lines` (pieces, 4) has the first, the last and the larger value of each piece and its length, `height` (stretches,)
+    the peaks.  Values are in units of `unit`, a power of two near the largest: their squares are doubles.
     """
 
     lines: np.ndarray
     height: np.ndarray
     unit: float
+
+
+class Room(NamedTuple):
+    """Where the cells of a tile are worked on: Üy over the scale in units of the record, and the cells' order by it."""
+
     lanes: np.ndarray
     onsets: np.ndarray
     order: np.ndarray
 
 
-@scalar
 def record_of(wave: Wave, options: Options) -> Record:
-    """The record of a wave."""
-    wanted = options.rise == NEWMARK
-    pieces, stretches = (wave.pieces.shape[0], wave.height.size) if wanted else (0, 0)
+    """The record of a wave, made once for all cells."""
+    pieces, height = (wave.pieces, wave.height) if options.rise == NEWMARK else (wave.pieces[:0], wave.height[:0])
     unit = math.ldexp(1.0, math.frexp(max(wave.highest, -wave.lowest))[1])
-    record = Record(
-        np.empty((pieces, 4)), np.empty(stretches), unit, np.empty(LANES_SIZE), np.empty(TILE), np.empty(TILE, np.int64)
-    )
-    for p in range(pieces):
-        first, last = wave.pieces[p, FIRST] / unit, wave.pieces[p, LAST] / unit
-        record.lines[p, 0], record.lines[p, 1], record.lines[p, 2] = first, last, max(first, last)
-        record.lines[p, 3] = wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]
-    for k in range(stretches):
-        record.height[k] = wave.height[k] / unit
-    return record
+    first, last = pieces[:, FIRST] / unit, pieces[:, LAST] / unit
+    lines = np.column_stack([first, last, np.maximum(first, last), pieces[:, FINISH] - pieces[:, BEGIN]])
+    return Record(lines, height / unit, unit)
+
+
+def room_of() -> Room:
+    """Room for a tile."""
+    return Room(np.empty(LANES_SIZE), np.empty(TILE), np.empty(TILE, np.int64))
 
 
 @in_lanes
@@ -176,9 +177,9 @@ def along(lanes: np.ndarray, least: float, most: float, first: float, last: floa
 
 
 @scalar
-def walk(wave: Wave, record: Record, least: float, most: float) -> None:
+def walk(wave: Wave, record: Record, lanes: np.ndarray, least: float, most: float) -> None:
     """Follow lanes through the record; from where all are at rest to the next pulse above the `least` Üy at once."""
-    lines, lanes = record.lines, record.lanes
+    lines = record.lines
     pieces, stretches, p, k, count = lines.shape[0], record.height.size, 0, 0, 0
     if pieces > 0 and lines[0, 0] > least:
         begin(lanes, 0.0, lines[0, 0], 0.0)
@@ -201,14 +202,14 @@ def walk(wave: Wave, record: Record, least: float, most: float) -> None:
 
 
 @scalar
-def lay_out(cells: np.ndarray, count: int, options: Options, record: Record, codes: np.ndarray) -> None:
+def lay_out(cells: np.ndarray, count: int, options: Options, unit: float, room: Room, codes: np.ndarray) -> None:
     """Find Üy over the scale and the validity of the cells of a tile, and their order by the former (Shell's sort)."""
-    onsets, order = record.onsets, record.order
+    onsets, order = room.onsets, room.order
     for j in range(count):
         block = block_of(cell_of(cells, j), NEWMARK, options.g)
         codes[3, j] = block.validity & STATICALLY_UNSTABLE
         # one that slides by itself has no motion to follow
-        onsets[j] = math.inf if codes[3, j] else block.yield_acceleration / block.amplitude / record.unit
+        onsets[j] = math.inf if codes[3, j] else block.yield_acceleration / block.amplitude / unit
         order[j] = j
     for gap in (301, 132, 57, 23, 10, 4, 1):
         for j in range(gap, count):
@@ -220,29 +221,30 @@ def lay_out(cells: np.ndarray, count: int, options: Options, record: Record, cod
 
 
 @scalar
-def solve_strip(wave: Wave, record: Record, first: int, count: int) -> None:
+def solve_strip(wave: Wave, record: Record, room: Room, first: int, count: int) -> None:
     """Follow `count` cells, from the one at place `first` of their order on, in as many lanes or more."""
-    lanes, height = record.lanes, record.height
+    lanes, height = room.lanes, record.height
     for row in range(LANES_SIZE):
         lanes[row] = 0.0
     for j in range(LANES):
-        lanes[_YIELD + j] = record.onsets[record.order[first + min(j, count - 1)]]
+        lanes[_YIELD + j] = room.onsets[room.order[first + min(j, count - 1)]]
     least, most = lanes[_YIELD], lanes[_YIELD + LANES - 1]
     for k in range(height.size):
         for j in range(LANES if height[k] > least else 0):
             lanes[_PULSES + j] += 1.0 if height[k] > lanes[_YIELD + j] else 0.0
-    walk(wave, record, least, most)
+    walk(wave, record, lanes, least, most)
 
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, record: Record, motion: np.ndarray, codes: np.ndarray
-) -> None:
+    cells: np.ndarray, count: int, options: Options, wave: Wave, record: Record, room: Room, motion: np.ndarray,
+    codes: np.ndarray,
+) -> None:  # fmt: skip
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and the codes of `record.respond`."""
-    lanes, order, onsets = record.lanes, record.order, record.onsets
-    lay_out(cells, count, options, record, codes)
+    lanes, order, onsets = room.lanes, room.order, room.onsets
+    lay_out(cells, count, options, record.unit, room, codes)
     for first in range(0, count, LANES):
-        solve_strip(wave, record, first, min(LANES, count - first))
+        solve_strip(wave, record, room, first, min(LANES, count - first))
         for lane in range(min(LANES, count - first)):
             j, velocity = order[first + lane], lanes[_V + lane]
             scale, none = cell_of(cells, j).amplitude * record.unit, codes[3, j] != 0

@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
-from slipsweep.kernels import newmark
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
@@ -199,12 +198,8 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, record: newmark.Record, room: Room,
-    motion: np.ndarray, codes: np.ndarray,
-) -> None:  # fmt: skip
+    cells: np.ndarray, count: int, options: Options, wave: Wave, room: Room, motion: np.ndarray, codes: np.ndarray
+) -> None:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and the codes of `respond`."""
-    if options.rise == NEWMARK:
-        newmark.solve_cells(cells, count, options, wave, record, motion, codes)
-        return
     for j in range(count):
         motion[0, j], motion[1, j] = respond(cell_of(cells, j), options, wave, room, codes, j)
