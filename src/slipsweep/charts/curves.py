@@ -293,7 +293,8 @@ def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> Non
     flagged = broadcast(validity_has(panel.table["validity"], CAUTIONS), panel.table, drawn.dims)
     cautious = replace(drawn, values=np.where(flagged & (drawn.values > 0), drawn.values, np.nan))
     if factor:
-        curves = [(panel.values(panel.x), ys * factor) for ys in panel.grid(cautious)]
+        # the limit itself is cautious, and a jump there is no line
+        curves = [(xs, ys * factor) for xs, ys in _curves(panel, cautious, _on_limit(panel, name))]
     else:
         found = dimensionless_curves(panel, cautious)
         curves = [curve for (_, frequency), curve in found.items() if frequency == 0]
