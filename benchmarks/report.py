@@ -146,9 +146,8 @@ def step_solver(tiny: bool) -> str:
         f"## The step solver, {STEPS} steps a cycle\n\n"
         + table(header, rows)
         + "\nTen cycles. Steps are those of the cell's own slide: from onset to stop or, under Eq. 12, to t5, of one "
-        "pulse where the block comes to rest (the pulses repeat), of two cycles where it slides on. Steps that a lane "
-        "idles while its neighbours slide are not counted, but their time is. Errors are relative to the cycle "
-        "solver.\n"
+        "pulse where the block comes to rest (the pulses repeat), of two cycles where it slides on, also those whose "
+        "sum is taken from a table or from the cycle before. Errors are relative to the cycle solver.\n"
     )
 
 

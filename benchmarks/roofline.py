@@ -188,10 +188,9 @@ and lanes in which an event is still sought hold up those that have found it.
 ## The step solver, a step of the rectangle rule
 
 {table(header, step)}
-Steps are those between a cell's onset and its stop. A lane's state (seven numbers) and parameters
-(eight) are read and written in the first-level cache at every step, some 100 bytes against the few
-operations of the formula: loads and stores, masks for events, and idle lanes are the limit, not the
-multiply-adds, and main memory plays no part (8 bytes a cell, once).
+Steps are those between a cell's onset and its stop. With b held their sums come from a table that all cells
+share. By Eq. 4 rates are computed 32 at a time; what they cost is the exponential. The rest of a cell's time
+is its events, chains of operations that wait for each other. Main memory plays no part (8 bytes a cell, once).
 """
     (given.folder / "roofline.md").write_text(text)
 

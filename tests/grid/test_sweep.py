@@ -50,9 +50,8 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         call.expect = kernel.expect  # type: ignore[attr-defined]
         return call
 
-    monkeypatch.setattr(engine, "SINE_KERNEL", counting(engine.SINE_KERNEL))
-    kernels = {rule: counting(kernel) for rule, kernel in engine.STEP_KERNELS.items()}
-    monkeypatch.setattr(engine, "STEP_KERNELS", kernels)
+    for name in ("SINE_KERNEL", "STEP_KERNEL"):
+        monkeypatch.setattr(engine, name, counting(getattr(engine, name)))
     return solved
 
 

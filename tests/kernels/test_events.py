@@ -61,7 +61,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(engine, "WAVE_KERNEL", Failing())
-    monkeypatch.setattr(engine, "STEP_KERNELS", dict.fromkeys(engine.STEP_KERNELS, Failing()))
+    monkeypatch.setattr(engine, "STEP_KERNEL", Failing())
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,

@@ -26,7 +26,7 @@ from slipsweep.kernels.grid import (
     RECORD_KERNEL,
     REMAINING_KERNEL,
     SINE_KERNEL,
-    STEP_KERNELS,
+    STEP_KERNEL,
     WAVE_KERNEL,
     Grid,
     Results,
@@ -400,10 +400,10 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         return call_sine, 1
     wave = wave_of(motion)
     if isinstance(solver, Step):
-        kernel, steps = STEP_KERNELS[options.rule], steps_of(wave, options.steps_per_cycle, options.rule)
+        steps = steps_of(wave, options.steps_per_cycle, options.rule)
 
         def call_step(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            kernel(grid, first, last, rows, periods, options, steps, targets, tile_of(grid))
+            STEP_KERNEL(grid, first, last, rows, periods, options, steps, targets, tile_of(grid))
 
         # a step takes about 1/16 of a cell of the cycle solver
         return call_step, 1 + options.steps_per_cycle // 16
@@ -528,7 +528,7 @@ def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
     elif isinstance(problem.excitation, (Record, Suite)):
         RECORD_KERNEL.expect()
     elif isinstance(problem.solver, Step):
-        STEP_KERNELS[RULES[problem.solver.rule]].expect()
+        STEP_KERNEL.expect()
     elif _is_plain_sine(problem.excitation):
         SINE_KERNEL.expect()
         REMAINING_KERNEL.expect(perhaps=True)

@@ -362,12 +362,6 @@ def lane_relative_acceleration(lanes: np.ndarray, j: int, x: float, g: float) ->
 
 
 @in_lanes
-def lane_drift(lanes: np.ndarray, j: int, x: float) -> float:
-    """The part of D(x) of a lane that is the same at x and −x."""
-    return eq.drift(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j])
-
-
-@in_lanes
 def lane_rate_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
     """D and dD/dx of a lane (x ≠ 0, or a zero with the sign of its side)."""
     tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]

@@ -18,7 +18,7 @@ from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
 from slipsweep.kernels.sine import cells as sine
 from slipsweep.kernels.step import cells as step
-from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
+from slipsweep.kernels.step import lanes as step_lanes
 from slipsweep.kernels.step.table import Steps
 from slipsweep.motion.pieces import Wave
 
@@ -255,26 +255,23 @@ def _record_grid(
         spread_codes(grid, tile, runs, 3, results.codes[3])
 
 
-def _step_grid_of(rule: int) -> Kernel:
-    # a kernel a rule, so that only the one in use is compiled
-    def step_grid(
-        grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-        steps: Steps, results: Results, tile: Tile,
-    ) -> None:  # fmt: skip
-        for begin in range(first, last, TILE):
-            count = min(TILE, last - begin)
-            runs = gather(grid, begin, count, inputs, tile)
-            step.solve_cells(tile.cells, count, rule, options, steps, tile.motion, tile.codes)
-            place(grid, begin, count, runs, periods, results, tile)
-
-    return Kernel(step_grid)
+def _step_grid(
+    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    steps: Steps, results: Results, tile: Tile,
+) -> None:  # fmt: skip
+    room = step_lanes.room_of(steps)
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
+        runs = gather(grid, begin, count, inputs, tile)
+        step.solve_cells(tile.cells, count, options, room, tile.motion, tile.codes)
+        place(grid, begin, count, runs, periods, results, tile)
 
 
-#: Kernels of the stepping solver by its rule; of the cycle solver for any waveform; its short ways for the sine,
+#: Kernels of the stepping solver; of the cycle solver for any waveform; its short ways for the sine,
 #: which leave some cells: the number of their stretches is returned, and `remaining` holds them (rows: the first
 #: cell, and the first after it); and what solves those.  Most sweeps of a sine leave none, and half the first
 #: compilation is spared.
-STEP_KERNELS = {rule: _step_grid_of(rule) for rule in (RECTANGLE, TRAPEZOID, SIMPSON)}
+STEP_KERNEL = Kernel(_step_grid)
 WAVE_KERNEL = Kernel(_wave_grid)
 SINE_KERNEL = Kernel(_sine_grid)
 REMAINING_KERNEL = Kernel(_remaining_grid)

@@ -15,7 +15,7 @@ Steps end where a piece of the waveform does (`kernels.excitation`): on its jump
 of one length on each piece (`table.steps_of`).  The orders hold because a step in which something happens (t1, a
 switch to or from the hold, a turn of Eq. 4, the stop) is divided there by `pulse.rise_step` and `rates.take`, and
 because a slide or a layer of friction shorter than a few steps is given steps of its own.  Steps in
-which nothing happens, nearly all, are taken by lanes of cells in lockstep, with w from a table
-(`stick_slip`, `continuous`); what is no matter of lanes goes pulse by pulse (`pulse`).
+which nothing happens, nearly all, are taken many at a time: with b held their sums are in a table for all cells
+(`table`), by Eq. 4 their rates are computed in the lanes of SIMD loops (`lanes`).
 Orders, and what slides shorter than steps need: docs/numerics.md#step-solver.
 """

@@ -1,49 +1,43 @@
-"""Continuous sliding in lanes, cycle by cycle; arrays as in `stick_slip`.
+"""Continuous sliding by steps: what a cycle adds to V and W, from which the repeated ones follow.
 
 docs/numerics.md#step-solver and docs/numerics.md#continuous-sliding
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import literally
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import (
-    AMPLITUDE,
-    TILE,
-    YIELD,
-    Block,
-    Motion,
-    Options,
-    block_at,
-    lane_drift,
-    lane_relative_acceleration,
-    relative_acceleration,
-    store_motion,
-    whole_lanes,
-)
+from slipsweep.kernels.block import Block, Motion, friction, relative_acceleration
 from slipsweep.kernels.excitation import offset_at, plane
-from slipsweep.kernels.pulse import (
-    SLIDES,
-)
-from slipsweep.kernels.step.rates import SIMPSON, coefficients, displacement_gain, take, velocity_gain
-from slipsweep.kernels.step.rows import (
-    BEFORE,
-    BEFORE_PEAK,
-    BEFORE_V,
-    GAIN,
-    HAPPENS,
-    LANE_DISPLACEMENT,
-    LANE_EQ4,
-    LANE_PEAK,
-    LANE_SLIDES,
-    LANE_VELOCITY,
-    THIN,
-)
-from slipsweep.kernels.step.slides import LAYER, LEAST_STEP, SHARE_OF_CYCLE, STATE_SIZE, layer_of, reset_state
-from slipsweep.kernels.step.table import Steps, node
-from slipsweep.motion.pieces import FINISH, TOP
+from slipsweep.kernels.pulse import DISPLACEMENT, PEAK, VELOCITY
+from slipsweep.kernels.step.lanes import MIDDLE, RATE, Room, advance, eq4_rates, steps_to_turn
+from slipsweep.kernels.step.rates import SIMPSON, coefficients, take, velocity_gain
+from slipsweep.kernels.step.slides import LAYER, LEAST_STEP, SHARE_OF_CYCLE, layer_of, reset_state
+from slipsweep.kernels.step.table import AHEAD, Steps, node
+from slipsweep.model import equations as eq
+from slipsweep.motion.pieces import BEGIN, FINISH, FIRST, LAST, TOP
+
+
+class Gain(NamedTuple):
+    """What a part of the shaking adds to V and W of a block at rest before it, its largest V, and how long it is."""
+
+    velocity: float
+    displacement: float
+    peak: float
+    phase: float
+
+
+@scalar
+def then(before: Gain, after: Gain) -> Gain:
+    """One part of the shaking and the next as one."""
+    return Gain(
+        before.velocity + after.velocity,
+        before.displacement + before.velocity * after.phase + after.displacement,
+        max(before.peak, before.velocity + after.peak),
+        before.phase + after.phase,
+    )
 
 
 @scalar
@@ -84,118 +78,128 @@ def sided_relative_acceleration(block: Block, pieces: np.ndarray, p: int, x: flo
 
 
 @scalar
-def continuous_cycle(
-    count: int, rule: int, options: Options, steps: Steps, c: int, cells: np.ndarray, where: np.ndarray,
-    lanes: np.ndarray, states: np.ndarray,
-) -> None:  # fmt: skip
-    """Continuous lanes through cycle c of the table, from the first Üg ≥ Üy on."""
-    literally(rule)
-    columns = states.reshape((STATE_SIZE, TILE))
-    g, wave, nodes = options.g, steps.wave, steps.nodes
-    thickest = 0.0
-    for j in range(count):
-        thickest = max(thickest, lanes[THIN + j])
-    for p in range(wave.cycle[c], wave.cycle[c + 1]):
-        starting = False
-        for j in range(count):
-            starting = starting | (states[LANE_SLIDES + j] == 0.0)
-        at, h = steps.offset[p], steps.length[p]
-        for j in range(count):
-            lanes[LANE_EQ4 + j] = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * nodes[at], g)
-        for i in range(steps.counts[p]):
-            w_start, w_middle, w_end = nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2]
-            near = min(abs(w_start), abs(w_end))
-            layered = near < thickest
-            events = 0
-            for j in range(count):
-                x, x_end = lanes[AMPLITUDE + j] * w_start, lanes[AMPLITUDE + j] * w_end
-                rate, rate_end = lanes[LANE_EQ4 + j], lane_relative_acceleration(lanes, j, x_end, g)
-                lanes[LANE_EQ4 + j] = rate_end
-                middle = 0.0
-                if rule == SIMPSON:
-                    middle = lane_relative_acceleration(lanes, j, lanes[AMPLITUDE + j] * w_middle, g)
-                c0, c1, c2 = coefficients(rule, rate, middle, rate_end)
-                velocity, began = states[LANE_VELOCITY + j], (not starting) | (states[LANE_SLIDES + j] > 0.0)
-                after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
-                moved = velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
-                turns = (c0 > 0.0) & (c0 + c1 + c2 < 0.0)
-                begins = max(x, x_end) > lanes[YIELD + j]
-                happens = (turns | (layered & (near < lanes[THIN + j]))) if began else begins
-                goes = began & (not happens)
-                states[LANE_VELOCITY + j] = after if goes else velocity
-                states[LANE_DISPLACEMENT + j] += moved if goes else 0.0
-                states[LANE_PEAK + j] = max(states[LANE_PEAK + j], after if goes else velocity)
-                lanes[HAPPENS + j] = 1.0 if happens else 0.0
-                events += 1 if happens else 0
-            if events > 0:
-                for j in range(count):
-                    if lanes[HAPPENS + j] > 0.0:
-                        block, state = block_at(cells, where[j], options), columns[:, j]
-                        start = node(steps, p, i)
-                        if state[SLIDES] == 0.0 and block.amplitude * w_start < block.yield_acceleration:
-                            start = offset_at(wave.pieces, p, block.amplitude, block.yield_acceleration)
-                        state[SLIDES] = 1.0
-                        continuous_step(block, rule, steps, wave.pieces, p, start, node(steps, p, i + 1), state)
+def in_layer(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> bool:
+    """Whether step i of piece p reaches into a layer of friction thinner than steps."""
+    at = steps.offset[p] + i
+    return block.amplitude * min(abs(steps.nodes[at]), abs(steps.nodes[at + 1])) < state[LAYER]
 
 
 @scalar
-def mirrored_gain(count: int, rule: int, options: Options, steps: Steps, c: int, lanes: np.ndarray) -> None:
-    """Gain of V of continuous lanes over cycle c, whose halves mirror each other: what both sides share, twice.
+def steps_along(block: Block, p: int, i: int, until: int, room: Room) -> None:
+    """Steps i to `until` of piece p."""
+    steps, state, lanes = room.steps, room.state, room.lanes
+    while i < until:
+        at, most = steps.offset[p] + i, min(until - i, AHEAD - 1)
+        eq4_rates(block, steps.nodes, at, RATE, lanes)
+        if steps.rule == SIMPSON:
+            eq4_rates(block, steps.middles, at, MIDDLE, lanes)
+        taken = steps_to_turn(most, lanes)
+        if state[LAYER] > 0.0:
+            for k in range(taken):
+                if in_layer(block, steps, p, i + k, state):
+                    taken = k
+                    break
+        advance(steps, p, taken, False, state, lanes)
+        i += taken
+        if taken < most:
+            pieces = steps.wave.pieces
+            continuous_step(block, steps.rule, steps, pieces, p, node(steps, p, i), node(steps, p, i + 1), state)
+            i += 1
+
+
+@scalar
+def part_of_cycle(block: Block, p: int, i: int, last: int, until: int, room: Room) -> Gain:
+    """From step i of piece p to step `until` of piece `last`, from rest."""
+    steps, state = room.steps, room.state
+    state[VELOCITY] = state[DISPLACEMENT] = state[PEAK] = phase = 0.0
+    for q in range(p, last + 1):
+        begin, end = i if q == p else 0, until if q == last else steps.counts[q]
+        steps_along(block, q, begin, end, room)
+        phase += (end - begin) * steps.length[q]
+    return Gain(state[VELOCITY], state[DISPLACEMENT], state[PEAK], phase)
+
+
+@scalar
+def onset(block: Block, steps: Steps, c: int) -> tuple[int, int, float]:
+    """Where in cycle c Üg first exceeds Üy: piece, step and τ; past its last piece if it does not."""
+    pieces = steps.wave.pieces
+    p = steps.wave.cycle[c]
+    while p < steps.wave.cycle[c + 1]:
+        if block.amplitude * max(pieces[p, FIRST], pieces[p, LAST]) > block.yield_acceleration:
+            break
+        p += 1
+    i, tau = 0, 0.0
+    if p < steps.wave.cycle[c + 1]:
+        tau = pieces[p, BEGIN]
+        if block.amplitude * pieces[p, FIRST] < block.yield_acceleration:
+            tau = offset_at(pieces, p, block.amplitude, block.yield_acceleration)
+        i = min(max(int((tau - pieces[p, BEGIN]) / steps.length[p]), 0), steps.counts[p] - 1)
+    return p, i, tau
+
+
+@scalar
+def mirrored_gain(block: Block, steps: Steps, c: int) -> float:
+    """Gain of V over cycle c, whose halves mirror each other: what both sides share, twice.
 
     The rest cancels.  In V it would leave its rounding, and on a plane nearly level that is more than the gain.
     """
-    literally(rule)
-    wave, nodes = steps.wave, steps.nodes
-    for j in range(count):
-        lanes[GAIN + j] = 0.0
-    stride = 1 if rule == SIMPSON else 2
-    for p in range(wave.cycle[c], wave.cycle[c + 1]):
-        if wave.pieces[p, TOP] > 0.0:
-            at, last = steps.offset[p], 2 * steps.counts[p]
-            for k in range(0, last + 1, stride):
-                # what the step before k and that behind it give the node
-                c0, c1, c2 = coefficients(rule, 0.0, 1.0 if k % 2 else 0.0, 0.0 if k % 2 or k == 0 else 1.0)
-                share = velocity_gain(c0, c1, c2, steps.length[p], 1.0)
-                c0, c1, c2 = coefficients(rule, 0.0 if k % 2 or k == last else 1.0, 0.0, 0.0)
-                share += velocity_gain(c0, c1, c2, steps.length[p], 1.0)
-                w = nodes[at + k]
-                for j in range(count):
-                    lanes[GAIN + j] += 2.0 * share * lane_drift(lanes, j, lanes[AMPLITUDE + j] * w)
+    gain = 0.0
+    for p in range(steps.wave.cycle[c], steps.wave.cycle[c + 1]):
+        if steps.wave.pieces[p, TOP] > 0.0:
+            at, h = steps.offset[p], steps.length[p]
+            for i in range(steps.counts[p]):
+                x, x_end = block.amplitude * steps.nodes[at + i], block.amplitude * steps.nodes[at + i + 1]
+                middle = 0.0
+                if steps.rule == SIMPSON:
+                    middle = drift(block, block.amplitude * steps.middles[at + i])
+                c0, c1, c2 = coefficients(steps.rule, drift(block, x), middle, drift(block, x_end))
+                gain += 2.0 * velocity_gain(c0, c1, c2, h, 1.0)
+    return gain
 
 
 @scalar
-def continuous_lanes(
-    count: int, rule: int, options: Options, steps: Steps, cells: np.ndarray, where: np.ndarray, lanes: np.ndarray,
-    states: np.ndarray, motion: np.ndarray, codes: np.ndarray,
-) -> None:  # fmt: skip
-    """Continuous sliding, cycle by cycle; repeated ones are stepped twice, the later ones follow from the second."""
-    literally(rule)
-    columns = states.reshape((STATE_SIZE, TILE))
-    wave, whole = steps.wave, whole_lanes(count)
-    for j in range(whole):
-        state = columns[:, j]
-        reset_state(block_at(cells, where[j], options), state)
-        lanes[THIN + j] = state[LAYER] / lanes[AMPLITUDE + j]
-    for c in range(wave.shape.size):
-        continuous_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
-        if c != wave.lead or wave.repeats == 0:
-            continue
-        times = wave.repeats - 1.0 + (1.0 if wave.alike else 0.0)
+def drift(block: Block, x: float) -> float:
+    """The part of D(x) that is the same at x and −x."""
+    return eq.drift(x, friction(block, x), block.mu_s, block.tan_theta)
+
+
+@scalar
+def continuous(block: Block, room: Room) -> Motion:
+    """Continuous sliding from the first Üg > Üy on; repeated cycles are a series."""
+    steps, state, pieces = room.steps, room.state, room.steps.wave.pieces
+    reset_state(block, state)
+    total, begun = Gain(0.0, 0.0, 0.0, 0.0), False
+    for c in range(steps.wave.shape.size):
+        first, last = steps.wave.cycle[c], steps.wave.cycle[c + 1] - 1
+        times = 0.0
+        if c == steps.wave.lead and steps.wave.repeats > 0:
+            times = steps.wave.repeats - 1.0 + (1.0 if steps.wave.alike else 0.0)
+        whole = Gain(0.0, 0.0, 0.0, 0.0)
+        if begun:
+            whole = part_of_cycle(block, first, 0, last, steps.counts[last], room)
+            total = then(total, whole)
+        else:
+            p, i, tau = onset(block, steps, c)
+            if p > last:
+                continue
+            state[VELOCITY] = state[DISPLACEMENT] = state[PEAK] = 0.0
+            continuous_step(block, steps.rule, steps, pieces, p, tau, node(steps, p, i + 1), state)
+            total = Gain(state[VELOCITY], state[DISPLACEMENT], state[PEAK], 0.0)
+            after = part_of_cycle(block, p, i + 1, last, steps.counts[last], room)
+            total, begun = then(total, after), True
+            if times > 0.0:
+                whole = then(part_of_cycle(block, first, 0, p, i + 1, room), after)
         if times > 0.0:
-            for j in range(whole):
-                lanes[BEFORE + j], lanes[BEFORE_V + j] = states[LANE_DISPLACEMENT + j], states[LANE_VELOCITY + j]
-                lanes[BEFORE_PEAK + j], states[LANE_PEAK + j] = states[LANE_PEAK + j], states[LANE_VELOCITY + j]
-            continuous_cycle(whole, rule, options, steps, c, cells, where, lanes, states)
-            if steps.mirrored:
-                mirrored_gain(whole, rule, options, steps, c, lanes)
-            for j in range(whole):
-                moved, velocity = states[LANE_DISPLACEMENT + j] - lanes[BEFORE + j], lanes[BEFORE_V + j]
-                gain = lanes[GAIN + j] if steps.mirrored else states[LANE_VELOCITY + j] - velocity
-                peak = states[LANE_PEAK + j] + max(0.0, (times - 1.0) * gain)
-                states[LANE_PEAK + j] = max(lanes[BEFORE_PEAK + j], peak)
-                states[LANE_VELOCITY + j] = velocity + times * gain
-                states[LANE_DISPLACEMENT + j] = lanes[BEFORE + j] + times * (moved + math.pi * gain * (times - 1.0))
-        if wave.alike:
+            # entered with V, a cycle adds W + 2πV
+            gain = mirrored_gain(block, steps, c) if steps.mirrored else whole.velocity
+            moved = whole.displacement + whole.phase * total.velocity
+            peak = total.velocity + whole.peak + max(0.0, (times - 1.0) * gain)
+            total = Gain(
+                total.velocity + times * gain,
+                total.displacement + times * (moved + math.pi * gain * (times - 1.0)),
+                max(total.peak, peak),
+                0.0,
+            )
+        if c == steps.wave.lead and steps.wave.repeats > 0 and steps.wave.alike:
             break
-    for j in range(count):
-        store_motion(Motion(states[LANE_DISPLACEMENT + j], states[LANE_PEAK + j], 0), where[j], motion, codes)
+    return Motion(total.displacement, total.peak, 0)

@@ -14,6 +14,7 @@ from slipsweep.kernels.block import (
     NEWMARK,
     Block,
     Options,
+    inflection,
     relative_acceleration,
     relative_acceleration_root,
     response,
@@ -36,20 +37,31 @@ from slipsweep.kernels.pulse import (
     begin_slide,
     pulse_of,
 )
-from slipsweep.kernels.step.rates import SIMPSON, coefficients, displacement_gain, take, velocity_gain
+from slipsweep.kernels.step.lanes import (
+    EQ4,
+    HAPPENS,
+    MIDDLE,
+    RATE,
+    Room,
+    X,
+    advance,
+    eq4_rates,
+    first_event,
+    held_rates,
+)
+from slipsweep.kernels.step.rates import SIMPSON, coefficients, take
 from slipsweep.kernels.step.slides import (
     LAYER,
     REACH,
-    STATE_SIZE,
     TOUCH,
     longest_step,
     reset_state,
     resolve_fall,
     resolve_slide,
 )
-from slipsweep.kernels.step.table import Steps, node, tau_within
+from slipsweep.kernels.step.table import AHEAD, Steps, node, tau_within
 from slipsweep.kernels.train import train_of
-from slipsweep.motion.pieces import BEGIN, END, FINISH, LAST, Wave
+from slipsweep.motion.pieces import BEGIN, END, FINISH, LAST, TOP, Wave
 
 #: More events than any step holds.
 _MOST_EVENTS = 16
@@ -69,58 +81,101 @@ def hold_step(block: Block, rule: int, pieces: np.ndarray, p: int, start: float,
 
 
 @scalar
-def whole_hold_step(
-    rule: int, amplitude: float, w_start: float, w_middle: float, w_end: float, h: float, state: np.ndarray
-) -> None:
-    """A step of length h with b held, cut at the stop."""
-    held = state[HELD]
-    c0, c1, c2 = coefficients(rule, amplitude * w_start - held, amplitude * w_middle - held, amplitude * w_end - held)
-    take(c0, c1, c2, h, True, state)
+def held_velocity(block: Block, steps: Steps, p: int, i: int, k: int, state: np.ndarray) -> float:
+    """V at node k of piece p, with b held from node i on."""
+    at = steps.offset[p]
+    excess = block.amplitude * steps.wave.pieces[p, TOP] - state[HELD]
+    gained = block.amplitude * (steps.once[at + k] - steps.once[at + i])
+    return state[VELOCITY] + (excess * ((k - i) * steps.length[p]) + gained)
 
 
 @scalar
-def hold_steps(
-    rule: int, amplitude: float, nodes: np.ndarray, at: int, count: int, h: float, state: np.ndarray
-) -> None:
-    """So many steps with b held, up to the stop; w from nodes[at] on."""
-    for i in range(count):
-        whole_hold_step(rule, amplitude, nodes[at + 2 * i], nodes[at + 2 * i + 1], nodes[at + 2 * i + 2], h, state)
-        if state[SLIDES] == 0.0:
-            break
+def take_held(block: Block, steps: Steps, p: int, i: int, k: int, state: np.ndarray) -> None:
+    """All steps from node i to node k of piece p with b held; V does not turn between them."""
+    at, duration = steps.offset[p], (k - i) * steps.length[p]
+    excess = block.amplitude * steps.wave.pieces[p, TOP] - state[HELD]
+    moved = steps.twice[at + k] - steps.twice[at + i] - steps.once[at + i] * duration
+    after = held_velocity(block, steps, p, i, k, state)
+    state[DISPLACEMENT] += (state[VELOCITY] + 0.5 * excess * duration) * duration + block.amplitude * moved
+    state[VELOCITY] = after
+    state[PEAK], state[LEAST] = max(state[PEAK], after), min(state[LEAST], after)
+
+
+@scalar
+def take_one_held(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> None:
+    """Step i of piece p with b held, cut at the stop."""
+    at, amplitude, held = steps.offset[p] + i, block.amplitude, state[HELD]
+    rates = amplitude * steps.nodes[at] - held, amplitude * steps.middles[at] - held
+    c0, c1, c2 = coefficients(steps.rule, rates[0], rates[1], amplitude * steps.nodes[at + 1] - held)
+    take(c0, c1, c2, steps.length[p], True, state)
+
+
+@scalar
+def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.ndarray) -> None:
+    """Steps i to `until` of piece p, on which Üg falls or is negative, with b held, up to the stop.
+
+    V is largest where Üg falls through b; from there on it decreases.
+    """
+    steps, level, at = room.steps, state[HELD], room.steps.offset[p]
+    if block.amplitude * steps.nodes[at + i] > level:
+        low, high = i, until
+        while high > low:  # the first node at which Üg < b; `until` if none is before it
+            middle = (low + high) // 2
+            low, high = (low, middle) if block.amplitude * steps.nodes[at + middle] < level else (middle + 1, high)
+        turns = block.amplitude * steps.nodes[at + low] < level
+        last = low - 1 if turns else until
+        take_held(block, steps, p, i, last, state)
+        i = last
+        if turns:
+            take_one_held(block, steps, p, i, state)
+            i += 1
+    if i < until and state[SLIDES] > 0.0:
+        if held_velocity(block, steps, p, i, until, state) > 0.0:
+            take_held(block, steps, p, i, until, state)
+        else:
+            low, high = i + 1, until
+            while high > low:  # the first node at which V ≤ 0
+                middle = (low + high) // 2
+                stopped = held_velocity(block, steps, p, i, middle, state) <= 0.0
+                low, high = (low, middle) if stopped else (middle + 1, high)
+            take_held(block, steps, p, i, low - 1, state)
+            take_one_held(block, steps, p, low - 1, state)
+            if state[SLIDES] > 0.0 and low < until:  # but for rounding
+                take_one_held(block, steps, p, low, state)
 
 
 @scalar
 def fall_steps(
-    block: Block, pieces: np.ndarray, steps: Steps, p: int, start: float, end: float, state: np.ndarray
+    block: Block, pieces: np.ndarray, room: Room, p: int, start: float, end: float, state: np.ndarray
 ) -> None:
     """From the beginning of piece p (τ = `start`) to `end` with b held, finer while a slide just begun asks for it."""
-    rule, first, at = steps.rule, 0, steps.offset[p]
+    steps, first = room.steps, 0
     whole = steps.counts[p] if end == pieces[p, FINISH] else int((end - start) / steps.length[p])
     resolve_fall(block, pieces, p, state)
     while first < whole and phase_at(pieces, p, node(steps, p, first)) < state[REACH]:
         tau, until = node(steps, p, first), node(steps, p, first + 1)
         while tau < until and state[SLIDES] > 0.0:
             cut = min(until, tau + longest_step(block, steps, pieces, p, tau, math.inf, state))
-            hold_step(block, rule, pieces, p, tau, cut, state)
+            hold_step(block, steps.rule, pieces, p, tau, cut, state)
             tau = cut
         first += 1
     if state[SLIDES] > 0.0:
-        hold_steps(rule, block.amplitude, steps.nodes, at + 2 * first, whole - first, steps.length[p], state)
+        hold_steps(block, room, p, first, whole, state)
     if state[SLIDES] > 0.0 and whole < steps.counts[p] and end > node(steps, p, whole):
-        hold_step(block, rule, pieces, p, node(steps, p, whole), end, state)
+        hold_step(block, steps.rule, pieces, p, node(steps, p, whole), end, state)
     if state[SLIDES] == 0.0:
         state[STOPPED_AT] = pieces[p, END]
 
 
 @scalar
-def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float, x: float, state: np.ndarray) -> None:
+def rise_step(block: Block, steps: Steps, p: int, k: int, tau: float, x: float, state: np.ndarray) -> None:
     """From τ on piece p, where Üg = x rises, to the end of step k.
 
     Cut at Üg = Üy, at t1, at switches to and from the hold, and at the stop.
     """
-    wave, amplitude, literal = steps.wave, block.amplitude, block.rise == LITERAL
-    begin, end, at = node(steps, p, k), node(steps, p, k + 1), steps.offset[p] + 2 * k
-    x_end, located = amplitude * steps.nodes[at + 2], True
+    wave, amplitude, literal, rule = steps.wave, block.amplitude, block.rise == LITERAL, steps.rule
+    begin, end, at = node(steps, p, k), node(steps, p, k + 1), steps.offset[p] + k
+    x_end, located = amplitude * steps.nodes[at + 1], True
     # of a slide's own steps (`longest_step`), which grow by share/4 from 1e-14 on, there are ln(1e13) 4/share
     for _ in range(_MOST_EVENTS + 3 * steps.per_cycle):
         if state[SLIDES] == 0.0:
@@ -175,7 +230,7 @@ def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float,
         follows, held, h = state[FOLLOWS] == 1.0, state[HELD], cut - tau
         rate, middle = x - (eq4 if follows else held), 0.0
         if rule == SIMPSON:
-            x_middle = amplitude * steps.nodes[at + 1]
+            x_middle = amplitude * steps.middles[at]
             if tau != begin or cut != end:
                 x_middle = plane(wave.pieces, p, amplitude, tau + 0.5 * h)
             middle = relative_acceleration(block, x_middle) if follows else x_middle - held
@@ -201,46 +256,113 @@ def rise_step(block: Block, rule: int, steps: Steps, p: int, k: int, tau: float,
 
 
 @scalar
-def rise_steps(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, x: float, state: np.ndarray) -> None:
-    """Along piece p, on which Üg > 0 does not fall, from τ on, where Üg = x."""
-    rule, nodes, at, h = steps.rule, steps.nodes, steps.offset[p], steps.length[p]
-    share = (tau - pieces[p, BEGIN]) / (pieces[p, FINISH] - pieces[p, BEGIN])
-    first = min(max(int(share * steps.counts[p]), 0), steps.counts[p] - 1)
-    newmark, eq4 = block.rise == NEWMARK, math.nan
-    for i in range(first, steps.counts[p]):
-        x_end = block.amplitude * nodes[at + 2 * i + 2]
-        if state[SLIDES] == 0.0 and x_end <= block.yield_acceleration:
-            eq4 = math.nan
-            continue
-        eq4_end = -math.inf if newmark else response(block, x_end)
-        # the step as it is where nothing happens in it, as in `lockstep_rise`
-        if state[SLIDES] > 0.0 and i > first and state[REACH] == -math.inf and state[LAYER] == 0.0:
-            x = block.amplitude * nodes[at + 2 * i]
-            if not newmark and math.isnan(eq4):
-                eq4 = response(block, x)
-            follows, held, velocity, middle = state[FOLLOWS] > 0.0, state[HELD], state[VELOCITY], 0.0
-            if rule == SIMPSON:
-                x_middle = block.amplitude * nodes[at + 2 * i + 1]
-                middle = relative_acceleration(block, x_middle) if follows else x_middle - held
-            c0, c1, c2 = coefficients(rule, x - held, middle, x_end - (eq4_end if follows else held))
-            after = velocity + velocity_gain(c0, c1, c2, h, 1.0)
-            switches = block.rise == MONOTONE and (eq4_end < eq4 if follows else eq4_end > held)
-            if not (switches or after <= 0.0 or (c0 > 0.0 and c0 + c1 + c2 < 0.0)):
-                state[DISPLACEMENT] += velocity * h + displacement_gain(c0, c1, c2, h, 1.0)
-                state[VELOCITY] = after
-                state[PEAK], state[LEAST] = max(state[PEAK], after), min(state[LEAST], after)
-                if follows:
-                    state[HELD] = eq4_end
-                eq4 = eq4_end
-                continue
-        if i > first:
-            tau, x = node(steps, p, i), block.amplitude * nodes[at + 2 * i]
-        rise_step(block, rule, steps, p, i, tau, x, state)
-        eq4 = eq4_end
+def steps_to_event(block: Block, p: int, i: int, most: int, state: np.ndarray, room: Room) -> int:
+    """Steps from i on, `most` at most, before the one on the rise in which something happens; rates of V in the lanes.
+
+    To a block that slides: a switch to or from the hold, or a largest V.  To one at rest: its onset.
+    """
+    steps, lanes, amplitude, at = room.steps, room.lanes, block.amplitude, room.steps.offset[p] + i
+    slides, follows, held = state[SLIDES] > 0.0, state[FOLLOWS] > 0.0, state[HELD]
+    monotone, touch, yields = block.rise == MONOTONE, state[TOUCH], block.yield_acceleration
+    if block.rise == NEWMARK:
+        for k in range(AHEAD):
+            lanes[EQ4 + k] = math.inf
+    else:
+        eq4_rates(block, steps.nodes, at, EQ4, lanes)
+    w = steps.nodes[at : at + AHEAD]
+    for k in range(AHEAD):
+        lanes[X + k] = amplitude * w[k]
+    events = 0
+    for k in range(AHEAD):
+        x, x_end, rate, rate_end = lanes[X + k], lanes[X + k + 1], lanes[EQ4 + k], lanes[EQ4 + k + 1]
+        eq4, eq4_end = x - rate, x_end - rate_end
+        rate = rate if follows else x - held
+        rate_end = rate_end if follows else x_end - held
+        lanes[RATE + k] = rate
+        switches = monotone & (eq4_end < eq4 if follows else eq4_end > held)
+        turns = (rate > 0.0) & (rate_end < 0.0)
+        starts = ((x_end > yields) & (lanes[EQ4 + k + 1] > 0.0)) | ((x < touch) & (touch < x_end))
+        happens = (switches | turns if slides else starts) & (k < most)
+        lanes[HAPPENS + k] = 1.0 if happens else 0.0
+        events += 1 if happens else 0
+    return first_event(most, lanes) if events > 0 else most
 
 
 @scalar
-def note_nothing(steps: Steps, start: float, end: float, state: np.ndarray) -> None:
+def rise_ahead(block: Block, p: int, i: int, state: np.ndarray, room: Room) -> int:
+    """Take the steps from i on, on the rise, in which nothing happens, as many as the lanes hold; how many."""
+    steps, lanes, amplitude = room.steps, room.lanes, block.amplitude
+    at, follows = steps.offset[p] + i, state[FOLLOWS] > 0.0
+    most = steps_to_event(block, p, i, min(steps.counts[p] - i, AHEAD - 1), state, room)
+    if state[SLIDES] == 0.0:
+        return most
+    if steps.rule == SIMPSON and follows:
+        eq4_rates(block, steps.middles, at, MIDDLE, lanes)
+    elif steps.rule == SIMPSON:
+        held_rates(amplitude, state[HELD], steps.middles, at, MIDDLE, lanes)
+    taken = advance(steps, p, most, True, state, lanes)
+    if follows:
+        state[HELD] = amplitude * steps.nodes[at + taken] - lanes[EQ4 + taken]
+    return taken
+
+
+@scalar
+def quiet_steps(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> int:
+    """Steps from i on, on the rise, in which nothing happens to a block at rest or under the hold; -1 if not known.
+
+    Beyond the inflection E is convex, so that E − b and D each change their sign once at most.
+    """
+    at, end, slides, held = steps.offset[p], steps.counts[p], state[SLIDES] > 0.0, state[HELD]
+    x, top = block.amplitude * steps.nodes[at + i], block.amplitude * steps.nodes[at + end]
+    if slides and (state[FOLLOWS] > 0.0 or x < held):
+        return -1
+    if block.rise == NEWMARK:
+        return end - i if slides else -1
+    if x < max(inflection(block), block.yield_acceleration) or state[TOUCH] < math.inf:
+        return -1
+    if slides:
+        if response(block, top) <= held:
+            return end - i
+        if response(block, x) >= held:
+            return 0
+        level = response_root(block, held, x, top)
+    else:
+        if relative_acceleration(block, top) <= 0.0:
+            return end - i
+        if relative_acceleration(block, x) >= 0.0:
+            return 0
+        level = relative_acceleration_root(block, x, top)
+    low, high = i + 1, end
+    while high > low:  # the first node at which Üg ≥ level
+        middle = (low + high) // 2
+        low, high = (low, middle) if block.amplitude * steps.nodes[at + middle] >= level else (middle + 1, high)
+    return low - 1 - i
+
+
+@scalar
+def rise_steps(block: Block, pieces: np.ndarray, room: Room, p: int, tau: float, x: float, state: np.ndarray) -> None:
+    """Along piece p, on which Üg > 0 does not fall, from τ on, where Üg = x."""
+    steps = room.steps
+    share = (tau - pieces[p, BEGIN]) / (pieces[p, FINISH] - pieces[p, BEGIN])
+    i = min(max(int(share * steps.counts[p]), 0), steps.counts[p] - 1)
+    rise_step(block, steps, p, i, tau, x, state)
+    i += 1
+    while i < steps.counts[p]:
+        if state[SLIDES] == 0.0 or (state[REACH] == -math.inf and state[LAYER] == 0.0):
+            quiet = quiet_steps(block, steps, p, i, state)
+            if quiet > 0 and state[SLIDES] > 0.0:
+                take_held(block, steps, p, i, i + quiet, state)
+            taken = quiet if quiet >= 0 else rise_ahead(block, p, i, state, room)
+            i += taken
+            if quiet < 0 and taken == AHEAD - 1:
+                continue
+        if i < steps.counts[p]:
+            rise_step(block, steps, p, i, node(steps, p, i), block.amplitude * steps.nodes[steps.offset[p] + i], state)
+            i += 1
+
+
+@scalar
+def note_nothing(room: Room, start: float, end: float, state: np.ndarray) -> None:
     """Steps are not sampled later."""
 
 
@@ -248,11 +370,10 @@ pulse_by_steps = pulse_of(rise_steps, fall_steps, note_nothing)
 
 
 @scalar
-def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
+def pulse(block: Block, options: Options, wave: Wave, room: Room, k: int, following: int, velocity: float) -> Pulse:
     """A pulse of a train (see `train`)."""
-    state = np.empty((STATE_SIZE, 1))[:, 0]  # spaced as a column of the lanes' states: functions serve both
-    reset_state(block, state)
-    return pulse_by_steps(block, options, wave, steps, k, following, velocity, state)
+    reset_state(block, room.state)
+    return pulse_by_steps(block, options, wave, room, k, following, velocity, room.state)
 
 
 train = train_of(pulse)

@@ -18,8 +18,7 @@ from slipsweep.kernels.pulse import (
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
 
-@in_lanes
-def coefficients(rule: int, start: float, middle: float, end: float) -> tuple[float, float, float]:
+def coefficients_of(rule: int, start: float, middle: float, end: float) -> tuple[float, float, float]:
     """c0, c1, c2 of the rate c0 + c1 s + c2 s², s in [0, 1] over the step."""
     if rule == RECTANGLE:
         return start, 0.0, 0.0
@@ -28,16 +27,20 @@ def coefficients(rule: int, start: float, middle: float, end: float) -> tuple[fl
     return start, 4.0 * middle - 3.0 * start - end, 2.0 * (start + end) - 4.0 * middle
 
 
-@in_lanes
-def velocity_gain(c0: float, c1: float, c2: float, h: float, s: float) -> float:
+def velocity_gain_of(c0: float, c1: float, c2: float, h: float, s: float) -> float:
     """∫ of the rate from 0 to s, over a step of phase h."""
     return h * s * (c0 + s * (0.5 * c1 + s * c2 / 3.0))
 
 
-@in_lanes
-def displacement_gain(c0: float, c1: float, c2: float, h: float, s: float) -> float:
+def displacement_gain_of(c0: float, c1: float, c2: float, h: float, s: float) -> float:
     """∫∫ of the rate from 0 to s, over a step of phase h."""
     return h * h * s * s * (0.5 * c0 + s * (c1 / 6.0 + s * c2 / 12.0))
+
+
+#: The same in kernels; the table of steps takes them as they are, for arrays.
+coefficients = in_lanes(coefficients_of)
+velocity_gain = in_lanes(velocity_gain_of)
+displacement_gain = in_lanes(displacement_gain_of)
 
 
 @scalar

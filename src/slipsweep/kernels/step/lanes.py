@@ -1,0 +1,124 @@
+"""Steps in which nothing happens, many of one block at a time, each in a lane of SIMD loops.
+
+The rate of V does not depend on V, so that the rates of many steps are computed side by side and then summed.  A lane
+beyond the last step wanted is computed and left out of the sums.  docs/numerics.md#step-solver
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.decorators import scalar, summed
+from slipsweep.kernels.block import Block
+from slipsweep.kernels.pulse import DISPLACEMENT, LEAST, PEAK, VELOCITY
+from slipsweep.kernels.step.slides import STATE_SIZE
+from slipsweep.kernels.step.table import AHEAD, Steps
+from slipsweep.model import equations as eq
+
+#: Rows of the lanes: the rate of V at the nodes and in the middles of steps (0 but for Simpson's rule), that by
+#: Eq. 4 at the nodes, Üg there, and whether something happens in the step.  Row + k is lane k.
+RATE, MIDDLE, EQ4, X, HAPPENS = range(0, 10 * AHEAD, 2 * AHEAD)
+_LANES_SIZE = 10 * AHEAD
+
+#: The number of a lane.
+_INDEX = np.arange(AHEAD) * 1.0
+
+
+class Room(NamedTuple):
+    """Where a block is followed step by step: the table of steps, its state (rows as in `slides`), and the lanes."""
+
+    steps: Steps
+    state: np.ndarray
+    lanes: np.ndarray
+
+
+@scalar
+def room_of(steps: Steps) -> Room:
+    """Room for one block after the other."""
+    return Room(steps, np.zeros(STATE_SIZE), np.zeros(_LANES_SIZE))
+
+
+@scalar
+def eq4_rates(block: Block, w: np.ndarray, at: int, row: int, lanes: np.ndarray) -> None:
+    """D at the nodes w[at:] into a row of the lanes."""
+    amplitude, mu_s, tan_theta, g = block.amplitude, block.mu_s, block.tan_theta, block.g
+    delta_mu, decay = block.delta_mu, block.decay_rate / block.g
+    source, target = w[at : at + AHEAD], lanes[row : row + AHEAD]
+    for k in range(AHEAD):
+        x = amplitude * source[k]
+        mu = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
+        target[k] = eq.relative_acceleration(x, mu, mu_s, tan_theta, g)
+
+
+@scalar
+def held_rates(amplitude: float, held: float, w: np.ndarray, at: int, row: int, lanes: np.ndarray) -> None:
+    """Üg − b at the nodes w[at:] with b held into a row of the lanes."""
+    source, target = w[at : at + AHEAD], lanes[row : row + AHEAD]
+    for k in range(AHEAD):
+        target[k] = amplitude * source[k] - held
+
+
+@scalar
+def first_event(most: int, lanes: np.ndarray) -> int:
+    """The first of `most` lanes in which something happens; `most` if there is none."""
+    for k in range(most):
+        if lanes[HAPPENS + k] > 0.0:
+            return k
+    return most
+
+
+@scalar
+def steps_to_turn(most: int, lanes: np.ndarray) -> int:
+    """Steps, `most` at most, before the one in which the rate of V falls through 0."""
+    events = 0
+    for k in range(AHEAD):
+        turns = (lanes[RATE + k] > 0.0) & (lanes[RATE + k + 1] < 0.0) & (k < most)
+        lanes[HAPPENS + k] = 1.0 if turns else 0.0
+        events += 1 if turns else 0
+    return first_event(most, lanes) if events > 0 else most
+
+
+@scalar
+def _steps_to_stop(velocity: float, most: int, weights: np.ndarray, p: int, lanes: np.ndarray) -> int:
+    """Steps, `most` at most, before the one in which V comes to 0."""
+    start, middle, end = weights[p, 0], weights[p, 1], weights[p, 2]
+    for k in range(most):
+        velocity += start * lanes[RATE + k] + middle * lanes[MIDDLE + k] + end * lanes[RATE + k + 1]
+        if velocity <= 0.0:
+            return k
+    return most
+
+
+@summed
+def _sums(count: int, h: float, weights: np.ndarray, p: int, lanes: np.ndarray) -> tuple[float, float, float]:
+    """What V and W of a block at rest gain over `count` steps of piece p, and what V loses where it falls."""
+    v_start, v_middle, v_end = weights[p, 0], weights[p, 1], weights[p, 2]
+    w_start, w_middle, w_end = weights[p, 3], weights[p, 4], weights[p, 5]
+    gain, late, moved, lost = 0.0, 0.0, 0.0, 0.0
+    for k in range(AHEAD):
+        start, middle, end = lanes[RATE + k], lanes[MIDDLE + k], lanes[RATE + k + 1]
+        gained = v_start * start + v_middle * middle + v_end * end
+        shift = w_start * start + w_middle * middle + w_end * end
+        gained = gained if _INDEX[k] < count else 0.0
+        gain += gained
+        late += _INDEX[k] * gained
+        lost += gained if gained < 0.0 else 0.0
+        moved += shift if _INDEX[k] < count else 0.0
+    return gain, moved + h * ((count - 1.0) * gain - late), lost
+
+
+@scalar
+def advance(steps: Steps, p: int, most: int, stops: bool, state: np.ndarray, lanes: np.ndarray) -> int:
+    """Take `most` steps of piece p with the rates of the lanes, or those before the stop; how many.
+
+    Their rates do not fall through 0, so that V is least where they rise through it.
+    """
+    velocity, count, h = state[VELOCITY], most, steps.length[p]
+    gain, moved, lost = _sums(count, h, steps.weights, p, lanes)
+    if stops and velocity + lost <= 0.0:
+        count = _steps_to_stop(velocity, most, steps.weights, p, lanes)
+        gain, moved, lost = _sums(count, h, steps.weights, p, lanes)
+    state[DISPLACEMENT] += velocity * h * count + moved
+    state[VELOCITY] = velocity + gain
+    state[PEAK], state[LEAST] = max(state[PEAK], velocity + gain), min(state[LEAST], velocity + lost)
+    return count
