@@ -131,6 +131,7 @@ def _rows(regimes: dict[str, int], peak: float, tiny: bool, solver: str) -> list
         each = times[regime] * cores() / units
         least = operations * cores() / peak
         row = [regime.replace("_", "–"), str(operations), number(least * 1e9, 2), number(each * 1e9)]
+        row.append(number(each * peak / cores()))
         rows.append([*row, number(operations / each / 1e9, 2), f"{least / each:.1%}"])
     return rows
 
@@ -140,7 +141,7 @@ def main() -> None:
     given = arguments(__doc__)
     found = ceilings(given.tiny)
     peak = found["multiply-add"]
-    header = ["", "operations", "ns at the peak", "ns reached", "G/s and core", "of the peak"]
+    header = ["", "operations", "ns at the peak", "ns reached", "slots reached", "G/s and core", "of the peak"]
     cycle = _rows(CYCLE_OPERATIONS, peak, given.tiny, "cycle")
     step = _rows(STEP_OPERATIONS, peak, given.tiny, "step")
     balance = 8 * peak / found["fresh"]
@@ -167,7 +168,7 @@ Written by `python -m benchmarks.roofline`.
 Operations count a fused multiply-add, a division or a root as one, and are those of the formulas at
 the least: Eqs. 7–11, the phases of the events, {NODES} nodes of quadrature where Eq. 4 is followed
 ({EARLY_NODES} before the first Üg = Üy of continuous sliding, whose whole quarters are a series), each an
-exponential ({EXP}), a versine ({VERSINE}) and Eq. 4 ({NODE}).
+exponential ({EXP}), a versine ({VERSINE}) and Eq. 4 ({NODE}). A slot is the time of one multiply-add on one core.
 
 ## The cycle solver, a cell
 
