@@ -22,6 +22,7 @@ from slipsweep.kernels import block as physics
 from slipsweep.kernels import newmark as newmark_kernels
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import (
+    NEWMARK_RECORD_KERNEL,
     PARAMETER_KERNEL,
     RECORD_KERNEL,
     REMAINING_KERNEL,
@@ -35,7 +36,7 @@ from slipsweep.kernels.grid import (
 from slipsweep.kernels.sine.cells import room_of
 from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
 from slipsweep.kernels.step.table import steps_of
-from slipsweep.model.options import Mendez, Model, Solver, Step
+from slipsweep.model.options import Mendez, Model, Newmark, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, STRENGTHS, Validity
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.cutting import wave_of, wave_of_record
@@ -377,15 +378,21 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
     motion, solver = problem.excitation, problem.solver
     if isinstance(motion, Record):
         recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
+        # some 1 µs against 0.1, and more for a long record
+        cost = max(16, recorded.pieces.shape[0] // 128)
+        if isinstance(problem.model, Newmark):
+            own = newmark_kernels.record_of(recorded)
 
-        own = newmark_kernels.record_of(recorded, options)
+            def call_newmark(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+                tile, lanes = tile_of(grid), newmark_kernels.room_of()
+                NEWMARK_RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, own, targets, tile, lanes)
+
+            return call_newmark, cost
 
         def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            tile, lanes = tile_of(grid), newmark_kernels.room_of()
-            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, own, targets, tile, lanes)
+            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets, tile_of(grid))
 
-        # some 1 µs against 0.1, and more for a long record
-        return call, max(16, recorded.pieces.shape[0] // 128)
+        return call, cost
     assert isinstance(motion, Waveform)
     if _is_plain_sine(motion) and not isinstance(solver, Step):
 
@@ -526,7 +533,7 @@ def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
     elif solver not in (solve, newmark):
         return
     elif isinstance(problem.excitation, (Record, Suite)):
-        RECORD_KERNEL.expect()
+        (NEWMARK_RECORD_KERNEL if isinstance(problem.model, Newmark) or solver is newmark else RECORD_KERNEL).expect()
     elif isinstance(problem.solver, Step):
         STEP_KERNEL.expect()
     elif _is_plain_sine(problem.excitation):

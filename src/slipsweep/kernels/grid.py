@@ -13,7 +13,7 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import newmark, record
-from slipsweep.kernels.block import FRICTION_ESTIMATED, NEWMARK, TILE, UNSOLVED, Options, block_of, cell_of
+from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
 from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
 from slipsweep.kernels.sine import cells as sine
@@ -235,24 +235,40 @@ def _wave_grid(
         place(grid, begin, count, runs, periods, results, tile)
 
 
+@scalar
+def place_recorded(
+    grid: Grid, begin: int, count: int, runs: int, periods: np.ndarray, results: Results, tile: Tile
+) -> None:
+    """Place the results of a tile of cells under a record: W, V, three counts and validity."""
+    note_unsolved(begin, count, tile.codes[3], results)
+    scatter(grid, tile, runs, periods, results)
+    spread_codes(grid, tile, runs, 0, results.codes[0])
+    spread_codes(grid, tile, runs, 1, results.codes[1])
+    spread_codes(grid, tile, runs, 2, results.codes[2])
+    spread_codes(grid, tile, runs, 3, results.codes[3])
+
+
 def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, own: newmark.Record, results: Results, tile: Tile, lanes: newmark.Room,
+    wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
     room = room_of(0)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        if options.rise == NEWMARK:
-            newmark.solve_cells(tile.cells, count, options, wave, own, lanes, tile.motion, tile.codes)
-        else:
-            record.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
-        note_unsolved(begin, count, tile.codes[3], results)
-        scatter(grid, tile, runs, periods, results)
-        spread_codes(grid, tile, runs, 0, results.codes[0])
-        spread_codes(grid, tile, runs, 1, results.codes[1])
-        spread_codes(grid, tile, runs, 2, results.codes[2])
-        spread_codes(grid, tile, runs, 3, results.codes[3])
+        record.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+        place_recorded(grid, begin, count, runs, periods, results, tile)
+
+
+def _newmark_record_grid(
+    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    wave: Wave, own: newmark.Record, results: Results, tile: Tile, lanes: newmark.Room,
+) -> None:  # fmt: skip
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
+        runs = gather(grid, begin, count, inputs, tile)
+        newmark.solve_cells(tile.cells, count, options, wave, own, lanes, tile.motion, tile.codes)
+        place_recorded(grid, begin, count, runs, periods, results, tile)
 
 
 def _step_grid(
@@ -276,8 +292,10 @@ WAVE_KERNEL = Kernel(_wave_grid)
 SINE_KERNEL = Kernel(_sine_grid)
 REMAINING_KERNEL = Kernel(_remaining_grid)
 
-#: Of records: each pulse with its own peak, and counts of slips and pulses in place of the sliding mode.
+#: Of records: each pulse with its own peak, and counts of slips and pulses in place of the sliding mode; and of
+#: Newmark's block, whose first use takes 5 s of processor to compile, the other 19.
 RECORD_KERNEL = Kernel(_record_grid)
+NEWMARK_RECORD_KERNEL = Kernel(_newmark_record_grid)
 
 
 def _parameter_grid(

@@ -27,7 +27,7 @@ LANES_SIZE = 9 * LANES
 
 
 class Record(NamedTuple):
-    """A record as Newmark's block takes it; empty for any other model.
+    """A record as Newmark's block takes it.
 
     `lines` (pieces, 4) has the first, the last and the larger value of each piece and its length, `height` (stretches,)
     the peaks.  Values are in units of `unit`, a power of two near the largest: their squares are doubles.
@@ -46,9 +46,9 @@ class Room(NamedTuple):
     order: np.ndarray
 
 
-def record_of(wave: Wave, options: Options) -> Record:
+def record_of(wave: Wave) -> Record:
     """The record of a wave, made once for all cells."""
-    pieces, height = (wave.pieces, wave.height) if options.rise == NEWMARK else (wave.pieces[:0], wave.height[:0])
+    pieces, height = wave.pieces, wave.height
     unit = math.ldexp(1.0, math.frexp(max(wave.highest, -wave.lowest))[1])
     first, last = pieces[:, FIRST] / unit, pieces[:, LAST] / unit
     lines = np.column_stack([first, last, np.maximum(first, last), pieces[:, FINISH] - pieces[:, BEGIN]])
