@@ -644,7 +644,7 @@ def test_values_that_are_not_to_be_relied_on_leave_a_gap(lined: Path) -> None:
         expected = ~flags.upslope.values if shown else ~left_out  # a logarithmic axis has no place for upslope
         np.testing.assert_array_equal(seen, expected & (direct.permanent_displacement.values > 0))
         assert left_out_of(figure) == (["upslope"] if shown else ["not_recoupled", "upslope"])
-        assert ("Drawn as asked: values flagged not_recoupled" in figure.get_supxlabel()) == shown
+        assert ("Drawn on request: values flagged not_recoupled" in figure.get_supxlabel()) == shown
 
 
 def left_out_of(figure: Figure) -> list[str]:

@@ -211,7 +211,7 @@ def test_a_library_in_an_endless_loop_is_given_up(
     ("read", "message"),
     [
         (trials.endless, "damaged: reading it does not come to an end"),
-        (trials.broken, r"damaged: the netCDF library breaks down on it \(SIGABRT\)"),
+        (trials.broken, r"damaged: the netCDF library fails on it \(SIGABRT\)"),
         (trials.greedy, "damaged: reading it takes more memory than"),
         (trials.refused, "a.nc: ± is none"),
         (trials.failing, r"not a netCDF file, or a damaged one \(HDF error\)"),

@@ -66,7 +66,7 @@ def test_a_missing_channel(clean: dict[str, xr.Dataset], missing: str) -> None:
 def test_displacement_alone_does_not_tell_decay_from_excess(clean: dict[str, xr.Dataset], mode: str) -> None:
     test = measured(clean[mode], seed=3, responses=["relative_displacement"])
     found = calibrated(test, mode)
-    assert "λ and Δμ cannot be told apart by this test: their correlation is" in found.attrs["findings"]
+    assert "λ and Δμ cannot be separated by this test: their correlation is" in found.attrs["findings"]
     assert "Measure the acceleration of the block" in found.attrs["findings"]
     assert abs(found.correlation.values[1, 2]) > 0.99
 
@@ -129,7 +129,7 @@ def test_a_yield_acceleration_that_does_not_enter_is_said_not_to(clean: dict[str
     from tests.support.shaking import STICK_SLIP
 
     found = slipsweep.calibrate(measured(exact(STICK_SLIP), seed=9), 5.0, 0.38, cycles=False)
-    assert "Üy is not determined: Eq. 4 holds the block to the table" in found.attrs["findings"]
+    assert "Üy is not determined: by Eq. 4 the block sticks to the table" in found.attrs["findings"]
     assert np.isnan(found.yield_acceleration_error)
     assert found.yield_acceleration_interval[0] == 0.0
     assert 0.59 < found.yield_acceleration_interval[1] < 0.85

@@ -108,7 +108,7 @@ def test_statistics_are_those_of_the_draws(shaking: Record, name: str) -> None:
         ({"frequency": 1.0}, {"mu_s": NORMAL}, "frequency: not allowed with a Record"),
         ({"amplitude": 2.0}, {"scale": NORMAL}, "amplitude, scale: must not both be given"),
         ({}, {"scale": NORMAL, "amplitude": NORMAL}, "scale: not allowed beside amplitude"),
-        ({}, {"scale": ABOUT_ONE}, 'kind = "factor" wants scale given'),
+        ({}, {"scale": ABOUT_ONE}, 'kind = "factor" needs scale given'),
         ({}, {"decay_rate": ABOUT_ONE}, "under a record each pulse has an estimate of its own"),
         ({}, {"time_scale": {"distribution": "norm"}}, r"time_scale = norm.*% of the draws are not"),
     ],

@@ -163,7 +163,7 @@ def spread(sheet: Sheet) -> Figure:
         low, high = (np.maximum(most(each, axis=0), 1e-300) for most in (np.fmin.reduce, np.fmax.reduce))
         area: dict[str, Any] = {"facecolor": "0.92", "linewidth": 0}
         panel.axes.fill_between(xs, low, high, zorder=1, gid="spread", **area)
-        sheet.legend["between the answers"] = Patch(**area)
+        sheet.legend["range of these results"] = Patch(**area)
         for number, (text, curve) in enumerate(curves.items()):
             own: dict[str, Any] = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
             look = {"linewidth": 1.0, "markersize": 3.5, **_ANSWERS[text]} if text in _ANSWERS else own
@@ -172,7 +172,7 @@ def spread(sheet: Sheet) -> Figure:
         _underlay(sheet, panel, _DISPLACEMENT, 1000.0)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(_DISPLACEMENT, *flags)
-    sheet.notes.append("All answers have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
+    sheet.notes.append("All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
     return sheet.finish("outside right upper")
 
 

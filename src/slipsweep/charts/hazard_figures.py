@@ -68,7 +68,7 @@ def hazard_chart(rates: Table, axes: Axes | None = None, marked: Floats | None =
     asked = np.isin(wanted, marked)
     lines, held = (rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate"))
     if not (lines[:, asked if asked.any() else slice(None)] > 0.0).any():
-        raise InputError("no displacement that is asked for is exceeded by any motion: there is nothing to draw")
+        raise InputError("no motion exceeds any of the given displacements: there is nothing to draw")
     figure, grid = new_panels(axes, 1, 1, (6.4, 4.8))
     panel = grid[0, 0]
     panel.set_xscale("log")
@@ -91,6 +91,6 @@ def hazard_chart(rates: Table, axes: Axes | None = None, marked: Floats | None =
         add_legend(figure, axes, entries, "outside right upper")
     about = [model_text(rates.attrs), f"hazard curve {plain(str(rates.attrs['hazard_curve']))}"]
     if (held > 0.5 * lines).any():
-        about.append("dotted: more than half of the rate is from above the largest amplitude, where P is held")
+        about.append("dotted: more than half of the rate is from above the largest amplitude, where P is held constant")
     add_caption(figure, axes, about)
     return figure

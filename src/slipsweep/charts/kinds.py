@@ -233,7 +233,7 @@ def _axes(
 def _map_axes(result: Result, wish: Wish, variable: str, x: Sequence[str]) -> tuple[str, str]:
     found = _axes(result, wish, variable, x, DRIVES)
     if "case" in found:
-        raise InputError(f"{result.path}: case: the cases have no order; they tell curves (--y) or panels apart")
+        raise InputError(f"{result.path}: case: the cases have no order; use them for curves (--y) or panels")
     return found
 
 
@@ -256,7 +256,7 @@ def _sheet(
     keep: dict[str, Any] = {x: result.thinned(x), **(also or {})}
     at = dict(wish.at)
     if x in at:
-        raise InputError(f"{result.path}: {x} = {at[x]}: is an axis of this chart; it cannot be cut there too")
+        raise InputError(f"{result.path}: {x} = {at[x]}: is an axis of this chart; it cannot have one value")
     if y:
         keep[y] = result.members(y, _CURVES, at) if family else result.thinned(y)
     for name in panels:
@@ -458,7 +458,7 @@ def _sensitivity(result: Result, wish: Wish) -> Figure:
     if "total_index" not in result.variables:
         raise InputError(f"{result.path}: holds no Sobol indices; sensitivity = true in [uncertainty] asks for them")
     if wish.y is not None:
-        raise InputError(f"{result.path}: --y {wish.y}: not with sensitivity, whose inputs tell curves apart")
+        raise InputError(f"{result.path}: --y {wish.y}: not with sensitivity, whose curve parameter is the input")
     names = sensitivity_figures.NAMES
     for name in names:
         result.result(name)

@@ -190,7 +190,7 @@ def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], l
         ", ".join(single),
         f"{model_text(attributes)}{grey}",
         _suite_text(table) if suite else "",
-        "" if np.isfinite(table["limit_amplitude"].values).any() else "no limits to draw: limit_status says why",
+        "" if np.isfinite(table["limit_amplitude"].values).any() else "no limits to draw: limit_status has the reasons",
         f"shown: {', '.join(thinned)}" if thinned else "",
     ]
     return [line for line in lines if line]
@@ -203,7 +203,7 @@ def _suite_text(table: Table) -> str:
     texts = [f"median and band are of {suite_text(table['limit_amplitude'].sizes)}"]
     if beyond:
         highest = float(table.attrs["maximum_amplitude"]) / float(table.attrs["g"])
-        texts.append(f"{beyond} of {status.size} limits are above {highest:.4g} g, and count as above all others")
+        texts.append(f"{beyond} of {status.size} limits are above {highest:.4g} g, and count as larger than all others")
     if invalid:
         texts.append(f"{invalid} of {status.size} have no value and are left out")
     return "; ".join(texts)

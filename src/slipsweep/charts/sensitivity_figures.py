@@ -99,7 +99,7 @@ def _check_there(sheet: Sheet) -> None:
         return
     status = {int(one) for one in np.unique(sheet.table["sensitivity_status"].values)}
     reasons = [text for one, text in SENSITIVITY_STATUS_TEXT.items() if int(one) in status and int(one)]
-    raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons) or 'missing'}; cut it elsewhere (--at)")
+    raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons) or 'missing'}; choose another slice (--at)")
 
 
 def _legend(sheet: Sheet) -> None:

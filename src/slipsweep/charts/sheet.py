@@ -214,7 +214,7 @@ class Sheet:
         left_out = [flag for flag in raised if not self.look.show_cautions or flag in below_zero]
         left_out_as = "Left out, below zero on a logarithmic scale" if self.look.show_cautions else "Left out"
         drawn = [flag for flag in raised if flag not in left_out]
-        for heading, found in ((left_out_as, left_out), ("Drawn as asked", drawn)):
+        for heading, found in ((left_out_as, left_out), ("Drawn on request", drawn)):
             if found:
                 texts = " or ".join(_LEFT_OUT_TEXT[flag] for flag in found)
                 self.notes.append(f"{heading}: values flagged {texts}.")
@@ -280,7 +280,7 @@ def new_panels(
     if root is None:
         raise InputError(f"ax = {axes!r}: must be the axes of a matplotlib figure")
     if rows * columns > 1:
-        raise InputError(f"ax: is one panel, and this chart has {rows * columns}; leave ax away")
+        raise InputError(f"ax: is one panel, and this chart has {rows * columns}; leave out ax")
     return root, np.array([[axes]], dtype=object)
 
 
@@ -388,7 +388,7 @@ def check_positive(name: str, values: Floats) -> None:
     there = values[np.isfinite(values)]
     if not (there > 0).any():
         reason = "no value" if not there.size else "no value above zero"
-        raise InputError(f"{name}: {reason} in this slice, and the axis is logarithmic; cut it elsewhere (--at)")
+        raise InputError(f"{name}: {reason} in this slice, and the axis is logarithmic; choose another slice (--at)")
 
 
 def log_axis(axes: Axes, values: Floats, least: float | None) -> None:

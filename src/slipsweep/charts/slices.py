@@ -242,7 +242,7 @@ class Result:
     def _unsolvable(self, dim: str) -> str:
         """Why no slice at another value of an axis can be solved; empty where it can."""
         if self.sort == "statistics":
-            return "statistics are not drawn anew for a chart"
+            return "statistics are not computed again for a chart"
         if self.sort in ("record", "suite"):
             return "the response to recorded motions is not solved anew for a chart"
         if dim not in PARAMETERS:
@@ -298,14 +298,14 @@ class Result:
         for name in at:
             if name in keep:
                 raise InputError(
-                    f"{self.path}: {name} = {at[name]}: is an axis of this chart; it cannot be cut there too"
+                    f"{self.path}: {name} = {at[name]}: is an axis of this chart; it cannot have one value"
                 )
         where: dict[str, Any] = {}
         exact: dict[str, Floats] = {}
         cuts = self.places(at)
         for dim, places in cuts.items():
             if len(places) > 1:
-                raise InputError(f"{self.path}: {dim} = {at[dim]}: several values tell curves or panels apart only")
+                raise InputError(f"{self.path}: {dim} = {at[dim]}: several values are allowed for curves or panels only")
         for dim, values in self.axes.items():
             # of the polarities the record as it is
             middle = 0 if dim in NAMED else values.size - 1 if dim == "polarity" else (values.size - 1) // 2

@@ -148,7 +148,7 @@ def calibrate(
     offset: Offset = None,
     drift: Drift = None,
     cycles: Annotated[
-        bool, typer.Option("--cycles/--no-cycles", help="Fit each cycle by itself, too.", rich_help_panel=TEST)
+        bool, typer.Option("--cycles/--no-cycles", help="Fit each cycle separately, too.", rich_help_panel=TEST)
     ] = True,
     output: Annotated[
         list[Path] | None,

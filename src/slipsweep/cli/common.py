@@ -47,7 +47,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no s
 
 Resume = Annotated[
     bool,
-    typer.Option("--resume", help="Go on with an interrupted run, from its finished chunks.", rich_help_panel=LARGE),
+    typer.Option("--resume", help="Continue an interrupted run from its finished chunks.", rich_help_panel=LARGE),
 ]
 Split = Annotated[
     bool,
@@ -60,7 +60,7 @@ Shared = Annotated[
 Memory = Annotated[
     str | None,
     typer.Option(
-        metavar="SIZE", help="Most memory to take: 512MiB, 2GB (default: 500 to 600 MB).", rich_help_panel=LARGE
+        metavar="SIZE", help="Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", rich_help_panel=LARGE
     ),
 ]
 Workers = Annotated[
@@ -127,7 +127,7 @@ def place_of(text: str) -> "Place":
 
 def echo_found(path: Path | str) -> None:
     """Say that there was nothing to go on with."""
-    typer.echo(f"{path}: complete already, and of this very sweep; nothing was computed")
+    typer.echo(f"{path}: complete already, by the same sweep; nothing was computed")
 
 
 def write_figure(figure: "Figure", path: Path, overwrite: bool) -> None:
@@ -240,9 +240,9 @@ class Chunks:
 
     def __post_init__(self) -> None:
         if self.shared and self.scheduler is None:
-            raise InputError("--shared: is for the workers of --scheduler; those of --workers reach what this one does")
+            raise InputError("--shared: is for the workers of --scheduler only")
         if self.resume and self.overwrite:
-            raise InputError("--resume, --overwrite: either goes on with an interrupted run or starts anew; give one")
+            raise InputError("--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one")
 
     def given(self) -> list[str]:
         """Options that only make sense with an output in chunks."""

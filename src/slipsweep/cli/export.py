@@ -54,7 +54,7 @@ def export(
     columns: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Axis whose values become columns, of one result a table.", rich_help_panel="Table"
+            metavar="NAME", help="Axis whose values become columns; one table per result.", rich_help_panel="Table"
         ),
     ] = None,
     overwrite: Overwrite = False,
@@ -62,7 +62,7 @@ def export(
 ) -> None:
     """Write a result as a table: CSV, Parquet or .xlsx.
 
-    A row a cell, coordinates as columns, units in the header; or with --columns a table of one result over two axes.
+    One row per case, coordinates as columns, units in the header; or with --columns a table of one result over two axes.
     """
     from slipsweep.files import export as tables
     from slipsweep.grid.resources import size_text

@@ -30,7 +30,7 @@ def hazard(
             "--displacement",
             "-d",
             metavar="LENGTH",
-            help="To exceed: 50mm, 2in, 0.05 (m). Repeat.",
+            help="To exceed: 50mm, 0.05 (m); may be repeated.",
             rich_help_panel="Hazard",
         ),
     ],
@@ -103,7 +103,7 @@ def _summarize(rates: "Table", g: float) -> None:
     for text, name in (("amplitudes of the result", "amplitude_range"), ("hazard curve", "hazard_curve_range")):
         low, high = attrs[name]
         typer.echo(f"{text:<25}{low:.6g} to {high:.6g} m/s2 ({low / g:.4g} to {high / g:.4g} g)")
-    typer.echo("above the amplitudes P is held; below them it is taken as 0; below the hazard curve nothing is counted")
+    typer.echo("above these amplitudes P is held constant; below them it is taken as 0; below the hazard curve no rate is counted")
     thresholds = rates["threshold"].values
     columns = [rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate", "omitted_rate")]
     shares = rates["valueless_share"].values.reshape(-1)

@@ -50,7 +50,7 @@ def limit(
             "--displacement",
             "-d",
             metavar="LENGTH",
-            help="What is tolerable: 50mm, 2in, 0.05 (m). Repeat.",
+            help="Tolerable: 50mm, 0.05 (m); may be repeated.",
             rich_help_panel="Limit",
         ),
     ],
@@ -183,7 +183,7 @@ def _summarize_suite(table: "Table", g: float) -> None:
     each = limits.values.transpose(order).reshape(found["value_count"].values.size, -1)
     names = point_names(table, {dim: limits.sizes[dim] for dim in suite})
     width = max(24, *map(len, names))
-    typer.echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is above all others:")
+    typer.echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
     for number, point in enumerate(point_names(table, grid)[:_MOST_POINTS]):
         quantiles = found["limit_quantile"].values.reshape(-1, 3)[number]
         count, beyond = (found[name].values.reshape(-1)[number] for name in ("value_count", "not_reached_count"))

@@ -42,7 +42,7 @@ _OTHER_FORMATS = (
 def run(
     sweep: Annotated[
         Path,
-        typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to make again."),
+        typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to repeat."),
     ],
     solver: Annotated[
         Literal["auto", "step", "cycle"] | None,
@@ -82,7 +82,7 @@ def run(
         same = solver == checked.solver.name  # with the options that the sweep file gives it
         checked = checked if same else checked.with_solver(SOLVERS.of(solver))
     if output is None and checked.output.path is None and spec.is_stream(sweep):
-        raise InputError(f"{sweep}: a sweep from a pipe has no name; give the output's with -o or output.path")
+        raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = place_of(checked.output.path or f"{sweep.stem}.nc" if output is None else output)
     if split and output is None and isinstance(path, Path):
         path = path.with_suffix("")

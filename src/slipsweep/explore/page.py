@@ -270,11 +270,11 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
     shown = {dim: excerpt.sizes[dim] for dim in excerpt.lengths}
     notes = []
     if shown == excerpt.lengths:
-        notes.append(f"All {math.prod(shown.values()):,} cells of the file are here.")
+        notes.append(f"All {math.prod(shown.values()):,} cells of the file are in this page.")
     else:
         notes.append(
             f"Thinned: {math.prod(shown.values()):,} of the file's {math.prod(excerpt.lengths.values()):,} cells are "
-            "here, whole values of the file's axes, evenly spaced by number, first and last kept; nothing is averaged."
+            "in this page. Of each axis evenly spaced values are kept, with the first and the last. Nothing is averaged."
         )
         for dim, length in shown.items():
             if length < excerpt.lengths[dim]:
@@ -285,7 +285,7 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
                 )
     low, high = decades(excerpt)
     notes.append(
-        "Each cell reaches half way to its neighbours. Displacements are kept in single precision; those beyond "
+        "Each cell is drawn half way to its neighbours. Displacements are kept in single precision; those beyond "
         f"{10.0**low:g} and {10.0**high:g} mm have the colours at the ends of the scale."
     )
     if "motion" in excerpt.sizes and "quantile" in excerpt.sizes:
@@ -295,8 +295,8 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
         )
     if histories is None:
         notes.append(
-            "The page has no time histories: they are of harmonic motion without uncertain inputs, where there is "
-            "room. slipsweep simulate makes one of any case."
+            "The page has no time histories. They need harmonic motion without uncertain inputs, and space in the page. "
+            "slipsweep simulate computes one for any case."
         )
         return notes
     each = " × ".join(f"{len(indices)} {dim}" for dim, indices in histories.keep.items())

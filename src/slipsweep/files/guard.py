@@ -59,7 +59,7 @@ def try_out(read: Trial, path: Path) -> None:
         raise InputError(f"{path}: damaged: reading it does not come to an end")
     if status != _DONE:
         reason = signal.Signals(-status).name if -status in {*signal.Signals} else f"status {status}"
-        raise InputError(f"{path}: damaged: the netCDF library breaks down on it ({reason})")
+        raise InputError(f"{path}: damaged: the netCDF library fails on it ({reason})")
 
 
 def _memory_limit() -> int:

@@ -1,4 +1,4 @@
-"""Rows and columns of the tables that a result is exported as: long ones of a row a cell, or pivoted ones."""
+"""Rows and columns of the tables that a result is exported as: long ones with one row per case, or pivoted ones."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -275,7 +275,7 @@ def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
         )
     for name in INTERFACE_INPUTS:
         if name in parameters:
-            raise InputError(f"{name}: not allowed beside yield_coefficient, which is all of the interface")
+            raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
 
 
 def motion_coordinates(motion: Record | Suite, coords: Mapping[str, Variable]) -> dict[str, Variable]:

@@ -95,11 +95,11 @@ class LimitStatus(IntEnum):
 
 #: One line a status, for people (`slipsweep limit`).
 LIMIT_STATUS_TEXT: dict[LimitStatus, str] = {
-    LimitStatus.REACHED: "the displacement is reached in continuous growth",
-    LimitStatus.AT_MODE_JUMP: "it is passed in the jump where the sliding mode changes",
-    LimitStatus.AT_JUMP: "it is passed in a jump within one sliding mode",
+    LimitStatus.REACHED: "the displacement is reached where it is continuous",
+    LimitStatus.AT_MODE_JUMP: "the displacement is exceeded by the jump where the sliding mode changes",
+    LimitStatus.AT_JUMP: "the displacement is exceeded by a jump within one sliding mode",
     LimitStatus.AFTER_GAP: "just below the limit the model gives no value",
-    LimitStatus.NOT_REACHED: "not reached up to the maximum amplitude, or before the values end (no limit)",
+    LimitStatus.NOT_REACHED: "not reached up to the maximum amplitude, or up to the last amplitude with a value (no limit)",
     LimitStatus.INVALID: "the model gives no value at any amplitude (no limit)",
 }
 
@@ -150,8 +150,8 @@ VALUELESS, CAUTIONS, NOTES = flags_of(FlagKind.NO_VALUE), flags_of(FlagKind.CAUT
 #: A heading for each kind, for people.
 FLAG_KIND_TEXT: dict[FlagKind, str] = {
     FlagKind.NO_VALUE: "the model does not apply",
-    FlagKind.CAUTION: "an assumption behind the value is broken",
-    FlagKind.NOTE: "the value is sound; which rule produced it",
+    FlagKind.CAUTION: "an assumption of the model is violated",
+    FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
 }
 
 #: One line a flag, for people (`slipsweep info`).
@@ -160,14 +160,14 @@ VALIDITY_TEXT: dict[Validity, str] = {
     Validity.UPLIFT: "A tan(theta) >= g: the block loses contact within the cycle",
     Validity.LIMIT_UNDEFINED: "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit",
     Validity.FRICTION_NOT_DECAYING: "calibrated decay rate <= 0 (mu_s xi^2 >= 1)",
-    Validity.YIELD_GOVERNS: "Eq. 4 stays below the yield acceleration: with the monotone rise the block slides as "
-    "Newmark's, and lambda plays no part",
+    Validity.YIELD_GOVERNS: "with the monotone rise the block slides at constant yield acceleration, as "
+    "Newmark's; the result does not depend on lambda",
     Validity.KD_NOT_POSITIVE: "literal rise: Kd <= 0, Eq. 12 cannot stop the block",
     Validity.NOT_RECOUPLED: "does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable",
     Validity.FLEXIBLE_BLOCK: "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold",
     Validity.UPSLOPE: "the permanent displacement is negative: the block ends upslope",
-    Validity.NEAR_MODE_LIMIT: "0.9 <= xi <= 1.1: at xi = 1 the displacement jumps several times over",
-    Validity.FRICTION_ESTIMATED: "lambda by Eq. 6 or delta_mu by Eqs. 10, 11 enters the displacement",
+    Validity.NEAR_MODE_LIMIT: "0.9 <= xi <= 1.1: at xi = 1 the displacement jumps to several times its value",
+    Validity.FRICTION_ESTIMATED: "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11",
 }
 
 #: Dimensions of a result, in order; further ones follow.
@@ -373,7 +373,8 @@ STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
     "bound": {"units": "1", "long_name": "probability below an end of an interval"},
 }
 
-#: Statistics of `sample`; quantiles, mean and probabilities are of the samples that have a value.
+#: Statistics of `sample`.  Quantiles and mean are of the samples that have a value; probabilities also count the
+#: statically unstable samples, as exceeding every threshold.
 STATISTICS: dict[str, dict[str, Any]] = {
     "displacement_quantile": {
         "units": "m",
@@ -448,11 +449,11 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     },
     "held_rate": {
         "units": "year-1",
-        "long_name": "part of it above the largest amplitude, where the probability is held",
+        "long_name": "part of it above the largest amplitude, where the probability is held constant",
     },
     "omitted_rate": {
         "units": "year-1",
-        "long_name": "at most what is left out of it below the smallest amplitude, where the probability is taken as 0",
+        "long_name": "upper bound of the part below the smallest amplitude, where the probability is taken as 0",
     },
     "valueless_share": {"units": "1", "long_name": "largest share of the motions without a value at any amplitude"},
 }

@@ -481,7 +481,8 @@ def sample(
 
         - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and
           `exceedance_probability`, dimension `threshold` (m): P(u > threshold).  They are of the
-          samples that have a value; NaN where none has.
+          samples that have a value; NaN where none has.  Statically unstable samples have no value, and are counted
+          as exceeding every threshold.
         - `mode_share`, dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
           all samples, how many slide in which mode, have which flag, and have no value.  They do not
           depend on the frequency (of a record: the time scale) and have no such dimension (but with

@@ -64,22 +64,22 @@ def findings(
         )
     slips = int(summary["stick_slip_pulses"].item()) + int(summary["continuous_pulses"].item())
     if slips <= 0:
-        said.append("The computed block does not slide: no parameter is determined. Shake harder.")
+        said.append("The computed block does not slide: no parameter is determined. Test with a larger amplitude.")
     elif 1 in lost and 2 in lost:
         said.append(
-            "λ and Δμ are not determined: Eq. 4 stays below the yield value in every cycle, so that friction plays no "
-            "part in the motion. Shake harder, or at a larger inclination."
+            "λ and Δμ are not determined: Eq. 4 gives less than the yield acceleration in every cycle, so that the "
+            "motion does not depend on them. Test with a larger amplitude or inclination."
         )
     elif 0 in lost:
         said.append(
-            "Üy is not determined: Eq. 4 holds the block to the table until the table's acceleration has passed Üy. "
+            "Üy is not determined: by Eq. 4 the block sticks to the table until the table's acceleration has passed Üy. "
             f"Any Üy up to {solution.parameters[0]:.3g} m/s2 gives the same motion; {intervals[0][1]:.3g} m/s2 is the "
             "largest that the data allow. To measure Üy, shake with an amplitude that grows slowly until the block "
             "first slides."
         )
     said += _not_apart(fit, solution, intervals, lost)
     if flags & Validity.NOT_RECOUPLED:
-        said.append("The computed block still slides when the next slide begins (flag not_recoupled).")
+        said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
     if not _moves(fit, 0):
         said += _drifting(fit, solution, drifting)
     return [*_misfit(fit, solution, drifting), *said]
@@ -103,8 +103,8 @@ def _misfit(fit: Fit, solution: Solution, drifting: Sequence[str]) -> list[str]:
     if worse := misfits(fit, solution):
         said.append(
             "The misfit is larger than the noise of the sensors: "
-            f"{', '.join(f'{name} {times:.2g} times' for name, times in worse.items())}. The block did not move as the "
-            "model has it, or a sensor drifts: look at the figure (-o FIGURE.png) before the results are used."
+            f"{', '.join(f'{name} {times:.2g} times' for name, times in worse.items())}. The block did not move as "
+            "in the model, or a sensor drifts: check the figure (-o FIGURE.png) before you use the results."
         )
         said += [
             f"With a drift of {name} taken out, the misfit is that of the sensors' noise: give drift = {name!r}."
@@ -146,7 +146,7 @@ def _not_apart(fit: Fit, solution: Solution, intervals: Floats, lost: Sequence[i
         vague = max(errors[at] / max(abs(parameters[at]), 1e-12) for at in (i, j)) > _LOOSE
         if abs(correlation) >= _ONE_AND_THE_SAME or (abs(correlation) >= _CORRELATED and vague):
             one, other = SYMBOL[SOUGHT[i]], SYMBOL[SOUGHT[j]]
-            text = f"{one} and {other} cannot be told apart by this test: their correlation is {correlation:.3f}."
+            text = f"{one} and {other} cannot be separated by this test: their correlation is {correlation:.3f}."
             if (i, j) == (1, 2):
                 known = _at_the_peak(fit, solution)
                 text += f" What is known is the friction at the peak of the table's acceleration, {known}."
@@ -195,8 +195,8 @@ def _remedy(fit: Fit, solution: Solution, places: Sequence[int]) -> str:
             best, name = errors, channel
     if not name:
         return (
-            "No other measurement of this motion would tell; a test in which the amplitude grows slowly, or tests at "
-            "several amplitudes, would."
+            "No other sensor would improve this. A test in which the amplitude grows slowly, or tests at several "
+            "amplitudes, would."
         )
     become = " and ".join(
         f"of {SYMBOL[SOUGHT[at]]} from {before:.2g} to {after:.2g}"
@@ -230,7 +230,7 @@ def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
         most = float(np.nanmax(np.abs(fit.test.channels[name])))
         if abs(slope) > _DRIFTS * error and abs(slope) * span > _TELLS * most:
             said.append(
-                f"What is measured less computed of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a second: if "
+                f"The difference measured - computed of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a second: if "
                 f"its sensor drifts, give drift = {name!r}."
             )
         elif (
@@ -239,7 +239,7 @@ def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
             and f"offset of {name}" not in lines
         ):
             said.append(
-                f"What is measured less computed of {name} is {float(np.mean(rest[use])):.3g} {HISTORY[name]['units']} "
+                f"The difference measured - computed of {name} is {float(np.mean(rest[use])):.3g} {HISTORY[name]['units']} "
                 f"on average: if its sensor has an offset, give offset = {name!r}."
             )
     at_rest = not (_moves(fit, 0) or _moves(fit, -1))  # a cycle cut in two has an average of its own

@@ -194,7 +194,7 @@ def hazard_table(table: Table, curve: HazardCurve, *, thresholds: Any, over: Any
     if displacement is not None and displacement.sizes.get("amplitude", 1) < 2:
         raise InputError(
             "result: amplitude: must be a dimension of two peak ground accelerations or more: the probability of "
-            "exceedance is wanted at each"
+            "exceedance is needed at each"
         )
     statistics = suite_table(table, thresholds=thresholds, quantiles=0.5, zero=0.0, over=over)
     probability, valueless = statistics["exceedance_probability"], statistics["valueless_share"]

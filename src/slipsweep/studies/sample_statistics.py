@@ -97,13 +97,15 @@ class SampleStatistics:
                         found["mode_share"][row] = np.bincount(modes[row] + 1, minlength=4)[1:] / samples
                     found["flag_share"][row] = np.bincount(flags[row], minlength=codes) @ bits / samples
                     found["valueless_share"][row] = (samples - count) / samples
-                    if not count:
-                        continue
                     there, square = values[:count], squares[row][:, None]
-                    found["displacement_quantile"][row] = _quantiles(there, quantiles) / square
-                    found["mean_displacement"][row] = there.mean() / squares[row]
-                    above = count - np.searchsorted(there, thresholds * square, side="right")
-                    found["exceedance_probability"][row] = above / count
+                    # these slide without any shaking: their displacement has no value and exceeds every threshold
+                    unstable = np.count_nonzero(flags[row] & Validity.STATICALLY_UNSTABLE)
+                    if count + unstable:
+                        above = count - np.searchsorted(there, thresholds * square, side="right")
+                        found["exceedance_probability"][row] = (above + unstable) / (count + unstable)
+                    if count:
+                        found["displacement_quantile"][row] = _quantiles(there, quantiles) / square
+                        found["mean_displacement"][row] = there.mean() / squares[row]
 
         # sorting and counting take about an eighth of what solving takes
         threads.spread(rows, work, max(samples // 8, 1))

@@ -149,12 +149,12 @@ class Sampling:
         for name, one in self.distributions.items():
             if one.kind == "absolute" and name in given:
                 raise InputError(
-                    f'{self.key(name)}: is drawn, but {name} is given as well: take it away, or give kind = "factor" '
+                    f'{self.key(name)}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
                     'or "offset" to draw about what is given'
                 )
             estimated = name in ESTIMATED and (one.kind == "factor" or name == "yield_acceleration")
             if one.kind != "absolute" and name not in given and not estimated:
-                raise InputError(f'{self.key(name)}: kind = "{one.kind}" wants {name} given, which it is relative to')
+                raise InputError(f'{self.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
 
     @property
     def attributes(self) -> dict[str, Any]:

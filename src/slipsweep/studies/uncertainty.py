@@ -105,7 +105,7 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     """
     names = [name for name in PARAMETERS if given.get(name) is not None]
     if "structure_frequency" in names:
-        raise InputError("structure_frequency: not allowed with uncertain inputs: it flags cells, and moves none")
+        raise InputError("structure_frequency: not allowed with uncertain inputs: it sets a flag only, and does not change the displacement")
     recorded = isinstance(given.get("excitation"), (Record, Suite))
     _check_drawn(sampling, names, recorded, MODELS.of(given.get("model", "mendez")))
     sampling.check_given(names)
@@ -150,7 +150,7 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], recorded: bool, model
             raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
         if friction_law and recorded and one.kind != "absolute" and name not in given:
             raise InputError(
-                f'{sampling.key(name)}: kind = "{one.kind}" wants {name} given: under a record each pulse has an '
+                f'{sampling.key(name)}: kind = "{one.kind}" needs {name} given: under a record each pulse has an '
                 "estimate of its own"
             )
 
