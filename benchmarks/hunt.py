@@ -1,6 +1,6 @@
 """Odd and damaged input tried out: ``python -m benchmarks.hunt`` writes hunt.md.
 
-Draws input of all kinds that tests/support/hunt.py knows and counts how it ends: served, or refused with one clear
+Draws input of all kinds that tests/support/hunt.py knows and counts how it ends: accepted, or refused with one clear
 message.  ``.ci/include-report`` puts the table into docs/files.md.  Nothing is timed; it ends with an error where
 an input ends otherwise.
 """
@@ -25,7 +25,7 @@ BATCH = 500
 #: Seconds after which an input is taken to have no end.
 LONGEST = 300
 
-HEADER = ["input", "tried", "passed", "served", "refused"]
+HEADER = ["input", "tried", "passed", "accepted", "refused"]
 
 
 class Endings:
@@ -41,7 +41,7 @@ class Endings:
         part = f"{self.name} {kind.part(value)}" if kind.part else self.name
         faulthandler.dump_traceback_later(LONGEST, exit=True)
         try:
-            ended = "served" if kind.trial(sources, value) else "refused"
+            ended = "accepted" if kind.trial(sources, value) else "refused"
         except HypothesisException:  # not one to be tried
             raise
         except Exception as error:
@@ -57,8 +57,8 @@ class Endings:
         """A line a part."""
         rows: list[list[object]] = []
         for part, ended in sorted(self.counts.items()):
-            passed = ended["served"] + ended["refused"]
-            rows.append([part, ended.total(), passed, ended["served"], ended["refused"]])
+            passed = ended["accepted"] + ended["refused"]
+            rows.append([part, ended.total(), passed, ended["accepted"], ended["refused"]])
         return rows
 
 
@@ -107,7 +107,7 @@ def main() -> None:
     )
     since = table(["input", "what was wrong"], [[found.kind.removesuffix(" of"), found.wrong] for found in FOUND])
     since = since.replace("---:", "---")
-    text = f"{head}\n\n{counted}\nFound by such runs, mended, and tried again by the tests:\n\n{since}"
+    text = f"{head}\n\n{counted}\nFound by such runs, corrected, and tried again by the tests:\n\n{since}"
     (wanted.folder / "hunt.md").write_text(text, encoding="utf-8")
     if faults:
         raise SystemExit(f"{faults} faults")
