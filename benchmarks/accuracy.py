@@ -90,7 +90,7 @@ def main() -> None:
     choices = (RESULTS / "model_choices.md").read_text().split("\n", 2)[2]
     (DOCS / "accuracy.md").write_text(f"""# Accuracy
 
-Which solver, how many steps, and where the digits end. {measured_on()}
+This page compares errors of the solvers, numbers of steps, and the limits of double precision. {measured_on()}
 Every number and figure here is written by `python -m benchmarks.accuracy` from the results of
 `python -m benchmarks.speed_vs_error` and `python -m benchmarks.model_choices`. Errors are relative
 errors of the permanent displacement against solutions of 30 digits (tests/support/reference.py), over a fixed
@@ -101,8 +101,8 @@ plane.
 ## The cycle solver (default)
 
 {cycle_errors(found)}
-It takes no steps, so that there is nothing to choose. The worst of the hard cells are those nearest to
-yield, where the rounding of the inputs alone does as much (below).
+It takes no steps, so that there is no number of steps to choose. The largest errors are in cells nearest to
+yield. There the rounding of the inputs alone has the same effect (below).
 
 ## The step solver
 
@@ -121,25 +121,26 @@ the events, is in [speed_vs_error.md](../benchmarks/results/speed_vs_error.md).
 
 ## Where double precision ends
 
-Just above yield the displacement goes with (A − Üy)², so that a last digit of A, of μs or of θ moves
-it by twice that digit over A/Üy − 1. "One ulp" is how far the exact displacement moves, relatively, when each of the
-three is moved by its last digit, added up; no solver that is given doubles can promise less.
-Every other hard place, with the conditioning there and the errors of each solver in units of it, is in
-[hard-cases.md](hard-cases.md).
+Just above yield the displacement grows as (A − Üy)²: a change of A, of μs or of θ by its last digit changes
+it by twice that digit over A/Üy − 1. "One ulp" is the sum of the relative changes of the exact displacement when each
+of the three changes by its last digit. No solver with inputs in double precision can guarantee a smaller error.
+[hard-cases.md](hard-cases.md) has all other cases, with their conditioning and the errors of each solver in units
+of it.
 
 {near_yield()}
-## The model's own choices
+## Options of the model
 
-These differences are physics, not numerics: the paper leaves room, and the options say how it is filled.
+These differences are not numerical errors: the paper does not specify these rules, and options select an
+interpretation.
 
 {choices}
 ![Displacement under each choice over the default's](../benchmarks/results/model_choices.png)
 
-The literal rise lets the block's acceleration fall below the yield value, so that just above yield it
-multiplies the displacement without bound, and some cells have no value at all. Recoupling by
-integration rather than by Eq. 12 stops the block sooner after the plane's acceleration has reversed,
-which matters where it would otherwise carry its velocity into the next pulse. Newmark's block stays
-near the default where the yield value governs and parts from it, either way, where Eq. 4 does.
+With the literal rise the block's acceleration may be below the yield acceleration. Just above yield the displacement
+then grows without bound, and some cells have no value. With re-sticking by integration instead of Eq. 12 the
+block stops sooner after the base's acceleration has become negative. This has a large effect where the block would
+otherwise still slide when the next pulse begins. Newmark's block has nearly the default's displacement where the yield
+acceleration governs, and a smaller or larger one where Eq. 4 governs.
 """)
 
 

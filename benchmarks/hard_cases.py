@@ -95,40 +95,40 @@ def main() -> None:
         answers[f"{rule}, {steps}"] = solve(cases, solver="step", rule=rule, steps_per_cycle=steps)
     (DOCS / "hard-cases.md").write_text(f"""# Hard cases
 
-Where the model is hardest to solve, and how the solvers fare there. Written by
-`python -m benchmarks.hard_cases`; the cells are made in tests/support/hard_cells.py, and stand with their
-answers in tests/data/hard_cases.csv ({len(cases)} cells). tests/kernels/test_hard_cases.py holds the solvers to
-what is said here.
+Cases with the largest effects of rounding, and the errors of the solvers in them. Written by
+`python -m benchmarks.hard_cases`; the cells are defined in tests/support/hard_cells.py, and are stored with their
+solutions in tests/data/hard_cases.csv ({len(cases)} cells). tests/kernels/test_hard_cases.py tests the
+solvers against this page.
 
 ## What could go wrong
 
 {dangers()}
 ## Errors in units of the conditioning
 
-*Conditioning* is how far the exact displacement moves, relatively, when one of the doubles given (θ, μs, A,
-f, g, and Üy, λ, Δμ where given) moves by one ulp, the greatest of all such moves, plus half an ulp of the
+*Conditioning* is the largest relative change of the exact displacement when one of the inputs (θ, μs, A,
+f, g, and Üy, λ, Δμ where given) changes by one ulp, plus half an ulp of the
 displacement itself. It is computed, not estimated: every neighbour of every cell is solved in multiple
-precision (tests/support/reference.py). The column gives the least and the greatest over the cells of a category
-that move. A solver that is given doubles cannot promise an error below 1 in these units.
+precision (tests/support/reference.py). The column has the smallest and the largest of the cells of a category
+that slide. A solver with inputs in double precision cannot guarantee an error below 1 in these units.
 
-Errors of the permanent displacement are over that bound, cell by cell: median, then worst. For the step
-solver the heading names the rule and the steps a cycle; its errors fall with the step, to where rounding
-ends them.
+Errors of the permanent displacement are divided by that bound, cell by cell: median, then largest. For the step
+solver the heading has the rule and the steps per cycle; its errors decrease with the step, until rounding
+dominates.
 
 {errors_table(cases, answers)}
-The cycle solver is held to 100 everywhere, its peak velocity likewise. Where one ulp of an input
+The errors of the cycle solver must be at most 100 everywhere, also for the peak velocity. Where one ulp of an input
 changes the sliding mode or a flag, a solver may give that of either side (column `outcomes` of the data
 file); a neighbour without a value is left out of the bound.
 
-The step solver is held to first order at least (sixteen times the steps, from 1024 on, a twelfth of the
-error) until it is within 100, everywhere. Three things are done for that in kernels/step/, because steps of
-one length do not converge where the motion has a shorter one of its own. A slide that lasts less than a
+The step solver must converge at first order at least, everywhere (sixteen times the steps, from 1024 on, a twelfth of
+the error), until its error is at most 100. Steps of equal length do not converge where the motion changes within a
+shorter time. kernels/step/ therefore has three rules. A slide that lasts less than a
 few steps (just above yield, or where Eq. 4 touches Üg between two nodes) is found where D = Üg − Ü has its
 maximum and gets steps of its own, which grow with the time since its onset. A layer of friction thinner than
 steps (λA/g above some 400) is cut out of the step and covered by 1/64 of the steps a cycle on each side of Üg = 0.
-And where the two halves of a cycle mirror each other, V over many cycles is the integral of the part of D
-that both share: summed up with the other part, which cancels, it carries rounding of 1e-14 a cycle, on a plane
-nearly level more than itself.
+Where the two halves of a cycle are mirror images, V over many cycles is the integral of the part of D
+that both have in common. A sum with the other part, which cancels, would have a rounding error of 1e-14 per cycle; on a
+nearly level base this is more than the sum itself.
 """)
 
 

@@ -80,10 +80,10 @@ def main() -> None:
     (given.folder / "model_choices.md").write_text(
         f"# Choices of the model\n\nPermanent displacement over that of the default (monotone rise, Eq. 12), over "
         f"{base.size:,} cells of the design chart, ten cycles. Written by `python -m benchmarks.model_choices`.\n\n"
-        f"{table(header, rows)}\nIn {governed.sum() / slides.sum():.0%} of the stick–slip cells Eq. 4 stays below the "
-        f"yield value over the whole rise: there nine in ten of Newmark's blocks move "
+        f"{table(header, rows)}\nIn {governed.sum() / slides.sum():.0%} of the stick–slip cells Eq. 4 is below the "
+        f"yield acceleration over the whole rise: there 90 % of Newmark's blocks move "
         f"{spread(newmark, governed, 5)}, elsewhere {spread(newmark, slides & ~governed, 5)}. "
-        f"{carried.sum() / slides.sum():.1%} still slide when the next pulse begins: recoupling by integration moves "
+        f"{carried.sum() / slides.sum():.1%} do not re-stick before the next pulse: recoupling by integration moves "
         f"them {spread(integrated, carried, 0)}, the others "
         f"{spread(integrated, slides & ~carried, 0)}.\n"
     )

@@ -72,7 +72,7 @@ def cycle_solver(tiny: bool) -> str:
     return (
         "## The cycle solver\n\n"
         + table(["cells", "number", "ns a cell and core", "median error", "worst error"], rows)
-        + f"\nTen cycles, displacement only; of three calls in turn the best, of nine turns the median. "
+        + f"\nTen cycles, displacement only; median over nine rounds of the best of three calls. "
         f"Of the design chart {shares.replace('_', '–')}. Errors are relative, "
         f"against 30 digits, over {sample.SIZE} random cells a regime (benchmarks/data/sample.csv).\n"
     )

@@ -55,7 +55,7 @@ def main() -> None:
     header = ["grid", "cells", f"`{BASE}`, ms", *(f"`{name}` adds" for name in ADDED)]
     text = (
         f"{table(header, rows)}\nMilliseconds of processor, all cores together: the displacement alone, and what one "
-        "more result adds. Ten cycles of a sine; of three calls in turn the best, of 25 turns the median. "
+        "more result adds. Ten cycles of a sine; median over 25 rounds of the best of three calls. "
         f"{measured_on()} Written by `python -m benchmarks.variables`.\n"
     )
     print(text)

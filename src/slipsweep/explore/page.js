@@ -292,7 +292,7 @@
     const moved = clicked ? `The cell that was clicked (${described(map, clicked)}) has none; this is the nearest that has one. ` : "";
     note.textContent = `${moved}${described(map, chosen)}: the first ${store.cycles} of ${store.of} cycles.`;
     element("history-summary").textContent =
-      `Acceleration of plane and block, velocity and displacement of the block relative to the plane. Largest velocity ${digits(Math.max(...data.v))} m/s; displacement at the end ${lengthText(data.u[n - 1] / 1000)}.`;
+      `Acceleration of base and block, velocity and displacement of the block relative to the base. Largest velocity ${digits(Math.max(...data.v))} m/s; displacement at the end ${lengthText(data.u[n - 1] / 1000)}.`;
     return note.textContent;
   }
 
