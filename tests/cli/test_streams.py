@@ -149,7 +149,7 @@ def test_a_sweep_from_standard_input(made: Path, tmp_path: Path, source: str) ->
     # it has no name that one could make another of
     done = shell(tmp_path, f"{before}$S run {source}")
     assert done.returncode == 2
-    assert b"give the output's with -o or output.path" in done.stderr
+    assert b"name the output with -o or output.path" in done.stderr
     (tmp_path / "a.toml").write_text(CELL + '[output]\npath = "own.nc"\n')
     assert shell(tmp_path, f"{before}$S run {source} --quiet").returncode == 0
     assert {*os.listdir(tmp_path)} == {"a.toml", "a.nc", "limit.nc", "own.nc"}

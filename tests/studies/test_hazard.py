@@ -191,7 +191,7 @@ def test_the_command(tmp_path: Path) -> None:
         (("-d", "5 s"), '--displacement = "5 s": must be a number'),
         (("-d", "-1"), "--displacement = -1: must be"),
         (("-o", "h.csv"), "h.csv: the name must end in one of .png, .svg, .pdf"),
-        (("-o", "h.png", "-d", "8"), "no displacement that is no motion exceeds any"),
+        (("-o", "h.png", "-d", "8"), "no motion exceeds any of the given displacements"),
     ],
 )
 def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], message: str) -> None:

@@ -305,7 +305,9 @@ class Result:
         cuts = self.places(at)
         for dim, places in cuts.items():
             if len(places) > 1:
-                raise InputError(f"{self.path}: {dim} = {at[dim]}: several values are allowed for curves or panels only")
+                raise InputError(
+                    f"{self.path}: {dim} = {at[dim]}: several values are allowed for curves or panels only"
+                )
         for dim, values in self.axes.items():
             # of the polarities the record as it is
             middle = 0 if dim in NAMED else values.size - 1 if dim == "polarity" else (values.size - 1) // 2

@@ -59,9 +59,7 @@ Shared = Annotated[
 ]
 Memory = Annotated[
     str | None,
-    typer.Option(
-        metavar="SIZE", help="Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", rich_help_panel=LARGE
-    ),
+    typer.Option(metavar="SIZE", help="Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", rich_help_panel=LARGE),
 ]
 Workers = Annotated[
     int | None,
@@ -242,7 +240,9 @@ class Chunks:
         if self.shared and self.scheduler is None:
             raise InputError("--shared: is for the workers of --scheduler only")
         if self.resume and self.overwrite:
-            raise InputError("--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one")
+            raise InputError(
+                "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
+            )
 
     def given(self) -> list[str]:
         """Options that only make sense with an output in chunks."""

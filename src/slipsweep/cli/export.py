@@ -62,7 +62,7 @@ def export(
 ) -> None:
     """Write a result as a table: CSV, Parquet or .xlsx.
 
-    One row per case, coordinates as columns, units in the header; or with --columns a table of one result over two axes.
+    One row per case, coordinates as columns, units in the header; with --columns a table of one result over two axes.
     """
     from slipsweep.files import export as tables
     from slipsweep.grid.resources import size_text

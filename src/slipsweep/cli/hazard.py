@@ -103,7 +103,10 @@ def _summarize(rates: "Table", g: float) -> None:
     for text, name in (("amplitudes of the result", "amplitude_range"), ("hazard curve", "hazard_curve_range")):
         low, high = attrs[name]
         typer.echo(f"{text:<25}{low:.6g} to {high:.6g} m/s2 ({low / g:.4g} to {high / g:.4g} g)")
-    typer.echo("above these amplitudes P is held constant; below them it is taken as 0; below the hazard curve no rate is counted")
+    typer.echo(
+        "above these amplitudes P is held constant; below them it is taken as 0; "
+        "below the hazard curve no rate is counted"
+    )
     thresholds = rates["threshold"].values
     columns = [rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate", "omitted_rate")]
     shares = rates["valueless_share"].values.reshape(-1)

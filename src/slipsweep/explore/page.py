@@ -274,7 +274,7 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
     else:
         notes.append(
             f"Thinned: {math.prod(shown.values()):,} of the file's {math.prod(excerpt.lengths.values()):,} cells are "
-            "in this page. Of each axis evenly spaced values are kept, with the first and the last. Nothing is averaged."
+            "in this page. Of each axis evenly spaced values are kept, with the first and last. Nothing is averaged."
         )
         for dim, length in shown.items():
             if length < excerpt.lengths[dim]:
@@ -295,8 +295,8 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
         )
     if histories is None:
         notes.append(
-            "The page has no time histories. They need harmonic motion without uncertain inputs, and space in the page. "
-            "slipsweep simulate computes one for any case."
+            "The page has no time histories. They need harmonic motion without uncertain inputs, and space in the "
+            "page. slipsweep simulate computes one for any case."
         )
         return notes
     each = " × ".join(f"{len(indices)} {dim}" for dim, indices in histories.keep.items())

@@ -99,7 +99,7 @@ LIMIT_STATUS_TEXT: dict[LimitStatus, str] = {
     LimitStatus.AT_MODE_JUMP: "the displacement is exceeded by the jump where the sliding mode changes",
     LimitStatus.AT_JUMP: "the displacement is exceeded by a jump within one sliding mode",
     LimitStatus.AFTER_GAP: "just below the limit the model gives no value",
-    LimitStatus.NOT_REACHED: "not reached up to the maximum amplitude, or up to the last amplitude with a value (no limit)",
+    LimitStatus.NOT_REACHED: "not reached up to the maximum amplitude, or the last one with a value (no limit)",
     LimitStatus.INVALID: "the model gives no value at any amplitude (no limit)",
 }
 

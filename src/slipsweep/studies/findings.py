@@ -72,7 +72,8 @@ def findings(
         )
     elif 0 in lost:
         said.append(
-            "Üy is not determined: by Eq. 4 the block sticks to the table until the table's acceleration has passed Üy. "
+            "Üy is not determined: by Eq. 4 the block sticks to the table until the table's acceleration has "
+            "passed Üy. "
             f"Any Üy up to {solution.parameters[0]:.3g} m/s2 gives the same motion; {intervals[0][1]:.3g} m/s2 is the "
             "largest that the data allow. To measure Üy, shake with an amplitude that grows slowly until the block "
             "first slides."
@@ -230,7 +231,7 @@ def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
         most = float(np.nanmax(np.abs(fit.test.channels[name])))
         if abs(slope) > _DRIFTS * error and abs(slope) * span > _TELLS * most:
             said.append(
-                f"The difference measured - computed of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a second: if "
+                f"The residual (measured - computed) of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a second: if "
                 f"its sensor drifts, give drift = {name!r}."
             )
         elif (
@@ -239,7 +240,7 @@ def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
             and f"offset of {name}" not in lines
         ):
             said.append(
-                f"The difference measured - computed of {name} is {float(np.mean(rest[use])):.3g} {HISTORY[name]['units']} "
+                f"The residual (measured - computed) of {name} is {float(np.mean(rest[use])):.3g} {HISTORY[name]['units']} "
                 f"on average: if its sensor has an offset, give offset = {name!r}."
             )
     at_rest = not (_moves(fit, 0) or _moves(fit, -1))  # a cycle cut in two has an average of its own

@@ -105,7 +105,9 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     """
     names = [name for name in PARAMETERS if given.get(name) is not None]
     if "structure_frequency" in names:
-        raise InputError("structure_frequency: not allowed with uncertain inputs: it sets a flag only, and does not change the displacement")
+        raise InputError(
+            "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
+        )
     recorded = isinstance(given.get("excitation"), (Record, Suite))
     _check_drawn(sampling, names, recorded, MODELS.of(given.get("model", "mendez")))
     sampling.check_given(names)
