@@ -1,4 +1,4 @@
-"""Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters.
+"""Permanent displacement of a rigid block on a shaken inclined base, over grids of parameters.
 
 `sweep` solves a grid, `limit_amplitude` is its inverse, `sample` gives the statistics of one whose
 inputs are uncertain, `friction_parameters` gives the paper's Eqs. 7-11, `simulate` one time history,

@@ -84,7 +84,7 @@ class SlipsweepAccessor:
             Where to cut an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
             by default its middle.  Several values choose the curves or panels of an axis, or the motions of a suite.
         x, y : str, optional
-            Axis to draw over, or an intensity measure; upright axis of a map, or the axis that tells curves apart.
+            Axis to draw over, or an intensity measure; vertical axis of a map, or the curve parameter.
         panels : sequence of str
             One or two axes to draw panels over, across and down.
         variable : str

@@ -42,7 +42,7 @@ class Wish:
     Attributes
     ----------
     x, y : str, optional
-        Axis to draw over; upright axis of a map, or the axis that tells curves apart.
+        Axis to draw over; vertical axis of a map, or the curve parameter.
     at : mapping of axis name to value
         Where to cut other axes; several values choose curves or panels.
     variable : str

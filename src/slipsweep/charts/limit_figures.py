@@ -45,7 +45,7 @@ def limit_chart(table: Table, axes: Axes | None = None) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Curves end where no limit exists; grey disks mark limits in a jump or behind a gap.
+        Curves end where no limit exists; grey disks mark limits set by a discontinuity of the model.
     """
     labels: Sequence[str] = table.attrs.get("labels", {}).get("case", ())
     limits = table["limit_amplitude"]

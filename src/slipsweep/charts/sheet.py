@@ -74,7 +74,7 @@ class Panel:
     axes : Axes
     table : Table
     x, y : str
-        The axes of a map; of curves `y` is the axis that tells them apart, or None.
+        The axes of a map; of curves `y` is the curve parameter, or None.
     look : Look
     """
 

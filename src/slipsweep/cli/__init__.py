@@ -57,7 +57,7 @@ def _options(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Permanent displacement of a rigid block on a shaken inclined plane, over grids of parameters."""
+    """Permanent displacement of a rigid block on a shaken inclined base, over grids of parameters."""
 
 
 #: Commands by task: what they are called with, and their examples.

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 FIGURES = (".png", ".svg", ".pdf")
 
 Theta = Annotated[
-    str, typer.Option(metavar="VALUE", help="Plane inclination: 5 (degrees), 0.1rad.", rich_help_panel=BLOCK)
+    str, typer.Option(metavar="VALUE", help="Inclination of the base: 5 (degrees), 0.1rad.", rich_help_panel=BLOCK)
 ]
 MuS = Annotated[float, typer.Option(help="Static friction coefficient.", rich_help_panel=BLOCK)]
 #: Groups of options that several commands have.

@@ -81,7 +81,7 @@ def limit(
 ) -> None:
     """Find the limiting PGA for a tolerable displacement.
 
-    Over all other axes of a sweep; solved anew to rounding, not interpolated from the result.
+    Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
     chunks = Chunks(overwrite, resume, split, memory, workers, scheduler, shared)
     results: list[Place] = []

@@ -47,7 +47,7 @@ def run(
     solver: Annotated[
         Literal["auto", "step", "cycle"] | None,
         typer.Option(
-            help="Solver, in place of solver.method.",
+            help="Solver, instead of solver.method.",
             rich_help_panel="Solver",
         ),
     ] = None,

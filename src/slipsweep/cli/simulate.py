@@ -53,7 +53,7 @@ def simulate(
         str | None,
         typer.Option(
             metavar="VALUE",
-            help="Plane inclination: 5 (degrees), 0.1rad.",
+            help="Inclination of the base: 5 (degrees), 0.1rad.",
             rich_help_panel=BLOCK,
         ),
     ] = None,
@@ -67,7 +67,7 @@ def simulate(
     yield_coefficient: Annotated[
         float | None,
         typer.Option(
-            help="Üy/g of Newmark's block, in place of --theta and --mu-s.",
+            help="Üy/g of Newmark's block, instead of --theta and --mu-s.",
             rich_help_panel=RARE,
         ),
     ] = None,

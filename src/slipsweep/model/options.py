@@ -49,7 +49,9 @@ class Mendez(Choice):
 
     name: ClassVar[str] = "mendez"
     rise: Literal["monotone", "literal"] = option("rise of the block's acceleration", "monotone")
-    recoupling: Literal["eq12", "integrate"] = option("how sliding ends after the plane has reversed", "eq12")
+    recoupling: Literal["eq12", "integrate"] = option(
+        "rule by which the block re-sticks after the base has reversed", "eq12"
+    )
     g: float = option("gravity, m/s²", 9.81)
 
 

@@ -1,6 +1,6 @@
 """Intensity measures of a recorded motion, by the definitions of the literature.
 
-The acceleration is straight between its samples, and v = d = 0 at the first one: velocity is then a parabola on
+Acceleration is interpolated linearly between samples, and v = d = 0 at the first one: velocity is then a parabola on
 each interval and displacement a cubic, and every integral and extreme below is theirs, exact to rounding, at any
 sampling, even or not.  (The mean period alone is defined by a discrete Fourier transform.)  Nothing is taken off the
 acceleration but what `baseline` took off when it was read: where it leaves a drift, the peak ground velocity and

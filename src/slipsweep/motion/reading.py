@@ -12,8 +12,8 @@ class Reading(Choice):
 
     name: ClassVar[str] = "reading"
     units: Literal["m/s2", "g", "cm/s2", "gal"] | None = option(
-        "unit of the file's accelerations, where it does not name it", None
+        "unit of the file's accelerations, if it does not name it", None
     )
-    baseline: Literal["none", "mean", "linear"] = option("what is taken off the accelerations", "none")
+    baseline: Literal["none", "mean", "linear"] = option("what is subtracted from the accelerations", "none")
     format: Literal["auto", "csv", "at2", "esm", "cosmos"] = option("format of the file", "auto")
     channel: int | None = option("channel of acceleration in a COSMOS file that holds several, from 1", None, least=1)

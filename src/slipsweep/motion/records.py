@@ -48,7 +48,7 @@ _COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A recorded acceleration, taken as straight between its samples.
+    """A recorded acceleration, interpolated linearly between samples.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def read_record(
         Unit of the file's accelerations.  Needed for CSV unless its header names one; a unit
         that contradicts the file's own is refused.  "g" is standard gravity, 9.80665 m/s².
     baseline : {"none", "mean", "linear"}
-        What is taken off the accelerations.
+        What is subtracted from the accelerations.
     format : {"auto", "csv", "at2", "esm", "cosmos"}
         "auto" looks into the file; "cosmos" is the format of [1]_.
     channel : int, optional

@@ -129,7 +129,7 @@ class Suite:
     motions : tuple of Record or of Pair
         Of any length and sampling.  A suite of pairs wants an `azimuth`.
     labels : tuple of str
-        What tells them apart in results, each another; by default the stems of the records' names.
+        Labels in results, all different; by default the stems of the records' names.
     name : str
         What the suite is called in results.
 

@@ -47,7 +47,7 @@ class Waveform(Choice):
 
     cycles: int = option("cycles of shaking", 10, least=1, most=MOST_CYCLES)
     ramp_in: float = option("cycles over which the shaking grows", 0.0, least=0.0, most=MOST_RAMP)
-    ramp_out: float = option("cycles over which the shaking fades", 0.0, least=0.0, most=MOST_RAMP)
+    ramp_out: float = option("cycles over which the shaking decreases", 0.0, least=0.0, most=MOST_RAMP)
 
     def check(self) -> None:
         """Refuse ramps longer than the shaking."""

@@ -92,8 +92,8 @@ def sweep(
     time_scale : float, array or DataArray
         With a record: factor on its time, > 0; 2 makes it last twice as long.
     polarity : {1, -1}, list of these, or "both"
-        With a record: 1 takes its positive accelerations for those that move the block downslope, -1
-        its negative ones.
+        With a record: 1, positive recorded acceleration drives the block downslope; -1, negative
+        recorded acceleration does.
     azimuth : float, array or DataArray
         With a suite of pairs of components, of which it is needed: the direction of sliding, degrees from the first
         component towards the second, 0 to 360.
@@ -370,7 +370,7 @@ def limit_amplitude(
           itself between neighbouring numbers, with and without a change of sliding mode),
           3 after_gap (no value just below), 4 not_reached, 5 invalid (no value anywhere).
         - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
-          limit; more than `displacement` where it is passed in a jump or after a gap.
+          limit; more than `displacement` where a discontinuity of the model sets the limit.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
 
     Raises

@@ -231,8 +231,8 @@ def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
         most = float(np.nanmax(np.abs(fit.test.channels[name])))
         if abs(slope) > _DRIFTS * error and abs(slope) * span > _TELLS * most:
             said.append(
-                f"The residual (measured - computed) of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a second: if "
-                f"its sensor drifts, give drift = {name!r}."
+                f"The residual (measured - computed) of {name} drifts by {slope:.3g} {HISTORY[name]['units']} a "
+                f"second: if its sensor drifts, give drift = {name!r}."
             )
         elif (
             abs(float(np.mean(rest[use]))) > _DRIFTS * spread / math.sqrt(use.sum())
@@ -240,8 +240,8 @@ def _drifting(fit: Fit, solution: Solution, told: Sequence[str]) -> list[str]:
             and f"offset of {name}" not in lines
         ):
             said.append(
-                f"The residual (measured - computed) of {name} is {float(np.mean(rest[use])):.3g} {HISTORY[name]['units']} "
-                f"on average: if its sensor has an offset, give offset = {name!r}."
+                f"The residual (measured - computed) of {name} is {float(np.mean(rest[use])):.3g} "
+                f"{HISTORY[name]['units']} on average: if its sensor has an offset, give offset = {name!r}."
             )
     at_rest = not (_moves(fit, 0) or _moves(fit, -1))  # a cycle cut in two has an average of its own
     if at_rest and not fit.table_lines and abs(float(np.mean(table))) > 0.02 * float(np.abs(table).max()):

@@ -92,7 +92,7 @@ class HazardCurve:
             object.__setattr__(self, name, values)
 
     def rate_at(self, amplitude: Floats) -> Floats:
-        """The rate within the curve, straight between its points in logarithms of both."""
+        """The rate within the curve, linear between its points in logarithms of both."""
         return np.asarray(np.exp(np.interp(np.log(amplitude), np.log(self.amplitude), np.log(self.rate))))
 
 
@@ -130,7 +130,7 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> Ra
         Peak ground accelerations, m/s², > 0, strictly increasing, two at least.
     probability : array or callable
         Probability of exceedance at each, along the first dimension, or what gives it of an array of amplitudes.  It is
-        taken as straight in the logarithm of the amplitude between them.
+        interpolated linearly in the logarithm of the amplitude between them.
 
     Returns
     -------

@@ -49,7 +49,7 @@ class TableMotion:
     Attributes
     ----------
     times : ndarray
-        Where `acceleration` and `shapes` are given, s; the motion is straight between.
+        Where `acceleration` and `shapes` are given, s; the motion is linear between them.
     acceleration : ndarray
         m/s².
     shapes : ndarray
