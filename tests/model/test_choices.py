@@ -334,7 +334,7 @@ def test_a_new_option_is_an_edit_of_one_line_in_python(edited: Path) -> None:
 
 
 def test_a_new_option_is_in_the_help_of_commands(edited: Path) -> None:
-    shown = of_the_copy(edited, "-m", "slipsweep", "simulate", "--help").stdout
+    shown = of_the_copy(edited, "-m", "slipsweep", "simulate", "--help-all").stdout
     assert "--damping" in shown
     assert "--ageing" in shown
     assert "What is new (with sine; default: 0.0)." in " ".join(shown.split())
