@@ -154,7 +154,7 @@ def main() -> None:
     by = "Written by `python -m benchmarks.model_trends`.\n"
     (given.folder / "experiments.md").write_text(
         f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. Üy is the yield acceleration, at which "
-        f"sliding begins; λ and Δμ say how friction decays as the plane shakes harder. {by}",
+        f"sliding begins; λ and Δμ describe how friction decays with stronger shaking. {by}",
         encoding="utf-8",
     )
     (given.folder / "sensitivity.md").write_text(

@@ -45,7 +45,7 @@ def measured_friction(
         Gravity, m/s².
     offset, drift : str or list of str
         Channels to take a constant, or a straight line, off; "all" for all.  What was taken off stands in the
-        attribute `removed`.  Nothing is taken off unasked.
+        attribute `removed`.  Nothing else is subtracted.
     rest : (float, float), optional
         From when to when table and block were at rest, s: what is taken off is then fitted to these samples, else
         to all.
