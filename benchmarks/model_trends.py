@@ -76,7 +76,7 @@ def experiments() -> str:
             if model != "newmark" and found.sliding_mode != (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS)[which]:
                 about.append(f"as {SlidingMode(found.sliding_mode.item()).name.lower().replace('_', '–')}")
             if found.validity & Validity.NOT_RECOUPLED:
-                about.append("does not recouple")
+                about.append("does not re-stick")
             value = f"{found.permanent_displacement.item() * 1000:.0f}"
             row.append(f"{value} ({', '.join(about)})" if about else value)
         rows.append(row)
