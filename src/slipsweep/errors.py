@@ -1,4 +1,4 @@
-"""What goes wrong, in the two kinds a caller tells apart."""
+"""Errors of two kinds: bad input, and failed runs."""
 
 
 class InputError(ValueError):
@@ -18,7 +18,7 @@ class InputError(ValueError):
 
 
 class RunError(RuntimeError):
-    """A run that failed for a reason outside its input (disk, memory, a rival process).
+    """A run that failed for a reason outside its input (disk, memory, another process).
 
     See Also
     --------

@@ -81,7 +81,7 @@ class SlipsweepAccessor:
             `limit_amplitude` ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
             `measured_friction` ("friction") have one chart each.  By default the first one that a dataset has.
         at : mapping of axis to value, optional
-            Where to cut an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
+            Value of an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
             by default its middle.  Several values choose the curves or panels of an axis, or the motions of a suite.
         x, y : str, optional
             Axis to draw over, or an intensity measure; vertical axis of a map, or the curve parameter.
@@ -95,9 +95,9 @@ class SlipsweepAccessor:
         units : {"m/s2", "g"}
             Unit of accelerations on the main axis and in the caption.
         show_cautions : bool
-            Draw values flagged `not_recoupled` too, which are left out otherwise.
+            Draw values flagged `not_recoupled`, too; by default they are left out, because they are unreliable.
         ax : matplotlib.axes.Axes, optional
-            What to draw a chart of one panel in; legend and caption go with it.
+            Axes to draw a chart of one panel in, with its legend and caption.
 
         Returns
         -------
@@ -107,7 +107,7 @@ class SlipsweepAccessor:
         Raises
         ------
         InputError
-            The chart cannot be drawn of this dataset, or what is asked for is not there.
+            The chart cannot be drawn of this dataset, or a value or variable is not in it.
 
         Examples
         --------

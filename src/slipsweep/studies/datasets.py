@@ -62,12 +62,12 @@ def sweep(
 
     A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own
     name; the grid is the outer product of all of them.  A DataArray keeps its dimensions,
-    so that several on one shared dimension are taken together instead of crossed.
+    so that several on one shared dimension are combined value by value, not crossed.
 
     Parameters
     ----------
     theta : float, array or DataArray
-        Plane inclination, degrees, 0 ≤ θ < 90.
+        Inclination of the base, degrees, 0 ≤ θ < 90.
     mu_s : float, array or DataArray
         Static friction coefficient, > 0.
     amplitude : float, array or DataArray
@@ -75,15 +75,15 @@ def sweep(
     frequency : float, array or DataArray
         Excitation frequency, Hz, > 0; not with a record.
     excitation : Sine, Cosine, Triangle, Square, Harmonics, Record, Suite or str
-        What the plane does; "sine", "cosine", "triangle" and "square" stand for ten cycles without ramps.  What is said
-        of a record below holds for each motion of a suite.
+        Motion of the base; "sine", "cosine", "triangle" and "square" are ten cycles without ramps.  All that is written
+        about a record below holds for each motion of a suite.
     model : Mendez, Newmark or str
         The paper's friction law, or the classical rigid block; "mendez", "newmark".
     solver : Cycle, Step or str
         Event by event, exact to rounding, or time stepping; "auto" takes "cycle".
     displacement_amplitude : float, array or DataArray
         Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.  The result has A as a
-        coordinate, but where d and `frequency` span a grid: there it is a result to ask for.
+        coordinate, except if d and `frequency` span a grid: there it is a result, for `variables`.
     scale : float, array or DataArray
         With a record: factor on its acceleration, > 0, instead of `amplitude`; by default 1.
     pgv, arias_intensity : float, array or DataArray
@@ -100,7 +100,7 @@ def sweep(
     yield_acceleration : float, array or DataArray, optional
         Üy, m/s²; by default Coulomb's, g tan(φs − θ).
     yield_coefficient : float, array or DataArray, optional
-        ky = Üy/g of Newmark's block, in place of `theta`, `mu_s` and `yield_acceleration`.
+        ky = Üy/g of Newmark's block, instead of `theta`, `mu_s` and `yield_acceleration`.
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under a
         record every pulse has from its own peak.
@@ -113,9 +113,9 @@ def sweep(
         `permanent_displacement`, `peak_relative_velocity`, `number_of_slips` (that begin at rest),
         `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension of
         the paper's harmonic motion) and `validity`, these by default, `newmark_displacement`, and `motion_factor`, by
-        which the strength asked for multiplies the recorded acceleration (under a suite by default, too).
+        which the recorded acceleration is multiplied (under a suite by default, too).
     chunks : int, tuple, dict or "auto", optional
-        Chunks as dask takes them; the result is then lazy.  Frequency is best left whole.
+        Chunks as dask takes them; the result is then lazy.  Do not divide the frequency.
     progress : callable, optional
         Called with the number of cells just finished, from any thread; not with `chunks`.
 
@@ -130,7 +130,7 @@ def sweep(
     Raises
     ------
     InputError
-        A value that no physics allows, an unknown option, a grid that memory cannot hold.  A result that double
+        A physically impossible value, an unknown option, a grid that memory cannot hold.  A result that double
         precision does not hold (of inputs beyond 1e40, say) is refused when it is computed: with `chunks`, later.
 
     See Also
@@ -499,7 +499,7 @@ def sample(
     Raises
     ------
     InputError
-        As `sweep`; a distribution that scipy.stats does not know, or draws that no physics allows.
+        As `sweep`; a distribution that is not in scipy.stats, or physically impossible draws.
 
     See Also
     --------

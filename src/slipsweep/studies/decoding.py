@@ -13,10 +13,10 @@ _ORDER = list(FlagKind)
 
 
 def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
-    """Take a bit mask apart: one boolean variable a flag.
+    """Decode a bit mask: one boolean variable per flag.
 
     Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions, 3.5 [1]_),
-    so that a file of any version is read by its own words.  Lazy data stay lazy.
+    so that files of any version can be read.  Lazy data stay lazy.
 
     Parameters
     ----------

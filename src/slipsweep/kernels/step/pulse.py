@@ -1,4 +1,4 @@
-"""A pulse by steps, cut at the events inside them, cell by cell: what is no matter of lanes.
+"""A pulse by steps, cut at the events inside them, cell by cell: the part without lanes.
 
 State arrays as in `slides`; docs/numerics.md#step-solver.
 """
