@@ -154,7 +154,7 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
     # none of them needs all frequencies here: stored once
     assert {tuple(meta["arrays"][name]["shape"]) for name in expected if name in meta["arrays"]} == {(3, 2, 23, 1)}
     assert [dim["log"] for dim in meta["dims"]] == [False, False, False, True]
-    assert "All 2,484 cells of the file are here." in written.read_text()
+    assert "All 2,484 cells of the file are in this page." in written.read_text()
 
 
 def test_page_refers_to_nothing_outside(written: Path) -> None:
