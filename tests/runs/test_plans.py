@@ -289,7 +289,7 @@ def test_commands_say_that_all_is_there(
         assert "complete already" not in capsys.readouterr().out
         assert main([*arguments, "--resume"]) == 0
         output = capsys.readouterr()
-        assert f"{arguments[-1]}: complete already, and of this very sweep; nothing was computed" in output.out
+        assert f"{arguments[-1]}: complete already, by the same sweep; nothing was computed" in output.out
         assert output.err == ""
         assert main(list(arguments)) == 2
         assert "exists already; give --overwrite" in capsys.readouterr().err
