@@ -80,6 +80,8 @@ VARIABLES = '[output]\nvariables = ["permanent_displacement", "sliding_mode", "v
 
 BLOCKS = CASES.replace("structure_frequency = 2\n", "")
 
+POOLED = 'over = ["motion", "polarity"]\n'
+
 #: Of each block there is a case for each motion and strength.
 FEW_BLOCKS = BLOCKS.partition('[[cases]]\nlabel = "no. 2"')[0]
 
@@ -123,6 +125,11 @@ PLANS: dict[str, Callable[[], Job]] = {
     "pairs": lambda: sweep_job(recorded(STRONG + AZIMUTHS + FEW_BLOCKS, PAIRS)),
     "samples of a suite": lambda: sweep_job(
         recorded(STRENGTHS + FEW_BLOCKS + DRAWN.replace("amplitude", "pgv"), SUITE)
+    ),
+    "pooled samples of a suite": lambda: sweep_job(
+        recorded(
+            STRENGTHS + FEW_BLOCKS + DRAWN.replace("amplitude", "pgv").replace("samples", POOLED + "samples"), SUITE
+        )
     ),
     "sensitivity of a suite": lambda: sweep_job(
         recorded(STRENGTHS + FEW_BLOCKS + SENSITIVE.replace("amplitude", "pgv"), SUITE)

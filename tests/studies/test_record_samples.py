@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Record, read_record, sample, sweep
+from slipsweep import InputError, Record, Suite, read_record, sample, sweep
 from slipsweep.model.variables import Validity
 from slipsweep.studies.sampling import check_sampling
 from tests.support.commands import command
@@ -122,6 +122,54 @@ def test_refusals(shaking: Record, given: dict[str, Any], uncertain: dict[str, A
 def test_a_waveform_has_no_scales() -> None:
     with pytest.raises(InputError, match=r"uncertain\.time_scale: not allowed with a waveform"):
         sample(5.0, 0.4, 3.0, 1.0, uncertain={"time_scale": ABOUT_ONE})
+
+
+def test_pooled_motions_are_equally_likely_draws(shaking: Record) -> None:
+    suite = Suite((shaking, Record(shaking.times * 0.6, shaking.acceleration**3)))
+    # large scales lift some blocks, of one motion more than of another: they have no value
+    given: dict[str, Any] = {
+        "theta": 20.0, "scale": [1.0, 3.0], "time_scale": [1.0, 2.0], "polarity": "both", "excitation": suite,
+        "uncertain": {"mu_s": NORMAL, "scale": ABOUT_ONE}, "samples": SAMPLES, "thresholds": (0.1, 2.0),
+    }  # fmt: skip
+    over = ["polarity", "motion"]
+    pooled, each = sample(**given, over=over), sample(**given)
+    assert pooled.attrs["pooled"] == "2 polarity x 2 motion"
+    assert not {*over} & {*pooled.dims, *pooled.coords}
+    assert np.ptp(each.exceedance_probability.isel(scale=1, threshold=1).values) > 0.1
+    counts = SAMPLES * (1.0 - each.valueless_share)
+    assert 0 < counts.isel(scale=1).min() < counts.isel(scale=1).max()
+    expected = np.rint(each.exceedance_probability * counts).sum(over) / counts.sum(over)
+    np.testing.assert_array_equal(
+        pooled.exceedance_probability, expected.transpose(*pooled.exceedance_probability.dims)
+    )
+    for name in ("flag_share", "valueless_share"):
+        np.testing.assert_array_equal(pooled[name], each[name].mean(over).transpose(*pooled[name].dims))
+
+    draws = drawn(given["uncertain"])
+    scale = xr.DataArray(given["scale"], dims="scale") * draws["scale"]
+    moved = sweep(20.0, draws["mu_s"], scale=scale, time_scale=[1.0, 2.0], polarity="both", excitation=suite)
+    values = moved.permanent_displacement.stack(all=("draw", *over))
+    np.testing.assert_allclose(
+        pooled.displacement_quantile.transpose("quantile", ...),
+        np.nanquantile(values, pooled["quantile"], axis=values.get_axis_num("all")),
+        rtol=1e-11, atol=1e-15,
+    )  # fmt: skip
+    np.testing.assert_allclose(pooled.mean_displacement, values.mean("all"), rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"over": "motion"}, "over = 'motion': must be a dimension of the grid: time_scale, polarity"),
+        ({"over": ["polarity", "time_scale"]}, "over = 'time_scale': must not be a dimension of time_scale"),
+        ({"over": "polarity", "sensitivity": True}, "sensitivity = true: not allowed with over"),
+        ({"over": 2}, "over = 2: must be a list of dimensions"),
+    ],
+)
+def test_what_cannot_be_pooled(shaking: Record, given: dict[str, Any], message: str) -> None:
+    axes: dict[str, Any] = {"theta": 5.0, "time_scale": [1.0, 2.0], "polarity": "both"}
+    with pytest.raises(InputError, match=message):
+        sample(**axes, **given, uncertain={"mu_s": NORMAL}, excitation=shaking, samples=16)
 
 
 SWEEP = f"""

@@ -163,4 +163,5 @@ def drawn_text(attributes: Mapping[str, Any]) -> str:
         raise InputError(
             f"attribute uncertain = {attributes['uncertain']!r}: names no distributions of inputs"
         ) from None
-    return f"{', '.join(texts)}; {attributes.get('samples', '?')} samples"
+    pooled = f"{plain(str(attributes['pooled']))} x " if "pooled" in attributes else ""
+    return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"

@@ -99,6 +99,7 @@ def run(
     if quiet:
         return
     grid = grid_text(job.plan.sizes) or "no axes"
+    about = job.plan.empty().attrs
     if report.found:
         echo_found(report.path)
     else:
@@ -110,9 +111,9 @@ def run(
             points = math.prod(job.plan.sizes.values())
             runs = checked.sampling.sensitivity_runs
             beside = f", and {runs} runs each for Sobol indices" if runs else ""
-            typer.echo(f"{points} grid points ({grid}), {checked.sampling.samples} samples each{beside}")
+            pooled = f"{about['pooled']} x " if "pooled" in about else ""
+            typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{beside}")
             typer.echo(f"{report.tally.cells} samples solved in {took}")
-    about = job.plan.empty().attrs
     typer.echo(f"inputs: {about['friction_inputs']}")
     if "duplicate_motions" in about:
         typer.echo(f"the same motion under several labels: {about['duplicate_motions']}")

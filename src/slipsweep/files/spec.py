@@ -178,6 +178,7 @@ class _Sampling(_Table):
     thresholds: list[Any] = [0.01, 0.1, 1.0]
     correlation: list[Any] = []
     sensitivity: Annotated[bool, Field(strict=True)] = False
+    over: list[Text] = []
 
     def sampling(self, g: float) -> "Sampling":
         """What `slipsweep.studies.sampling` makes of the table (InputError: what is not allowed)."""
@@ -192,6 +193,7 @@ class _Sampling(_Table):
             thresholds=self.thresholds,
             correlation=self.correlation,
             sensitivity=self.sensitivity,
+            over=self.over,
             g=g,
             keys="uncertainty.",
         )

@@ -420,6 +420,7 @@ def sample(
     thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
     correlation: Sequence[tuple[str, str, float]] = (),
     sensitivity: bool = False,
+    over: str | Sequence[str] = (),
     displacement_amplitude: Values | None = None,
     scale: Values | None = None,
     pgv: Values | None = None,
@@ -469,6 +470,11 @@ def sample(
     sensitivity : bool
         Compute Sobol indices [1]_ of the displacement, too: from ``samples * (k + 2)`` further runs a grid point, of k
         inputs.
+    over : str or list of str
+        Dimensions of the grid, such as ``["motion", "polarity"]`` of a suite, whose values are equally likely draws
+        beside the uncertain inputs: each meets all samples, statistics are over all of them together, and the result
+        does not have these dimensions.  By default there are none: a suite has statistics for each motion.  Not with
+        `sensitivity`, nor a dimension of `frequency` or `time_scale`.
     yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         These and the remaining parameters as in `sweep`.
     progress : callable, optional
@@ -536,6 +542,7 @@ def sample(
         thresholds=thresholds,
         correlation=correlation,
         sensitivity=sensitivity,
+        over=over,
         g=MODELS.of(model).g,
     )
     plan = plan_samples(
@@ -546,7 +553,8 @@ def sample(
         solver=solver,
     )
     brought = _brought(given, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
-    return _dataset(plan.solve(progress), brought)
+    kept = {name: one for name, one in brought.items() if not {*sampling.over} & {*one.dims}}
+    return _dataset(plan.solve(progress), kept)
 
 
 def _inputs(arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -67,14 +67,14 @@ class SampleStatistics:
 
     def reduce(self, solved: Mapping[str, NDArray[Any]], frequency: Floats) -> dict[str, NDArray[Any]]:
         """Statistics of the samples of each cell (rows), for each of its frequencies (columns)."""
-        samples = self.runs
-        rows_of = {name: values.reshape(-1, samples) for name, values in solved.items()}
+        rows, squares = frequency.shape[0], frequency**2
+        rows_of = {name: values.reshape(rows, -1) for name, values in solved.items()}
         displacement, flags, modes = (
             rows_of["permanent_displacement"],
             rows_of["validity"],
             rows_of.get("sliding_mode"),
         )
-        rows, squares = frequency.shape[0], frequency**2
+        samples = displacement.shape[1]
         quantiles, thresholds = self._sampling.quantiles, self._sampling.thresholds
         found = {
             "displacement_quantile": np.full((*squares.shape, quantiles.size), np.nan),

@@ -59,6 +59,8 @@ class Sampling:
         Correlations of normal scores, by pairs of parameters.
     sensitivity : bool
         Whether Sobol indices are wanted.
+    over : tuple of str
+        Dimensions of the grid whose values are equally likely draws.
     keys : str
         What stands before the names of these options in errors.
     """
@@ -71,6 +73,7 @@ class Sampling:
     thresholds: Floats
     correlation: tuple[tuple[str, str, float], ...]
     sensitivity: bool
+    over: tuple[str, ...]
     keys: str
 
     @property
@@ -182,6 +185,7 @@ def check_sampling(
     correlation: Any,
     g: float,
     sensitivity: Any = False,
+    over: Any = (),
     keys: str = "",
 ) -> Sampling:
     """Check what is uncertain and how it is sampled.
@@ -189,7 +193,7 @@ def check_sampling(
     Parameters
     ----------
     uncertain : mapping of str to mapping or frozen distribution
-    samples, method, seed, quantiles, thresholds, correlation, sensitivity
+    samples, method, seed, quantiles, thresholds, correlation, sensitivity, over
         As `slipsweep.sample`.
     g : float
         What "g" as a unit of acceleration stands for, m/s².
@@ -232,7 +236,13 @@ def check_sampling(
     if not isinstance(sensitivity, (bool, np.bool_)):
         raise InputError(f"{keys}sensitivity = {shown(sensitivity)}: must be true or false")
     seed = check_whole(f"{keys}seed", seed, 0, _MOST_SEED)
-    sampling = Sampling(distributions, samples, method, seed, wanted, limits, pairs, bool(sensitivity), keys)
+    dims = [over] if isinstance(over, str) else check_list(f"{keys}over", over, "dimensions")
+    if not all(isinstance(dim, str) for dim in dims):
+        raise InputError(f"{keys}over = {shown(over)}: must be names of dimensions")
+    pooled = tuple(dict.fromkeys(dims))
+    if pooled and sensitivity:
+        raise InputError(f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only")
+    sampling = Sampling(distributions, samples, method, seed, wanted, limits, pairs, bool(sensitivity), pooled, keys)
     if pairs and np.linalg.eigvalsh(sampling._matrix()).min() < 1e-12:
         raise InputError(f"{keys}correlation = {list(pairs)}: no such correlations exist together (not positive)")
     if sampling.sensitivity_runs > MOST_SAMPLES:

@@ -26,7 +26,7 @@ from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Indices, Tally
 from slipsweep.model.estimates import friction_inputs
 from slipsweep.model.options import MODELS, Model, Newmark
-from slipsweep.model.parameters import BOUNDS, check_progress
+from slipsweep.model.parameters import BOUNDS, check_progress, shown
 from slipsweep.model.variables import (
     DRAWN,
     FRICTION_PARAMETERS,
@@ -131,6 +131,8 @@ def plan_samples(sampling: Sampling, **given: Any) -> "SamplePlan":
     kinds = {name: one.kind for name, one in sampling.distributions.items()}
     inputs = friction_inputs(plan.tasks[0].problem.model.name, coords, kinds)
     attrs = {**plan.attrs, "title": TITLE, "friction_inputs": inputs, **sampling.attributes}
+    if sampling.over:
+        attrs["pooled"] = _pooled_text(sampling, coords, "time_scale" if recorded else "frequency")
     if sampling.sensitivity:
         attrs["sensitivity"] = f"Saltelli et al. (2010), {sampling.sensitivity_runs} runs; bootstrap of {RESAMPLES}"
     return SamplePlan(sampling, studies, plan.tasks[0].problem, coords, attrs)
@@ -157,8 +159,23 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], recorded: bool, model
             )
 
 
+def _pooled_text(sampling: Sampling, coords: Mapping[str, Variable], clock: str) -> str:
+    """What is pooled, in words: ``8 motion x 2 polarity``; refuse what cannot be."""
+    sizes = grid_sizes(coords)
+    for dim in sampling.over:
+        if dim not in sizes:
+            there = ", ".join(sizes) or "there is none"
+            raise InputError(f"{sampling.keys}over = {shown(dim)}: must be a dimension of the grid: {there}")
+        # the samples of a grid point are sorted once, for all its frequencies
+        if clock in coords and dim in coords[clock].dims:
+            raise InputError(f"{sampling.keys}over = {shown(dim)}: must not be a dimension of {clock}")
+    return grid_text({dim: sizes[dim] for dim in sampling.over})
+
+
 class SamplePlan:
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
+
+    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.
 
     A plan as all others are (`anyplan.AnyPlan`); its parts have the draws of the whole.  Under a record the inverse of
     the time scale stands for the frequency, and there is no sliding mode.
@@ -191,11 +208,16 @@ class SamplePlan:
         everything = own | ({clock: coords[clock]} if clock in coords else {})
         offset = clock in drawn and drawn[clock].kind == "offset"
         # A = ω²d, and (f + offset)/f, depend on the frequency itself: no scaling law along its dimensions then
-        self.sizes = grid_sizes(everything)
-        check_dimensions(self.sizes, coords, {*STATISTICS, *STATISTIC_COORDINATES})
-        self.solved = grid_sizes(everything if self.by_displacement or self.timed or offset else own)
-        self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in self.solved}
-        self.base = aligned(everything if clock in everything and not self.scaled else own, self.solved)
+        sizes = grid_sizes(everything)
+        check_dimensions(sizes, coords, {*STATISTICS, *STATISTIC_COORDINATES})
+        self.pooled = {dim: sizes[dim] for dim in sampling.over}
+        self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
+        solved = grid_sizes(everything if self.by_displacement or self.timed or offset else own)
+        self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in solved}
+        self.solved = {dim: size for dim, size in solved.items() if dim not in self.pooled}
+        self.base = aligned(
+            everything if clock in everything and not self.scaled else own, {**self.solved, **self.pooled}
+        )
 
         dims = (*self.solved, *self.scaled)
         frequency = coords.get(clock, Variable((), np.ones(())))
@@ -212,7 +234,15 @@ class SamplePlan:
     @property
     def cells(self) -> int:
         """Number of samples to solve, of all grid points."""
-        return math.prod(self.solved.values()) * sum(study.runs for study in self.studies)
+        return math.prod(self.solved.values()) * sum(map(self._runs, self.studies))
+
+    def _runs(self, study: Study) -> int:
+        """Runs of a grid point: all draws with all that is pooled."""
+        return study.runs * math.prod(self.pooled.values())
+
+    def _points(self, study: Study) -> int:
+        """Grid points solved together."""
+        return max(_CELLS // self._runs(study), 1)
 
     @property
     def is_ordinary(self) -> bool:
@@ -230,7 +260,7 @@ class SamplePlan:
     @property
     def cost(self) -> float:
         """What a grid point takes, in cells of the cycle solver."""
-        cells = sum(cost_of(self.problem) * study.runs + study.work for study in self.studies)
+        cells = sum(cost_of(self.problem) * self._runs(study) + study.work for study in self.studies)
         return max(1.0, cells / math.prod(self.scaled.values()))
 
     @property
@@ -243,7 +273,7 @@ class SamplePlan:
         """Bytes of the draws, while they are made, and of the samples that are solved together."""
         drawn = len(self.sampling.distributions)
         draws = sum(24 * study.runs * drawn + study.memory for study in self.studies)
-        together = max(_points(study) * study.runs * (8 * (2 + drawn) + 11) for study in self.studies)
+        together = max(self._points(study) * self._runs(study) * (8 * (2 + drawn) + 11) for study in self.studies)
         return draws + together + memory_of(self.problem)
 
     def part(self, chunk: Chunk) -> "SamplePlan":
@@ -259,7 +289,8 @@ class SamplePlan:
 
     def _table(self, empty: Empty) -> Table:
         """The statistics, in arrays that `empty` makes."""
-        results, coords = {}, dict(self.coords)
+        results = {}
+        coords = {name: one for name, one in self.coords.items() if not {*self.pooled} & {*one.dims}}
         for study in self.studies:
             for name, own in study.results.items():
                 over = [dim for dim in self.sizes if name in study.by_frequency or dim in self.solved]
@@ -281,7 +312,7 @@ class SamplePlan:
         """
         check_progress(progress)
         check_memory(
-            f"grid of {grid_text(self.sizes) or 'one point'}, {sum(study.runs for study in self.studies)} samples",
+            f"grid of {grid_text(self.sizes) or 'one point'}, {sum(map(self._runs, self.studies))} samples",
             self.memory + sum(one.values.size * 8 for one in self.empty().data_vars.values()),
             "ask for fewer samples, grid points, quantiles or thresholds",
         )
@@ -295,7 +326,7 @@ class SamplePlan:
                 )
                 for name, own in study.results.items()
             }
-            for slab in slabs(tuple(self.solved.values()), _points(study)):
+            for slab in slabs(tuple(self.solved.values()), self._points(study)):
                 where: Any = (*slab, ...)
                 frequencies = self.frequency[where].reshape(-1, self.frequency.shape[-1])
                 for name, values in study.reduce(self._solve(study, slab, progress), frequencies).items():
@@ -314,7 +345,7 @@ class SamplePlan:
         shares = [name for name in ("mode_share", "flag_share", "valueless_share") if name in self.names]
         if not {*shares} <= results.keys():
             return Tally(indices=indices)
-        samples = self.sampling.samples
+        samples = self.sampling.samples * math.prod(self.pooled.values())
         counts = {name: np.rint(results[name] * np.float64(samples)).astype(np.int64) for name in shares}
         by_flag = dict(zip(Validity, counts["flag_share"].reshape(-1, len(Validity)).sum(0).tolist(), strict=True))
         tally = Tally(0, None, by_flag, indices=indices, counted=counts["valueless_share"].size * samples)
@@ -331,6 +362,7 @@ class SamplePlan:
 
         Under a record at time scale 1, or at the one drawn over the grid's.
         """
+        slab = (*slab, *(slice(0, size) for size in self.pooled.values()))
         base = {name: values[..., None] for name, values in engine.cut(self.base, slab).items()}
         one = np.ones((1,) * (len(slab) + 1))
         clock = self.clock
@@ -370,11 +402,6 @@ class SamplePlan:
         estimate = engine.estimates(Request(self.problem, full, arrays, (name,)))[name]
         values = one.applied(estimate, row)
         return np.where(BOUNDS[name].holds(values), values, np.nan)
-
-
-def _points(study: Study) -> int:
-    """Grid points solved together."""
-    return max(_CELLS // study.runs, 1)
 
 
 def _drawn_again(
