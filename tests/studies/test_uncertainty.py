@@ -548,7 +548,7 @@ def test_other_commands_say_what_they_want(folder: Path, capsys: pytest.CaptureF
     assert main(["limit", path, "-d", "5cm"]) == 2
     assert "limits are those of a sweep without [uncertainty]" in capsys.readouterr().err
     assert main(["chart", path, "--kind", "contours"]) == 2
-    assert "permanent_displacement: no such variable" in capsys.readouterr().err
+    assert "must be one of fragility, quantiles, sensitivity" in capsys.readouterr().err
     assert main(["info", path]) == 0
     assert "exceedance_probability" in capsys.readouterr().out
 
