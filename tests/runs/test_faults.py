@@ -232,7 +232,7 @@ def test_an_edited_manifest_is_refused(tmp_path: Path) -> None:
     head, _, content = manifest.read_text().partition("\n")
     edited = json.loads(content) | {"chunk_cells": 4001}
     manifest.write_text(f"{head}\n{json.dumps(edited)}")
-    with pytest.raises(InputError, match=r"manifest.json: damaged or missing: .* start anew with --overwrite"):
+    with pytest.raises(InputError, match=r"manifest.json: damaged or missing: .* start again with --overwrite"):
         run(tmp_path / "a.nc", resume=True)
     run(tmp_path / "a.nc", overwrite=True)
     assert {entry.name for entry in tmp_path.iterdir()} == {"a.nc"}

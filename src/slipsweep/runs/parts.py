@@ -213,7 +213,7 @@ class Folder:
             if self.finished:
                 raise InputError(
                     f"{self.path / 'manifest.json'}: damaged or missing: what the {len(self.finished)} finished "
-                    "chunks belong to cannot be told; start anew with --overwrite"
+                    "chunks belong to cannot be told; start again with --overwrite"
                 ) from None
 
     def hold(self) -> None:

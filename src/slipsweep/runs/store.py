@@ -119,7 +119,7 @@ def run(
         if work.finished and not (resume or overwrite):
             raise InputError(
                 f"{path}: {work.path.name} holds {len(work.finished)} finished chunks of an interrupted run; "
-                "go on with --resume, or start anew with --overwrite"
+                "go on with --resume, or start again with --overwrite"
             )
         if resume and not work.finished and target.is_complete():
             return _found(job, path, _complete(job, path, identity))
@@ -200,7 +200,7 @@ def _complete(job: Job, path: Place, identity: Mapping[str, Any]) -> int:
     Raises
     ------
     InputError
-        It is not the result of this very sweep.
+        It is not the result of this sweep.
     """
     stored = None
     try:
@@ -213,7 +213,7 @@ def _complete(job: Job, path: Place, identity: Mapping[str, Any]) -> int:
         difference = str(error).removeprefix(f"{path}: ")
     if stored is None or difference is not None:
         raise InputError(
-            f"{path}: exists already, and is not the complete result of this very sweep ({difference}); give "
+            f"{path}: exists already, and is not the complete result of this sweep ({difference}); give "
             "--overwrite to replace it, or another name with -o"
         )
     return stored.chunk_cells
@@ -263,7 +263,7 @@ def _check_same(work: parts.Folder, identity: Mapping[str, Any], chunk_cells: in
     if chunk_cells is not None and chunk_cells < work.manifest.chunk_cells:
         raise InputError(
             f"--memory: too little for the chunks of {work.manifest.chunk_cells} cells that {work.path.name} "
-            "was begun with; give more, or start anew with --overwrite"
+            "was begun with; give more, or start again with --overwrite"
         )
 
 
