@@ -446,7 +446,7 @@ def test_chunks_of_limits_need_an_output(
         (("--memory", "1GB", "-o", "a.png"), "--memory: needs -o OUT.nc"),
         (("--workers", "2"), "--workers: needs -o OUT.nc"),
         (("-o", "a.nc", "-o", "b.nc"), "b.nc: a second result, beside a.nc"),
-        (("-o", "a.nc", "--resume", "--overwrite"), "--resume, --overwrite: either"),
+        (("-o", "a.nc", "--resume", "--overwrite"), "--resume, --overwrite: --resume continues"),
     ):
         assert main(["limit", "a.toml", "-d", "1cm", *options]) == 2
         error = capsys.readouterr().err
