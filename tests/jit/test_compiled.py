@@ -226,14 +226,12 @@ def test_kernels_of_a_factory_are_told_apart(cache: Path) -> None:
 def test_numba_is_left_as_it_was(cache: Path) -> None:
     """Also by a kernel that cannot be compiled."""
     from numba.core.cpu import CPUContext
-    from numba.core.ir import Inst
     from numba.core.types.functions import Function
     from numba.core.typing.context import Context
 
     def methods() -> list[object]:
         return [
             Function.get_call_type,
-            Inst._rec_list_vars,
             Context.load_additional_registries,
             CPUContext.load_additional_registries,
         ]

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from typing import Any
 
 from numba.core.cpu import CPUContext
-from numba.core.ir import Arg, Const, FreeVar, Global, Inst, Loc, Var
 from numba.core.types import Array, Boolean, Number
 from numba.core.types.functions import Function
 from numba.core.typing.context import Context
@@ -18,14 +17,10 @@ from slipsweep.jit.inner.need import need
 need(Function, get_call_type="self context args kws", typing_key=None)
 need(Context, load_additional_registries="self")
 need(CPUContext, load_additional_registries="self", install_registry="self registry", _registries=None)
-need(Inst, _rec_list_vars="self val", list_vars="self")
 
 #: Modules of functions, and types of their arguments, of which nothing but the types decides on what comes out.
 _MODULES = ("_operator", "builtins")
 _PLAIN = (Number, Boolean, Array)
-
-#: Most of what else an instruction consists of.
-_NO_VARIABLES = {Loc, Const, Global, FreeVar, Arg, str, int, float, bool, type(None)}
 
 
 @contextmanager
@@ -34,8 +29,7 @@ def asked_once() -> Iterator[None]:
 
     For each a * b it goes, twice, through all that it knows of products, those of strings among it; and it compiles
     `max` once more for each kind of function that calls it (1.2 s).  For each array that is read it goes through
-    fifty imports that it has made before (0.2 s).  And it looks for the variables of each instruction a dozen times,
-    in places and texts as well (0.4 s).
+    fifty imports that it has made before (0.2 s).
     """
     known: dict[Any, Any] = {}
     find = Function.get_call_type
@@ -56,16 +50,7 @@ def asked_once() -> Iterator[None]:
         for registry in list(self._registries):
             self.install_registry(registry)
 
-    def variables(self: Any, value: Any) -> list[Any]:
-        if isinstance(value, Var):
-            return [value]
-        if isinstance(value, Inst):
-            return [*value.list_vars()]
-        inside = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
-        return [found for one in inside if type(one) not in _NO_VARIABLES for found in variables(self, one)]
-
     with (
-        _instead(Inst, "_rec_list_vars", variables),
         _instead(Function, "get_call_type", get_call_type),
         _instead(Context, "load_additional_registries", typing_is_loaded),
         _instead(CPUContext, "load_additional_registries", only_what_is_new),

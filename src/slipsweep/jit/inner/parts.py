@@ -23,7 +23,6 @@ from slipsweep.jit.inner.need import need
 need(
     JITCodeLibrary,
     _finalize_final_module="self",
-    _optimize_functions="self ll_module",
     _optimize_final_module="self",
     _finalize_dynamic_globals="self",
     _verify_declare_only_symbols="self",
@@ -33,15 +32,10 @@ need(
     _final_module=None,
     _finalized=None,
 )
-need(
-    JITCPUCodegen,
-    _function_pass_manager="self kwargs",
-    _module_pass_manager="self kwargs",
-    set_env="self env_name env",
-)
+need(JITCPUCodegen, _module_pass_manager="self kwargs", set_env="self env_name env")
 need(Compiler, __init__="self typingctx targetctx library args return_type flags locals", define_pipelines="self")
 need(DefaultPassBuilder, define_nopython_pipeline="state name")
-need(PassManager, finalize="self", passes=None, _ENFORCING=None)
+need(PassManager, finalize="self", passes=None)
 need(
     CPUDispatcher,
     __init__="self py_func locals targetoptions pipeline_class",
@@ -80,13 +74,6 @@ class _Library(JITCodeLibrary):
         self._verify_declare_only_symbols()
         self._finalized = True
 
-    def _optimize_functions(self, module: Any) -> None:
-        # one level of passes, not three, and none on what is only declared here (0.3 s)
-        for function in module.functions:
-            if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager(opt=1)
-                passes.run(function, builder)
-
     def _optimize_final_module(self) -> None:
         passes, builder = self._codegen._module_pass_manager(
             loop_vectorize=False, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
@@ -109,15 +96,6 @@ class _Nowhere:
         pass
 
 
-class _Passes(PassManager):
-    """Passes of numba's compiler, of which each leaves to those after it what they have to know anew.
-
-    numba looks after each for what lives where, which only the last ask for, and these look themselves (0.5 s).
-    """
-
-    _ENFORCING = False
-
-
 class _Compiler(Compiler):
     """numba's compiler, for functions that only jitted ones call."""
 
@@ -126,7 +104,7 @@ class _Compiler(Compiler):
 
     def define_pipelines(self) -> list[Any]:
         """The passes of numba's own pipeline but for the idle ones."""
-        pipeline = _Passes("part")
+        pipeline = PassManager("part")
         every = DefaultPassBuilder.define_nopython_pipeline(self.state).passes
         pipeline.passes.extend(one for one in every if one[0] not in _IDLE_PASSES)
         pipeline.finalize()
