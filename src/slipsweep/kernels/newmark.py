@@ -2,8 +2,8 @@
 
 Its one rule is that b = Üy from every Üg = Üy on to the stop.  A slide along straight pieces is a sum of three terms
 a piece, the same for all lanes but for Üy; only where one of them begins, turns or stops is there more to do.
-Cells of a tile are
-sorted by Üy, so that those of a strip begin and stop on the same pieces, or on pieces near each other.
+Cells of a tile are sorted by Üy, so that those of a strip begin and stop on the same pieces, or on pieces near each
+other.
 docs/numerics.md#newmarks-block-under-a-record
 """
 
