@@ -6,9 +6,12 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import netCDF4
 import numpy as np
@@ -16,6 +19,7 @@ import pytest
 import xarray as xr
 
 from slipsweep import cli
+from slipsweep.cli.signals import Interrupted, interrupting
 from tests.support.commands import command
 from tests.support.processes import SLIPSWEEP, on_a_terminal, slipsweep
 
@@ -212,6 +216,36 @@ def test_a_signal_inside_a_destructor_is_not_lost(
     assert cli.main(["run"]) == 128 + number
     assert capsys.readouterr().err == "slipsweep: interrupted; nothing written\n"
     assert before == ([signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)], sys.unraisablehook)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+def test_a_signal_leaves_no_lock_held() -> None:
+    """Between the call that takes a lock and what gives it back, an exception would leave it held for ever."""
+    semaphore = threading.Semaphore(0)
+    sent: list[signal.Signals] = []
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        if event == "return" and frame.f_code is threading.Condition.__enter__.__code__ and not sent:
+            sent.append(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        return trace
+
+    def take() -> None:
+        before = sys.gettrace()
+        sys.settrace(trace)
+        try:
+            semaphore.acquire(timeout=0)
+        finally:
+            sys.settrace(before)
+        time.sleep(30.0)  # it is raised here
+
+    with pytest.raises(Interrupted), interrupting():
+        take()
+    assert sent
+    another = threading.Thread(target=semaphore.release, daemon=True)
+    another.start()
+    another.join(10.0)
+    assert not another.is_alive()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")

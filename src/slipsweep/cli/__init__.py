@@ -8,12 +8,8 @@ What a command needs is imported inside it, so that `slipsweep --help` is there 
 import atexit
 import gc
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
@@ -35,6 +31,7 @@ from slipsweep.cli import (
     verify,
 )
 from slipsweep.cli.help import WIDTH, Command, Group
+from slipsweep.cli.signals import Interrupted, interrupting
 from slipsweep.errors import InputError, RunError
 
 app = typer.Typer(
@@ -92,52 +89,6 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 _LONGEST = 1000
 
 
-class Interrupted(BaseException):
-    """Ctrl-C or SIGTERM; no `except Exception` stops it."""
-
-    def __init__(self, signum: int) -> None:
-        self.signum = signum
-
-
-@contextmanager
-def _signals() -> Iterator[None]:
-    """Make Ctrl-C and SIGTERM raise `Interrupted`, once: cleaning up is not interrupted again."""
-    # a signal that the caller ignores (nohup, a shell's background job) stays ignored
-    watched = [s for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) is not signal.SIG_IGN]
-
-    def interrupt(signum: int, frame: FrameType | None) -> None:
-        for number in watched:
-            signal.signal(number, signal.SIG_IGN)
-        raise Interrupted(signum)
-
-    def watch() -> None:
-        for number in watched:
-            signal.signal(number, interrupt)
-
-    def unraisable(lost: Any) -> None:
-        """Have a signal come once more that came inside a destructor, where Python prints and drops what is raised."""
-        if not isinstance(lost.exc_value, Interrupted):
-            hook(lost)
-            return
-        watch()
-        # by a thread, a moment later: raised here, it would be dropped again
-        again.append(threading.Timer(0.02, os.kill, (os.getpid(), lost.exc_value.signum)))
-        again[-1].start()
-
-    again: list[threading.Timer] = []
-    before = {number: signal.getsignal(number) for number in watched}
-    hook, sys.unraisablehook = sys.unraisablehook, unraisable
-    watch()
-    try:
-        yield
-    finally:
-        for timer in again:
-            timer.cancel()
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        sys.unraisablehook = hook
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     with streams.guarded() as output:
@@ -152,7 +103,7 @@ def _run(arguments: list[str]) -> int:
     """Run a command; what it raises becomes a message and an exit status."""
     _spare_time()
     try:
-        with _signals():
+        with interrupting():
             # without standalone mode errors come back here instead of being boxed in several lines
             status: Any = app(arguments or ["--help"], prog_name="slipsweep", standalone_mode=False)
     except _UsageError as error:
