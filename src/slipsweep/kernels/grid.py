@@ -13,7 +13,7 @@ import numpy as np
 from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import newmark, record
-from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, block_of, cell_of
+from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, cell_of, decay_rate_of, interface_of
 from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
 from slipsweep.kernels.sine import cells as sine
@@ -311,19 +311,20 @@ def _parameter_grid(
 ) -> None:
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
-        runs = gather(grid, begin, count, inputs, tile)
-        for run in range(runs):
-            for j in range(tile.first[run], tile.first[run + 1]):
-                block = block_of(cell_of(tile.cells, j), options.rise, options.g)
-                at = tile.result[run] + (j - tile.first[run]) * grid.strides[8, -1]
-                parameters[0, at] = block.yield_acceleration
-                parameters[1, at] = block.limiting_acceleration
-                parameters[2, at] = block.acceleration_ratio
-                parameters[3, at] = block.minimum_friction
-                parameters[4, at] = block.delta_mu
-                parameters[5, at] = block.decay_rate
-                mode[at] = block.sliding_mode
-                validity[at] = block.validity & ~FRICTION_ESTIMATED  # known only with the motion
+        gather(grid, begin, count, inputs, tile)
+        end = begin + count
+        # row by row: of a block of rows numba does not know that they are contiguous, and takes three times as long
+        onset, limit, ratio = parameters[0, begin:end], parameters[1, begin:end], parameters[2, begin:end]
+        least, drop, decay = parameters[3, begin:end], parameters[4, begin:end], parameters[5, begin:end]
+        for j in range(count):
+            onset[j], limit[j], ratio[j], least[j], drop[j], tile.codes[0, j], tile.codes[1, j] = interface_of(
+                cell_of(tile.cells, j), options.rise, options.g
+            )
+        for j in range(count):
+            decay[j] = decay_rate_of(cell_of(tile.cells, j), drop[j], least[j], options.g)
+        for j in range(count):
+            mode[begin + j] = tile.codes[0, j]
+            validity[begin + j] = tile.codes[1, j] & ~FRICTION_ESTIMATED  # known only with the motion
 
 
 #: Friction parameters of every cell (rows as in `variables.FRICTION_PARAMETERS`).
