@@ -23,9 +23,13 @@ WRITES = {
     "stores": ["stores.md"],
     "writers": ["writers.md"],
     "calibration": ["calibration.md"],
+    "commits": ["commits.csv", "commits.png"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
 }
+
+#: Half a minute of processes, clusters and compilation.
+SLOW = ("large_sweeps", "writers", "commits")
 
 
 @pytest.fixture(autouse=True)
@@ -35,9 +39,8 @@ def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.filterwarnings("ignore")  # of the packages compared with
 @pytest.mark.parametrize(
-    # half a minute of processes and clusters
     "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in ("large_sweeps", "writers") else ()) for name in WRITES],
+    [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in WRITES],
 )
 def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if name == "records":
