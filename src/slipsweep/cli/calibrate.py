@@ -18,6 +18,7 @@ from slipsweep.cli.common import (
     typed_command,
     write_figure,
 )
+from slipsweep.cli.help import Panel
 from slipsweep.cli.options import BLOCK, chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
@@ -39,7 +40,7 @@ EXAMPLE = examples(
 )
 
 #: The group of options that say what of the measurement is used, and how.
-TEST = "Measurement"
+TEST = Panel("Measurement")
 
 Test = Annotated[
     Path,
@@ -50,16 +51,10 @@ Test = Annotated[
     ),
 ]
 Offset = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="CHANNEL", help="Channel whose sensor has an offset, or all; may be repeated.", rich_help_panel=TEST
-    ),
+    list[str] | None, TEST("Channel whose sensor has an offset, or all; may be repeated.", metavar="CHANNEL")
 ]
 Drift = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="CHANNEL", help="Channel whose sensor drifts linearly, or all; may be repeated.", rich_help_panel=TEST
-    ),
+    list[str] | None, TEST("Channel whose sensor drifts linearly, or all; may be repeated.", metavar="CHANNEL")
 ]
 
 
@@ -68,34 +63,15 @@ def friction(
     test: Test,
     theta: Theta,
     mu_s: MuS,
-    g: Annotated[float, typer.Option(help="Gravity, m/s².", rich_help_panel=BLOCK)] = 9.81,
+    g: Annotated[float, BLOCK("Gravity, m/s².")] = 9.81,
     offset: Offset = None,
     drift: Drift = None,
-    rest: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FROM:TO",
-            help="Times of rest, s, to find offsets and drifts by.",
-            rich_help_panel=TEST,
-        ),
-    ] = None,
+    rest: Annotated[str | None, TEST("Times of rest, s, to find offsets and drifts by.", metavar="FROM:TO")] = None,
     threshold: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Relative acceleration of a slide: 0.02g (default: 4 times its noise).",
-            rich_help_panel=TEST,
-        ),
+        str | None, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", metavar="VALUE")
     ] = None,
     output: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write .nc, .png, .svg or .pdf; may be repeated.",
-            rich_help_panel=OUTPUT,
-        ),
+        list[Path] | None, OUTPUT("Write .nc, .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
@@ -147,18 +123,10 @@ def calibrate(
     mu_s: MuS,
     offset: Offset = None,
     drift: Drift = None,
-    cycles: Annotated[
-        bool, typer.Option("--cycles/--no-cycles", help="Fit each cycle separately, too.", rich_help_panel=TEST)
-    ] = True,
+    cycles: Annotated[bool, TEST("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
     output: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write .nc, .toml, .png, .svg or .pdf; may be repeated.",
-            rich_help_panel=OUTPUT,
-        ),
+        OUTPUT("Write .nc, .toml, .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE"),
     ] = None,
     overwrite: Overwrite = False,
     model: Model,

@@ -6,7 +6,11 @@ from typing import Annotated, Literal
 import typer
 
 from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, check_ending, cuts, write_figure
+from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
+
+#: Groups of options.
+CHART, AXES, LOOK = Panel("Chart"), Panel("Axes"), Panel("Look")
 
 EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
 
@@ -15,75 +19,41 @@ def chart(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help='A result of "slipsweep run".')],
     kind: Annotated[
         list[str] | None,
-        typer.Option(
+        CHART(
+            "contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility, "
+            "quantiles or sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated "
+            "(default: all that fit).",
             "--kind",
             "-k",
             metavar="KIND",
-            help="contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility, "
-            "quantiles or sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated "
-            "(default: all that fit).",
-            rich_help_panel="Chart",
         ),
     ] = None,
     at: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Value of another axis: theta=12, amplitude=0.3g, case=LABEL (default: the middle); "
+        CHART(
+            "Value of another axis: theta=12, amplitude=0.3g, case=LABEL (default: the middle); "
             "several select curves or panels: theta=8,11,14.",
-            rich_help_panel="Chart",
+            metavar="NAME=VALUE",
         ),
     ] = None,
-    x: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Axis to draw over; of intensity the measure: pgv, cav.", rich_help_panel="Axes"
-        ),
-    ] = None,
-    y: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Vertical axis of a map, or the curve parameter.",
-            rich_help_panel="Axes",
-        ),
-    ] = None,
-    panels: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME[,NAME]",
-            help="One or two axes of panels, across and down.",
-            rich_help_panel="Axes",
-        ),
-    ] = None,
-    variable: Annotated[
-        str, typer.Option(metavar="NAME", help="What contours and families show.", rich_help_panel="Chart")
-    ] = "permanent_displacement",
+    x: Annotated[str | None, AXES("Axis to draw over; of intensity the measure: pgv, cav.", metavar="NAME")] = None,
+    y: Annotated[str | None, AXES("Vertical axis of a map, or the curve parameter.", metavar="NAME")] = None,
+    panels: Annotated[str | None, AXES("One or two axes of panels, across and down.", metavar="NAME[,NAME]")] = None,
+    variable: Annotated[str, CHART("What contours and families show.", metavar="NAME")] = "permanent_displacement",
     levels: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LEVEL,...",
-            help="Contours, or displacements of a suite's fragility: 1cm,5cm,30cm.",
-            rich_help_panel="Look",
-        ),
+        str | None, LOOK("Contours, or displacements of a suite's fragility: 1cm,5cm,30cm.", metavar="LEVEL,...")
     ] = None,
-    units: Annotated[
-        Literal["m/s2", "g"], typer.Option(help="Unit of accelerations.", rich_help_panel="Look")
-    ] = "m/s2",
+    units: Annotated[Literal["m/s2", "g"], LOOK("Unit of accelerations.")] = "m/s2",
     show_cautions: Annotated[
-        bool,
-        typer.Option(
-            "--show-cautions", help="Draw values flagged not_recoupled or upslope, too.", rich_help_panel="Look"
-        ),
+        bool, LOOK("Draw values flagged not_recoupled or upslope, too.", "--show-cautions")
     ] = False,
     output: Annotated[
         list[Path] | None,
-        typer.Option(
+        OUTPUT(
+            "Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf.",
             "--output",
             "-o",
             metavar="FILE",
-            help="Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf.",
-            rich_help_panel=OUTPUT,
         ),
     ] = None,
     overwrite: Overwrite = False,

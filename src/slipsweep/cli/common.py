@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from slipsweep.cli.help import Panel
 from slipsweep.cli.options import BLOCK
 from slipsweep.errors import InputError
 from slipsweep.model.variables import (
@@ -35,42 +36,20 @@ if TYPE_CHECKING:
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
 
-Theta = Annotated[
-    str, typer.Option(metavar="VALUE", help="Inclination of the base: 5 (degrees), 0.1rad.", rich_help_panel=BLOCK)
-]
-MuS = Annotated[float, typer.Option(help="Static friction coefficient.", rich_help_panel=BLOCK)]
+Theta = Annotated[str, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")]
+MuS = Annotated[float, BLOCK("Static friction coefficient.")]
 #: Groups of options that several commands have.
-OUTPUT, LARGE = "Output", "Large runs"
+OUTPUT, LARGE = Panel("Output"), Panel("Large runs")
 
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an output that exists.", rich_help_panel=OUTPUT)]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.", rich_help_panel=OUTPUT)]
+Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrite")]
+Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
 
-Resume = Annotated[
-    bool,
-    typer.Option("--resume", help="Continue an interrupted run from its finished chunks.", rich_help_panel=LARGE),
-]
-Split = Annotated[
-    bool,
-    typer.Option("--split", help="Write a folder with a netCDF file for each chunk.", rich_help_panel=LARGE),
-]
-Shared = Annotated[
-    bool,
-    typer.Option("--shared", help="The workers of --scheduler write the output themselves.", rich_help_panel=LARGE),
-]
-Memory = Annotated[
-    str | None,
-    typer.Option(metavar="SIZE", help="Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", rich_help_panel=LARGE),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(metavar="N", help="Solve on N processes of this machine (extra [cluster]).", rich_help_panel=LARGE),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS", help="Solve on the workers of the dask scheduler at HOST:PORT.", rich_help_panel=LARGE
-    ),
-]
+Resume = Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", "--resume")]
+Split = Annotated[bool, LARGE("Write a folder with a netCDF file for each chunk.", "--split")]
+Shared = Annotated[bool, LARGE("The workers of --scheduler write the output themselves.", "--shared")]
+Memory = Annotated[str | None, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", metavar="SIZE")]
+Workers = Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", metavar="N")]
+Scheduler = Annotated[str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")]
 
 
 def examples(*lines: str) -> str:

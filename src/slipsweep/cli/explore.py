@@ -17,23 +17,13 @@ _UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9}
 def explore(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep run wrote.")],
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="PAGE.html",
-            help="Page to write (default: the file's name, .html).",
-            rich_help_panel=OUTPUT,
-        ),
+        Path | None, OUTPUT("Page to write (default: the file's name, .html).", "--output", "-o", metavar="PAGE.html")
     ] = None,
     overwrite: Overwrite = False,
     size: Annotated[
-        str,
-        typer.Option(
-            metavar="SIZE", help="Largest size of the page; larger results are thinned to it.", rich_help_panel=OUTPUT
-        ),
+        str, OUTPUT("Largest size of the page; larger results are thinned to it.", metavar="SIZE")
     ] = "10MB",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary.", rich_help_panel=OUTPUT)] = False,
+    quiet: Annotated[bool, OUTPUT("No summary.", "--quiet", "-q")] = False,
 ) -> None:
     """Write a page for the browser in which to explore a result."""
     from slipsweep.explore import page as pages

@@ -7,6 +7,10 @@ from typing import Annotated
 import typer
 
 from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, examples, progress_bar
+from slipsweep.cli.help import Panel
+
+#: The group of options that only this command has.
+TABLE = Panel("Table")
 
 EXAMPLE = examples(
     "slipsweep export paper.nc -o paper.csv --words",
@@ -17,45 +21,23 @@ EXAMPLE = examples(
 
 def export(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="Table to write: .csv, .parquet or .xlsx.", rich_help_panel=OUTPUT
-        ),
-    ],
+    output: Annotated[Path, OUTPUT("Table to write: .csv, .parquet or .xlsx.", "--output", "-o", metavar="FILE")],
     variables: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--variable",
-            metavar="NAME",
-            help="Result to export (default: all); may be repeated.",
-            rich_help_panel="Table",
-        ),
+        list[str] | None, TABLE("Result to export (default: all); may be repeated.", "--variable", metavar="NAME")
     ] = None,
-    words: Annotated[
-        bool, typer.Option("--words", help="Sliding modes and flags as words, not codes.", rich_help_panel="Table")
-    ] = False,
+    words: Annotated[bool, TABLE("Sliding modes and flags as words, not codes.", "--words")] = False,
     at: Annotated[
         list[str] | None,
-        typer.Option(
+        TABLE(
+            "Values of an axis to take: theta=12, amplitude=0.1g,0.2g, case=LABEL; may be repeated.",
             metavar="NAME=VALUE",
-            help="Values of an axis to take: theta=12, amplitude=0.1g,0.2g, case=LABEL; may be repeated.",
-            rich_help_panel="Table",
         ),
     ] = None,
     rows: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME[,NAME]",
-            help="With --columns: axes of the rows (default: all others).",
-            rich_help_panel="Table",
-        ),
+        str | None, TABLE("With --columns: axes of the rows (default: all others).", metavar="NAME[,NAME]")
     ] = None,
     columns: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Axis whose values become columns; one table per result.", rich_help_panel="Table"
-        ),
+        str | None, TABLE("Axis whose values become columns; one table per result.", metavar="NAME")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,

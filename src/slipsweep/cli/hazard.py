@@ -6,45 +6,29 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, write_figure
+from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
     from slipsweep.grid.tables import Table
+
+#: The group of options that only this command has.
+HAZARD = Panel("Hazard")
 
 EXAMPLE = "Example: slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 0.3 -o hazard.png"
 
 
 def hazard(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A result under a suite, with an axis amplitude.")],
-    curve: Annotated[
-        Path,
-        typer.Option(
-            metavar="HAZARD.csv",
-            help='Columns "PGA (g)" and "annual rate", from low to high.',
-            rich_help_panel="Hazard",
-        ),
-    ],
+    curve: Annotated[Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high.', metavar="HAZARD.csv")],
     displacement: Annotated[
-        list[str],
-        typer.Option(
-            "--displacement",
-            "-d",
-            metavar="LENGTH",
-            help="To exceed: 50mm, 0.05 (m); may be repeated.",
-            rich_help_panel="Hazard",
-        ),
+        list[str], HAZARD("To exceed: 50mm, 0.05 (m); may be repeated.", "--displacement", "-d", metavar="LENGTH")
     ],
     at: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE", help="One value of another axis: mu_s=0.4 (default: all).", rich_help_panel="Hazard"
-        ),
+        list[str] | None, HAZARD("One value of another axis: mu_s=0.4 (default: all).", metavar="NAME=VALUE")
     ] = None,
     output: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="Write .png, .svg or .pdf; may be repeated.", rich_help_panel=OUTPUT
-        ),
+        list[Path] | None, OUTPUT("Write .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,

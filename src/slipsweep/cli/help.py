@@ -3,10 +3,20 @@
 import re
 from typing import Any
 
+import typer
 from typer.core import TyperCommand, TyperGroup
 
+
+class Panel(str):
+    """The name of a group of options in a command's help; called, it declares one of them."""
+
+    def __call__(self, about: str, *names: str, **more: Any) -> Any:
+        """An option of the group; names where its parameter does not give it, and what else typer takes."""
+        return typer.Option(*names, help=about, rich_help_panel=self, **more)
+
+
 #: The group of options that are described only by --help-all.
-RARE = "Rare options"
+RARE = Panel("Rare options")
 
 #: Columns that a help takes at most.
 WIDTH = 100

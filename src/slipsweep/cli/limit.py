@@ -25,6 +25,7 @@ from slipsweep.cli.common import (
     taken_as,
     write_figure,
 )
+from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from slipsweep.files.spec import SweepSpec
     from slipsweep.files.zarr_store import Place
     from slipsweep.grid.tables import Table
+
+#: The group of options that only this command has.
+LIMIT = Panel("Limit")
 
 EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
 
@@ -45,30 +49,14 @@ def limit(
         typer.Argument(metavar="OUT.nc|SWEEP.toml", help="A result or sweep file: its model and axes but amplitude."),
     ],
     displacement: Annotated[
-        list[str],
-        typer.Option(
-            "--displacement",
-            "-d",
-            metavar="LENGTH",
-            help="Tolerable: 50mm, 0.05 (m); may be repeated.",
-            rich_help_panel="Limit",
-        ),
+        list[str], LIMIT("Tolerable: 50mm, 0.05 (m); may be repeated.", "--displacement", "-d", metavar="LENGTH")
     ],
     output: Annotated[
         list[str] | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE|URL",
-            help="Write .nc, .zarr, .png, .svg or .pdf; may be repeated.",
-            rich_help_panel=OUTPUT,
-        ),
+        OUTPUT("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE|URL"),
     ] = None,
     maximum_amplitude: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ACCELERATION", help="End of the search: 2g, 15 (m/s²).  [default: 5g]", rich_help_panel="Limit"
-        ),
+        str | None, LIMIT("End of the search: 2g, 15 (m/s²).  [default: 5g]", metavar="ACCELERATION")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,

@@ -5,15 +5,13 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
-import typer
-
-from slipsweep.cli.help import RARE
+from slipsweep.cli.help import RARE, Panel
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Family, Option, declared
 from slipsweep.motion.reading import Reading
 
 #: Groups of options that say what shakes, and how it responds.
-SHAKING, BLOCK = "Shaking", "Block"
+SHAKING, BLOCK = Panel("Shaking"), Panel("Block")
 
 #: The group of the options of a choice, by what names it on the command line.
 PANELS = {"waveform": SHAKING, "model": BLOCK}
@@ -111,11 +109,8 @@ def _family_parameters(family: Family[Any], default: str | None) -> list[inspect
     names = Literal[tuple(family.names)]  # type: ignore[valid-type]
     note = "" if default else f" (default: {family.default})"
     words = ", ".join(family.names)
-    about = typer.Option(
-        f"--{family.attribute}",
-        metavar="NAME",
-        help=f"{family.keyword.capitalize()}: {words}{note}.",
-        rich_help_panel=PANELS[family.attribute],
+    about = PANELS[family.attribute](
+        f"{family.keyword.capitalize()}: {words}{note}.", f"--{family.attribute}", metavar="NAME"
     )
     kind: Any = Annotated[names if default else names | None, about]
     first = inspect.Parameter(family.attribute, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
@@ -137,9 +132,7 @@ def _parameter(one: Option, family: Family[Any] | None = None) -> inspect.Parame
         notes.append(f"default: {one.default}")
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
-    about = typer.Option(
-        option_name(one.name), help=text, metavar="A,B,..." if one.is_list else None, rich_help_panel=panel
-    )
+    about = panel(text, option_name(one.name), metavar="A,B,..." if one.is_list else None)
     return inspect.Parameter(
         one.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, about]
     )

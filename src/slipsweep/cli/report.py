@@ -14,10 +14,7 @@ EXAMPLE = examples("slipsweep report design_chart.nc", "slipsweep report design_
 def report(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help='A result of "slipsweep run".')],
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="OUT.pdf", help="PDF to write (default: OUT.pdf).", rich_help_panel=OUTPUT
-        ),
+        Path | None, OUTPUT("PDF to write (default: OUT.pdf).", "--output", "-o", metavar="OUT.pdf")
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:

@@ -23,8 +23,12 @@ from slipsweep.cli.common import (
     examples,
     place_of,
 )
+from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
+
+#: The group of options that only this command has.
+SOLVER = Panel("Solver")
 
 EXAMPLE = examples(
     "slipsweep run sweeps/design_chart.toml",
@@ -41,24 +45,13 @@ _OTHER_FORMATS = (
 
 def run(
     sweep: Annotated[
-        Path,
-        typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to repeat."),
+        Path, typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to repeat.")
     ],
-    solver: Annotated[
-        Literal["auto", "step", "cycle"] | None,
-        typer.Option(
-            help="Solver, instead of solver.method.",
-            rich_help_panel="Solver",
-        ),
-    ] = None,
+    solver: Annotated[Literal["auto", "step", "cycle"] | None, SOLVER("Solver, instead of solver.method.")] = None,
     output: Annotated[
         str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="OUT.nc|OUT.zarr",
-            help="File or store to write (default: output.path, else SWEEP.nc).",
-            rich_help_panel=OUTPUT,
+        OUTPUT(
+            "File or store to write (default: output.path, else SWEEP.nc).", "--output", "-o", metavar="OUT.nc|OUT.zarr"
         ),
     ] = None,
     overwrite: Overwrite = False,

@@ -49,128 +49,42 @@ EXAMPLE = examples(
 @chooses(excitation=WAVEFORMS, model=MODELS)
 def simulate(
     *,
-    theta: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Inclination of the base: 5 (degrees), 0.1rad.",
-            rich_help_panel=BLOCK,
-        ),
-    ] = None,
-    mu_s: Annotated[float | None, typer.Option(help="Static friction coefficient.", rich_help_panel=BLOCK)] = None,
+    theta: Annotated[str | None, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")] = None,
+    mu_s: Annotated[float | None, BLOCK("Static friction coefficient.")] = None,
     yield_acceleration: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE", help="Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", rich_help_panel=BLOCK
-        ),
+        str | None, BLOCK("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", metavar="VALUE")
     ] = None,
-    yield_coefficient: Annotated[
-        float | None,
-        typer.Option(
-            help="Üy/g of Newmark's block, instead of --theta and --mu-s.",
-            rich_help_panel=RARE,
-        ),
-    ] = None,
-    decay_rate: Annotated[
-        float | None, typer.Option(help="Friction decay λ (default: Eq. 6 at the peak).", rich_help_panel=BLOCK)
-    ] = None,
-    delta_mu: Annotated[
-        float | None, typer.Option(help="Friction above static Δμ (default: Eqs. 10, 11).", rich_help_panel=BLOCK)
-    ] = None,
-    minimum_friction: Annotated[
-        float | None, typer.Option(help="Minimum friction μmin (default: Eq. 9).", rich_help_panel=BLOCK)
-    ] = None,
+    yield_coefficient: Annotated[float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")] = None,
+    decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = None,
+    delta_mu: Annotated[float | None, BLOCK("Friction above static Δμ (default: Eqs. 10, 11).")] = None,
+    minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = None,
     structure_frequency: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE", help="Natural frequency of the structure, Hz: flag flexible_block.", rich_help_panel=RARE
-        ),
+        str | None, RARE("Natural frequency of the structure, Hz: flag flexible_block.", metavar="VALUE")
     ] = None,
     model: Model,
-    amplitude: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Peak ground acceleration: 0.36g, 3.5 (m/s²).",
-            rich_help_panel=SHAKING,
-        ),
-    ] = None,
+    amplitude: Annotated[str | None, SHAKING("Peak ground acceleration: 0.36g, 3.5 (m/s²).", metavar="VALUE")] = None,
     displacement_amplitude: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Peak ground displacement instead: 30mm, 0.03 (m); not with a record.",
-            rich_help_panel=SHAKING,
-        ),
+        str | None, SHAKING("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.", metavar="VALUE")
     ] = None,
-    frequency: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Excitation frequency, Hz; not with a record.",
-            rich_help_panel=SHAKING,
-        ),
-    ] = None,
+    frequency: Annotated[str | None, SHAKING("Excitation frequency, Hz; not with a record.", metavar="VALUE")] = None,
     excitation: Waveform | None = None,
     record: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="A recorded motion: CSV, PEER AT2, COSMOS or ESM text.", rich_help_panel=SHAKING
-        ),
+        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, COSMOS or ESM text.", metavar="FILE")
     ] = None,
     reading: Mapping[str, Any],
-    scale: Annotated[
-        float | None,
-        typer.Option(
-            help="Factor on a record's acceleration (default: 1).",
-            rich_help_panel=SHAKING,
-        ),
-    ] = None,
-    pgv: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Peak ground velocity to scale a record to: 40cm/s.",
-            rich_help_panel=RARE,
-        ),
-    ] = None,
-    arias_intensity: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE",
-            help="Arias intensity to scale a record to, m/s.",
-            rich_help_panel=RARE,
-        ),
-    ] = None,
-    time_scale: Annotated[
-        float | None, typer.Option(help="Factor on a record's time (default: 1).", rich_help_panel=RARE)
-    ] = None,
+    scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = None,
+    pgv: Annotated[str | None, RARE("Peak ground velocity to scale a record to: 40cm/s.", metavar="VALUE")] = None,
+    arias_intensity: Annotated[str | None, RARE("Arias intensity to scale a record to, m/s.", metavar="VALUE")] = None,
+    time_scale: Annotated[float | None, RARE("Factor on a record's time (default: 1).")] = None,
     polarity: Annotated[
-        Literal["1", "-1"] | None,
-        typer.Option(
-            help="Sign of a record; 1: positive drives downslope (default: 1).",
-            rich_help_panel=SHAKING,
-        ),
+        Literal["1", "-1"] | None, SHAKING("Sign of a record; 1: positive drives downslope (default: 1).")
     ] = None,
     output: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write .nc, .csv, .png, .svg or .pdf; may be repeated.",
-            rich_help_panel=OUTPUT,
-        ),
+        OUTPUT("Write .nc, .csv, .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE"),
     ] = None,
     overwrite: Overwrite = False,
-    points: Annotated[
-        int | None,
-        typer.Option(
-            min=4,
-            help="Points in time per cycle of a waveform (default: 512).",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
+    points: Annotated[int | None, OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)] = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
