@@ -1,9 +1,8 @@
 """Calibration: Üy, λ and Δμ from a test on a shaking table, for the whole of it and cycle by cycle."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,24 +10,18 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid.plans import plan_sweep
-from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.tables import Table
 from slipsweep.model.options import MODELS, Mendez
 from slipsweep.model.parameters import check_finite, check_single, shown
-from slipsweep.model.variables import CALIBRATION, CALIBRATION_SERIES, HISTORY, PARAMETERS
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
-from slipsweep.studies.findings import findings, misfits, model_table, uncertainty_table
-from slipsweep.studies.fitting import SOUGHT, Fit, Line, Profile, Solution, Whitening
+from slipsweep.studies.calibration_tables import LARGE, Cycle, intervals_of, table_of
+from slipsweep.studies.findings import findings, misfits
+from slipsweep.studies.fitting import SOUGHT, Fit, Line, Solution, Whitening
 from slipsweep.studies.forward import COLUMN, Forward
 from slipsweep.studies.friction import noise_of, onset_acceleration, slides_of, threshold_of
 from slipsweep.studies.table_motion import TableMotion, table_motion
 
 Floats = NDArray[np.float64]
-
-#: The share of tests whose interval holds the true value, and the rise of the sum of squares at its ends.
-CONFIDENCE, SQUARE = 0.95, 3.841
-
-#: How large an offset or drift may be, in parts of a channel's largest value: no bound, in effect.
-_LARGE = 3.0
 
 #: Starts that are tried beside those that Eq. 1 gives: parts of the table's peak, λ, and parts of μs.
 _START_ONSETS, _START_DECAYS, _START_EXCESS = (0.05, 0.15, 0.3, 0.5, 0.7), (1.0, 2.5, 5.0), (0.05, 0.25, 0.5)
@@ -47,18 +40,6 @@ _A_CYCLE = 0.1
 
 #: Fewest samples of a cycle that is fitted by itself.
 _FEWEST_IN_A_CYCLE = 12
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """What one cycle gave: estimates and standard errors of Üy, λ and Δμ, and Kd; NaN where there is none."""
-
-    start: float
-    peak: float
-    continuous: bool
-    estimate: Floats
-    errors: Floats
-    attenuation: float
 
 
 def calibration_table(
@@ -123,7 +104,9 @@ def calibration_table(
         solution = replace(solution, parameters=np.array([same.max(), *solution.parameters[1:]]))
     summary = _summary(fit, solution)
     own = _cycles(fit, solution) if cycles else []
-    return _table(fit, solution, profile, summary, own, episodes, _drifting(fit, solution, starts))
+    intervals = intervals_of(solution, profile)
+    notes = findings(fit, solution, summary, intervals, episodes, _drifting(fit, solution, starts))
+    return table_of(fit, solution, intervals, summary, own, notes)
 
 
 def _drifting(fit: Fit, solution: Solution, starts: Sequence[Floats]) -> list[str]:
@@ -226,10 +209,10 @@ def _with_table_lines(
     span = test.times[-1] - test.times[0]
     names = []
     if TABLE in offsets or TABLE in drifts:
-        motion = motion.with_line(-np.ones(motion.times.size), _LARGE * peak)
+        motion = motion.with_line(-np.ones(motion.times.size), LARGE * peak)
         names.append(f"offset of {TABLE}")
     if TABLE in drifts:
-        motion = motion.with_line(-(motion.times - test.times[0]) / span, _LARGE * peak)
+        motion = motion.with_line(-(motion.times - test.times[0]) / span, LARGE * peak)
         names.append(f"drift of {TABLE}")
     return motion, tuple(names)
 
@@ -239,7 +222,7 @@ def _lines(test: ShakingTest, offsets: Sequence[str], drifts: Sequence[str]) -> 
     since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
     lines = []
     for name in test.responses:
-        size = _LARGE * float(np.nanmax(np.abs(test.channels[name])))
+        size = LARGE * float(np.nanmax(np.abs(test.channels[name])))
         if name in offsets or name in drifts:
             lines.append(Line(f"offset of {name}", {name: np.ones(since.size)}, size))
         if name in drifts:
@@ -344,7 +327,7 @@ def _without(fit: Fit, episodes: Sequence[tuple[float, float]]) -> Fit:
         for name in use:
             use[name] = use[name] & ~((times >= begin) & (times <= end))
         if "relative_displacement" in use:
-            size = _LARGE * float(np.nanmax(np.abs(fit.test.channels["relative_displacement"])))
+            size = LARGE * float(np.nanmax(np.abs(fit.test.channels["relative_displacement"])))
             step = {"relative_displacement": (times > end).astype(float)}
             lines.append(Line(f"upslope slip at {begin:.4g} s", step, size))
     return Fit(fit.test, fit.motion, fit.forward, use, lines, fit.table_lines, given_noise=fit.given_noise)
@@ -385,7 +368,7 @@ def _cycles(fit: Fit, solution: Solution) -> list[Cycle]:
             continue
         lines = list(fit.lines)
         # what the cycles before have left: a displacement, and a velocity where the block is not at rest
-        size = {name: _LARGE * float(np.nanmax(np.abs(test.channels[name]))) for name in test.responses}
+        size = {name: LARGE * float(np.nanmax(np.abs(test.channels[name]))) for name in test.responses}
         if "relative_displacement" in use:
             lines.append(Line("start", {"relative_displacement": np.ones(times.size)}, size["relative_displacement"]))
         if whole[first, COLUMN["relative_velocity"]] != 0.0:
@@ -441,149 +424,3 @@ def _summary(fit: Fit, solution: Solution) -> Table:
         model=fit.forward.model,
     )
     return plan.solve()
-
-
-# -------------------------------------------------------------------------------------- table
-
-
-def _table(
-    fit: Fit,
-    solution: Solution,
-    profile: Profile,
-    summary: Table,
-    cycles: Sequence[Cycle],
-    episodes: Sequence[tuple[float, float]],
-    drifting: Sequence[str],
-) -> Table:
-    """All that was found, as a table."""
-    test = fit.test
-    history = fit.computed(solution.parameters, solution.wrong)
-    added = _added(fit, solution)
-    lost = ~np.isfinite(solution.errors)
-    intervals = np.array([profile.interval(at, SQUARE) for at in range(3)])
-    # the profile may be lower beside what was found: both are possible
-    intervals = np.column_stack(
-        [np.minimum(intervals[:, 0], solution.parameters), np.maximum(intervals[:, 1], solution.parameters)]
-    )
-    intervals = np.maximum(intervals, 0.0)  # nothing physical lies below
-    intervals[1:][lost[1:]] = np.nan
-    time = Variable(("time",), test.times, {"units": "s", "long_name": "time"})
-    place = np.arange(3, dtype=np.int8)
-    names = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
-    coords = {
-        "time": time,
-        "parameter": Variable(("parameter",), place, {"long_name": "parameter", **names}),
-        "other_parameter": Variable(("other_parameter",), place, {"long_name": "other parameter", **names}),
-        "bound": Variable(
-            ("bound",),
-            np.array([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE]),
-            {"units": "1", "long_name": "probability below an end of an interval"},
-        ),
-        "theta": Variable((), np.array(fit.forward.theta), PARAMETERS["theta"]),
-        "mu_s": Variable((), np.array(fit.forward.mu_s), PARAMETERS["mu_s"]),
-    }
-    data: dict[str, Variable] = {}
-    for at, name in enumerate(SOUGHT):
-        about = PARAMETERS[name]
-        data[name] = Variable((), np.array(solution.parameters[at]), about)
-        error = np.nan if lost[at] else solution.errors[at]
-        data[f"{name}_error"] = Variable(
-            (), np.array(error), {**about, "long_name": f"standard error of the {about['long_name']}"}
-        )
-        data[f"{name}_interval"] = Variable(
-            ("bound",), intervals[at], {**about, "long_name": f"95 % interval of the {about['long_name']}"}
-        )
-    data["correlation"] = Variable(
-        ("parameter", "other_parameter"), correlation_of(solution.covariance), CALIBRATION["correlation"]
-    )
-    if cycles:
-        coords["cycle"] = Variable(
-            ("cycle",), np.arange(1, len(cycles) + 1), {"units": "1", "long_name": "number of the cycle"}
-        )
-        table: dict[str, Any] = {
-            "cycle_start": [one.start for one in cycles],
-            "cycle_peak_acceleration": [one.peak for one in cycles],
-            "cycle_sliding_mode": np.array([2 if one.continuous else 1 for one in cycles], np.int8),
-            "cycle_attenuation_coefficient": [one.attenuation for one in cycles],
-        }
-        for at, name in enumerate(SOUGHT):
-            table[f"cycle_{name}"] = [one.estimate[at] for one in cycles]
-            table[f"cycle_{name}_error"] = [one.errors[at] for one in cycles]
-        data |= {name: Variable(("cycle",), np.asarray(values), CALIBRATION[name]) for name, values in table.items()}
-    series = {f"measured_{name}": values - added.get(name, 0.0) for name, values in test.channels.items()}
-    series |= {f"computed_{name}": history[:, COLUMN[name]] for name in HISTORY if name != "friction_coefficient"}
-    friction = history[:, COLUMN["friction_coefficient"]]
-    series["computed_friction_coefficient"] = friction
-    data |= {name: Variable(("time",), values, CALIBRATION_SERIES[name]) for name, values in series.items()}
-    for name in test.responses:
-        rest = (test.channels[name] - added[name] - history[:, COLUMN[name]])[fit.use[name]]
-        about = HISTORY[name]
-        data[f"misfit_{name}"] = Variable(
-            (),
-            np.array(np.sqrt(np.mean(rest**2))),
-            {**about, "long_name": f"root mean square of measured less computed {about['long_name']}"},
-        )
-        span = float(np.nanmax(np.abs(history[:, COLUMN[name]]), initial=1e-300))
-        data[f"relative_misfit_{name}"] = Variable(
-            (),
-            np.array(np.sqrt(np.mean(rest**2)) / span),
-            {"units": "1", "long_name": f"misfit of the {about['long_name']} over its largest computed value"},
-        )
-    for name in ("permanent_displacement", "stick_slip_pulses", "continuous_pulses", "validity"):
-        data[name] = summary[name]
-    notes = findings(fit, solution, summary, intervals, episodes, drifting)
-    attrs = {
-        "title": "Calibration of a sliding block from a test on a shaking table",
-        **test.attrs,
-        **MODELS.attributes(fit.forward.model),
-        "channels": json.dumps(test.responses),
-        "table_noise": fit.motion.noise,
-        "table_coefficients": fit.motion.coefficients,
-        "removed": "; ".join(_removed(fit, solution)) or "nothing",
-        "findings": "\n".join(notes),
-        "model_table": model_table(fit.forward, solution, intervals),
-        "uncertainty_table": uncertainty_table(fit.forward, solution, correlation_of(solution.covariance)),
-    }
-    return Table(coords, data, attrs)
-
-
-def correlation_of(covariance: Floats) -> Floats:
-    """The correlation matrix; NaN of what is not known."""
-    sizes = np.sqrt(np.diag(covariance))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        found = covariance / np.outer(sizes, sizes)
-    known = np.isfinite(sizes) & (sizes > 0.0)
-    found[~known, :] = np.nan
-    found[:, ~known] = np.nan
-    np.fill_diagonal(found, np.where(known, 1.0, np.nan))
-    return np.asarray(found)
-
-
-def _added(fit: Fit, solution: Solution) -> dict[str, Floats]:
-    """What offsets, drifts and steps add to each channel."""
-    added = {name: np.zeros(fit.test.times.size) for name in fit.test.channels}
-    shapes = fit.motion.shapes.shape[1]
-    for value, line in zip(solution.nuisances[shapes:], fit.lines, strict=True):
-        for name, part in line.parts.items():
-            added[name] = added[name] + value * line.deviation * part
-    for value, name in zip(solution.nuisances[shapes - len(fit.table_lines) : shapes], fit.table_lines, strict=True):
-        since = (fit.test.times - fit.test.times[0]) / (fit.test.times[-1] - fit.test.times[0])
-        size = _LARGE * float(np.abs(fit.test.channels[TABLE]).max())
-        added[TABLE] = added[TABLE] + value * size * (since if name.startswith("drift") else 1.0)
-    return added
-
-
-def _removed(fit: Fit, solution: Solution) -> list[str]:
-    """What was found of each offset, drift and step, with its standard error."""
-    shapes = fit.motion.shapes.shape[1]
-    peak = float(np.abs(fit.test.channels[TABLE]).max())
-    named = [(name, _LARGE * peak) for name in fit.table_lines] + [(one.name, one.deviation) for one in fit.lines]
-    places = range(shapes - len(fit.table_lines), solution.nuisances.size)
-    texts = []
-    for at, (name, size) in zip(places, named, strict=True):
-        channel = next((one for one in fit.test.channels if one in name), "relative_displacement")
-        unit = HISTORY[channel]["units"]
-        over = " over the whole test" if name.startswith("drift") else ""
-        value, error = solution.nuisances[at] * size, solution.spread[at] * size
-        texts.append(f"{name}: {value:.4g} ± {error:.2g} {unit}{over}")
-    return texts
