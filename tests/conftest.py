@@ -2,11 +2,45 @@
 
 import os
 import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
 
 # before NumPy is loaded: its linear algebra waits for its threads in busy loops, which costs ten times the work
 # where each core has a process of the suite already
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# each process that a test starts would compile all sources of the program anew, which is a fifth of its time
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # a suite started in the background ignores Ctrl-C, and so would every process it starts to interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_power_cut() -> Iterator[None]:
+    """Nothing waits for the disk, which alone takes minutes on a slow one; processes that tests start do wait."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        yield
+
+
+@pytest.fixture(scope="module")
+def tried_here() -> Iterator[None]:
+    """Have results tried out in this process, not in a copy of it: 0.1 s less for each that is opened.
+
+    For files that tests have written themselves; tests/files/test_results.py opens those that are damaged.
+    """
+    from slipsweep.files import guard  # here: the settings above come first
+
+    def tried(read: guard.Trial, path: Path) -> tuple[int, str]:
+        told: list[str] = []
+        return guard._run(read, path, told.append), "".join(told)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(guard, "_limit_memory", lambda: None)
+        patch.setattr(guard, "_next_step", lambda: None)
+        patch.setattr(guard, "_forked", tried)
+        yield

@@ -33,6 +33,8 @@ from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
 from tests.support.commands import command
 
+pytestmark = pytest.mark.usefixtures("tried_here")
+
 SWEEP = """
 [axes.theta]
 start = 0

@@ -20,6 +20,8 @@ from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
 from tests.support.commands import command
 
+pytestmark = pytest.mark.usefixtures("tried_here")
+
 GRID = """
 [axes.theta]
 values = [0, 5, 20]

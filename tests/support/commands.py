@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+from unittest import mock
 
 from slipsweep.cli import main
 
@@ -24,8 +25,13 @@ def run_command(*arguments: object, encoding: str = "utf-8") -> Ended:
     """Run a command to its end; `encoding` is that of what it prints."""
     written = [io.BytesIO(), io.BytesIO()]
     streams = [io.TextIOWrapper(one, encoding, errors="surrogateescape", write_through=True) for one in written]
-    with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
-        status = main([str(argument) for argument in arguments])
+    words = [str(argument) for argument in arguments]
+    with (
+        contextlib.redirect_stdout(streams[0]),
+        contextlib.redirect_stderr(streams[1]),
+        mock.patch.object(sys, "argv", ["slipsweep", *words]),  # which a result's history tells
+    ):
+        status = main(words)
     output, errors = (one.getvalue().decode(errors="surrogateescape") for one in written)
     return Ended(status, output, errors)
 
