@@ -1,14 +1,16 @@
 """Every plan, every way: in parts, in chunks, in folders, by workers, killed and gone on with, to the same bits."""
 
+import functools
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import netCDF4
 import numpy as np
@@ -21,11 +23,12 @@ from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import chunk_lengths, grid_chunks, places
+from slipsweep.grid.tables import Table
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import Job, limit_job, sweep_job
 from slipsweep.runs.stored import stored_table
 from tests.support.commands import command as run
-from tests.support.processes import TIMEOUT, slipsweep
+from tests.support.processes import TIMEOUT, two_workers
 
 AXES = """
 [axes.amplitude]
@@ -148,10 +151,53 @@ def assert_part(plan: AnyPlan, chunk: dict[str, slice], found: Any, whole: Any) 
         assert part.values.tobytes() == np.ascontiguousarray(expected).tobytes(), (name, chunk)
 
 
+@functools.cache
+def solved(name: str) -> Any:
+    """All results of a plan."""
+    return PLANS[name]().plan.solve()
+
+
+def cut_from(whole: Any) -> solving.Solved:
+    """What gives chunks out of all results: single cells, which another test solves by themselves."""
+
+    def part(chunk: dict[str, slice], one: Any) -> Any:
+        return replace(one, values=one.values[tuple(places(chunk, one.sizes).values())].copy())
+
+    def cut(plan: AnyPlan, missing: Any, progress: Any = None) -> Any:
+        for number, chunk in missing.items():
+            coords, results = (
+                {name: part(chunk, one) for name, one in variables.items()}
+                for variables in (whole.coords, whole.data_vars)
+            )
+            yield number, Table(coords, results, whole.attrs)
+
+    return cut
+
+
+class Written(NamedTuple):
+    """Where a run has written, alone in a folder, and what it reports; nothing may be changed there."""
+
+    path: Path
+    report: store.Report
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Written]:
+    """Run a plan to its end, in one chunk or several; the tests share what it writes."""
+
+    @functools.cache
+    def run_to_its_end(name: str, cells: int | None = None, split: bool = False) -> Written:
+        path = tmp_path_factory.mktemp("written") / "a.nc"
+        solve = cut_from(solved(name)) if cells == 1 else solving.solve_here
+        return Written(path, store.run(PLANS[name](), path, command="x", chunk_cells=cells, split=split, solved=solve))
+
+    return run_to_its_end
+
+
 @pytest.mark.parametrize("name", PLANS)
 def test_parts_give_the_bits_of_the_whole(name: str) -> None:
     plan = PLANS[name]().plan
-    whole = plan.solve()
+    whole = solved(name)
     empty = plan.empty()
     assert [(one.dims, one.values.shape, one.values.dtype, one.attrs) for one in empty.data_vars.values()] == [
         (one.dims, one.values.shape, one.values.dtype, one.attrs) for one in whole.data_vars.values()
@@ -188,19 +234,15 @@ def stored(path: Path) -> dict[str, tuple[tuple[str, ...], bytes]]:
 
 @pytest.mark.parametrize("cells", [1, 6, 20])
 @pytest.mark.parametrize("name", PLANS)
-def test_chunks_and_folders_give_what_one_piece_gives(tmp_path: Path, name: str, cells: int) -> None:
-    job = PLANS[name]()
-    one = store.run(job, tmp_path / "one.nc", command="x")
-    chunks = store.run(job, tmp_path / "chunks.nc", command="x", chunk_cells=cells)
-    assert stored(tmp_path / "chunks.nc") == stored(tmp_path / "one.nc")
-    # what several chunks have, as they lack a dimension, is counted once
-    assert chunks.tally == one.tally
-    split = store.run(job, tmp_path / "split", command="x", chunk_cells=cells, split=True)
-    assert split.tally == one.tally
-    whole = job.plan.solve()
-    for path in (tmp_path / "chunks.nc", tmp_path / "split"):
-        table = stored_table(job.plan, path, cells, job.plan.names)
-        assert_part(job.plan, {}, table, whole)
+def test_chunks_and_folders_give_what_one_piece_gives(written: Callable[..., Written], name: str, cells: int) -> None:
+    plan = PLANS[name]().plan
+    one = written(name)
+    # of single cells one file alone: files of a folder are no others than those of 6 cells
+    for found in (written(name, cells, split=split) for split in ((False,) if cells == 1 else (False, True))):
+        # what several chunks have, as they lack a dimension, is counted once
+        assert found.report.tally == one.report.tally
+        assert_part(plan, {}, stored_table(plan, found.path, cells, plan.names), solved(name))
+    assert stored(written(name, cells).path) == stored(one.path)
 
 
 def stopped(job: Job, path: Path, after: int, **options: Any) -> None:
@@ -219,36 +261,37 @@ def stopped(job: Job, path: Path, after: int, **options: Any) -> None:
 
 @pytest.mark.parametrize("split", [False, True])
 @pytest.mark.parametrize("name", PLANS)
-def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path: Path, name: str, split: bool) -> None:
+def test_an_interrupted_run_goes_on_to_the_same_bits(
+    tmp_path: Path, written: Callable[..., Written], name: str, split: bool
+) -> None:
     job = PLANS[name]()
-    store.run(job, tmp_path / "whole", command="x", chunk_cells=6, split=split)
     stopped(job, tmp_path / "a", 2, chunk_cells=6, split=split)
-    solved: list[int] = []
+    numbers: list[int] = []
 
     def counted(*arguments: Any) -> Any:
         for found in solving.solve_here(*arguments):
-            solved.append(found[0])
+            numbers.append(found[0])
             yield found
 
     store.run(job, tmp_path / "a", command="x", resume=True, split=split, solved=counted)
-    assert solved[0] == 2
-    for path in sorted((tmp_path / "whole").iterdir()) if split else [tmp_path / "whole"]:
+    assert numbers[0] == 2
+    whole = written(name, 6, split=split).path
+    for path in sorted(whole.iterdir()) if split else [whole]:
         assert stored(tmp_path / "a" / path.name if split else tmp_path / "a") == stored(path)
 
 
 @pytest.mark.parametrize("split", [False, True])
 @pytest.mark.parametrize("name", PLANS)
-def test_what_is_complete_stays_as_it_is(tmp_path: Path, name: str, split: bool) -> None:
-    job, path = PLANS[name](), tmp_path / "a.nc"
-    first = store.run(job, path, command="x", chunk_cells=6, split=split)
+def test_what_is_complete_stays_as_it_is(written: Callable[..., Written], name: str, split: bool) -> None:
+    job, (path, first) = PLANS[name](), written(name, 6, split=split)
     files = sorted(path.iterdir()) if split else [path]
     before = [(file.read_bytes(), file.stat().st_mtime_ns) for file in files]
-    again = store.run(PLANS[name](), path, command="y", resume=True, split=split, solved=unsolved)
+    again = store.run(job, path, command="y", resume=True, split=split, solved=unsolved)
     assert (again.found, again.tally, first.found) == (True, first.tally, False)
     assert [(file.read_bytes(), file.stat().st_mtime_ns) for file in files] == before
-    assert [entry.name for entry in tmp_path.iterdir()] == ["a.nc"]
+    assert [entry.name for entry in path.parent.iterdir()] == ["a.nc"]
     table = stored_table(job.plan, path, again.chunk_cells, job.plan.names)
-    assert_part(job.plan, {}, table, job.plan.solve())
+    assert_part(job.plan, {}, table, solved(name))
 
 
 def unsolved(*arguments: Any) -> Any:
@@ -388,9 +431,16 @@ sys.exit(main(sys.argv[2:]))
 """
 
 
+@pytest.fixture(scope="module")
+def others() -> Iterator[str]:
+    """Two workers that all commands share."""
+    with two_workers() as address:
+        yield address
+
+
 @pytest.mark.skipif(os.name != "posix", reason="kills the POSIX way")
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_killed_command_goes_on_to_the_same_bits(tmp_path: Path, name: str) -> None:
+def test_a_killed_command_goes_on_to_the_same_bits(tmp_path: Path, others: str, name: str) -> None:
     text, arguments, cells = COMMANDS[name]
     (tmp_path / "a.toml").write_text(text)
     expected = run(tmp_path, *arguments, "-o", "whole.nc")
@@ -407,7 +457,7 @@ def test_a_killed_command_goes_on_to_the_same_bits(tmp_path: Path, name: str) ->
     refused = run(tmp_path, *arguments, "-o", "a.nc")
     assert (refused.returncode, "go on with --resume" in refused.stderr) == (2, True)
     # what is left is done by others
-    done = slipsweep(tmp_path, *arguments, "-o", "a.nc", "--resume", "--workers", "2")
+    done = run(tmp_path, *arguments, "-o", "a.nc", "--resume", "--scheduler", others)
     assert (done.returncode, done.stderr) == (0, "")
     assert stored(tmp_path / "a.nc") == stored(tmp_path / "whole.nc")
     assert not journal.parent.exists()

@@ -21,9 +21,13 @@ from slipsweep.runs.jobs import sweep_job
 from slipsweep.runs.verify import verify
 from tests.support import fault_rounds
 from tests.support.fault_rounds import SWEEP, Stop, counting, run, stopping
+from tests.support.processes import two_workers
 
 zarr = pytest.importorskip("zarr")
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning"),
+    pytest.mark.usefixtures("tried_here"),
+]
 
 #: Labels of cases, of which none is ASCII only.
 CASES = """
@@ -252,7 +256,6 @@ def test_limits_go_into_a_store_as_into_a_file(tmp_path: Path) -> None:
 
 def test_workers_write_their_chunks_themselves(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What comes back from them is what goes on record: no results pass through the client."""
-    pytest.importorskip("distributed")
     came: list[Any] = []
     result = cluster._Run._result
 
@@ -262,16 +265,17 @@ def test_workers_write_their_chunks_themselves(results: Path, tmp_path: Path, mo
 
     monkeypatch.setattr(cluster._Run, "_result", counted)
     nbytes = (results / "grid.nc").stat().st_size
-    for name, split in (("a.zarr", False), ("a", True)):
-        came.clear()
-        with cluster.cluster(workers=2) as solved:
-            run(tmp_path / name, split=split, shared=True, solved=solved)
-        assert len(came) == 60
-        assert {type(one).__name__ for one in came} == {"Delivered"}
-        # however many cells a chunk has: names, a checksum and counts
-        assert sum(len(pickle.dumps(one)) for one in came) < 60 * 1000 < nbytes / 30
-        assert verify(tmp_path / name).damaged == []
-        assert_same(slipsweep.open_result(tmp_path / name), slipsweep.open_result(results / "grid.nc"))
+    with two_workers() as address:
+        for name, split in (("a.zarr", False), ("a", True)):
+            came.clear()
+            with cluster.cluster(scheduler=address) as solved:
+                run(tmp_path / name, split=split, shared=True, solved=solved)
+            assert len(came) == 60
+            assert {type(one).__name__ for one in came} == {"Delivered"}
+            # however many cells a chunk has: names, a checksum and counts
+            assert sum(len(pickle.dumps(one)) for one in came) < 60 * 1000 < nbytes / 30
+            assert verify(tmp_path / name).damaged == []
+            assert_same(slipsweep.open_result(tmp_path / name), slipsweep.open_result(results / "grid.nc"))
 
 
 # ------------------------------------------------------------------------------- addresses

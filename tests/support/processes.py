@@ -3,7 +3,8 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -53,3 +54,13 @@ def on_a_terminal(folder: Path, *arguments: str, environment: Mapping[str, str] 
         process.wait(TIMEOUT)
     os.close(reader)
     return read.decode()
+
+
+@contextmanager
+def two_workers() -> Iterator[str]:
+    """Two workers as processes, which take seconds to start: the address of their scheduler."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0
+    ) as cluster:
+        yield cluster.scheduler_address
