@@ -1,11 +1,14 @@
 """What README.md and docs/ say is so: their blocks run, their tables are those of the program."""
 
+import contextlib
+import io
 import os
 import re
 import shlex
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from dataclasses import MISSING
 from itertools import zip_longest
@@ -21,7 +24,7 @@ from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.model.variables import FLAG_KINDS, Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
-from tests.support.commands import command
+from tests.support.commands import command, working_folder
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (
@@ -113,6 +116,25 @@ def output_of(arguments: list[str], folder: Path) -> str:
     return done.stdout
 
 
+def printed_by(text: str, where: str, folder: Path) -> str:
+    """What a reader's program prints, run in this process, which has imported everything already."""
+    assert "slipsweep." not in text or "import slipsweep" in text, where
+    output, errors = io.StringIO(), io.StringIO()
+    with (
+        working_folder(folder),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(errors),
+        warnings.catch_warnings(),
+    ):
+        # all that Python would show
+        warnings.simplefilter("error")
+        for hidden in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+            warnings.simplefilter("ignore", hidden)
+        exec(compile(text, where, "exec"), {"__name__": "__main__"})
+    assert errors.getvalue() == "", where
+    return output.getvalue()
+
+
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
     """The blocks of a document, in order, in one folder that holds what a clone holds."""
@@ -146,7 +168,7 @@ def run_blocks(document: str, found: list[Block], tmp_path: Path) -> None:
                     continue  # a program of others, not on this machine
                 assert re.fullmatch(pattern(expected), printed, re.DOTALL), f"{where} printed:\n{printed}"
         elif block.language == "python":
-            printed = output_of([sys.executable, "-c", block.text], tmp_path)
+            printed = printed_by(block.text, where, tmp_path)
             assert printed == (after.text if after and after.language == "text" else ""), where
         elif block.language == "toml":
             spec.parse(block.text, where)

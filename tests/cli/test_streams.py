@@ -1,5 +1,6 @@
 """Streams: sweeps from pipes, output in alphabets of one byte, output that nobody reads or that is lost."""
 
+import contextlib
 import os
 import subprocess
 import threading
@@ -69,7 +70,10 @@ def test_every_command_in_every_alphabet(made: Path, encoding: str) -> None:
         )
     ):  # fmt: skip
         overwrite = ("--overwrite",) if "-o" in command else ()
-        done = slipsweep(made, *command, *overwrite, environment={"PYTHONIOENCODING": encoding})
+        if number in (0, 8):  # as users start it: one that is served, and one that is not
+            done = slipsweep(made, *command, *overwrite, environment={"PYTHONIOENCODING": encoding})
+        else:
+            done = run(made, *command, *overwrite, encoding=encoding)
         assert done.returncode == (2 if number == 8 else 0), done
         assert "Traceback" not in done.stderr
         text = done.stdout.encode(errors="surrogateescape").decode(encoding)  # letters that it has not are spelled
@@ -97,9 +101,9 @@ def test_output_that_nobody_reads(made: Path, tmp_path: Path, closed: str) -> No
         assert {*os.listdir(tmp_path)} - before == wanted
     assert shell(tmp_path, f"$S info nothing.nc {closed}").returncode == 2
     # what is written is what would have been, and no message is in it
-    done = shell(tmp_path, "$S info a.nc")
-    assert done.returncode == 0
-    assert done.stdout.startswith(b"a.nc")
+    shown = run(tmp_path, "info", "a.nc")
+    assert shown.returncode == 0
+    assert shown.stdout.startswith("a.nc")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="has no device that is full")
@@ -137,21 +141,46 @@ def test_a_sweep_from_a_named_pipe(pipe: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@contextlib.contextmanager
+def in_place_of(source: str, path: Path) -> Iterator[str]:
+    """What the shell makes of a source of a file's text, for a command in this process; its name for the command."""
+    if "< a.toml" in source:
+        reader = os.open(path, os.O_RDONLY)
+    else:
+        reader, writer = os.pipe()
+        os.write(writer, path.read_bytes())  # less than a pipe takes
+        os.close(writer)
+    before = os.dup(0)
+    try:
+        if source.startswith("<("):
+            yield f"/dev/fd/{reader}"
+        else:
+            os.dup2(reader, 0)
+            yield source.partition(" ")[0]
+    finally:
+        os.dup2(before, 0)
+        os.close(before)
+        os.close(reader)
+
+
 @posix
 @pytest.mark.parametrize("source", ["- < a.toml", "/dev/stdin < a.toml", "<(cat a.toml)", "-", "/dev/stdin"])
 def test_a_sweep_from_standard_input(made: Path, tmp_path: Path, source: str) -> None:
-    (tmp_path / "a.toml").write_text(CELL)
-    before = "" if "a.toml" in source else "cat a.toml | "
-    done = shell(tmp_path, f"{before}$S run {source} -o a.nc")
+    text = tmp_path / "a.toml"
+    text.write_text(CELL)
+    done = shell(tmp_path, f"{'' if 'a.toml' in source else 'cat a.toml | '}$S run {source} -o a.nc")
     assert (done.returncode, done.stderr) == (0, b"")
-    done = shell(tmp_path, f"{before}$S limit {source} -d 5mm -o limit.nc")
-    assert (done.returncode, done.stderr) == (0, b"")
+    with in_place_of(source, text) as name:
+        here = run(tmp_path, "limit", name, "-d", "5mm", "-o", "limit.nc")
+    assert (here.returncode, here.stderr) == (0, "")
     # it has no name that one could make another of
-    done = shell(tmp_path, f"{before}$S run {source}")
-    assert done.returncode == 2
-    assert b"name the output with -o or output.path" in done.stderr
-    (tmp_path / "a.toml").write_text(CELL + '[output]\npath = "own.nc"\n')
-    assert shell(tmp_path, f"{before}$S run {source} --quiet").returncode == 0
+    with in_place_of(source, text) as name:
+        here = run(tmp_path, "run", name)
+    assert here.returncode == 2
+    assert "name the output with -o or output.path" in here.stderr
+    text.write_text(CELL + '[output]\npath = "own.nc"\n')
+    with in_place_of(source, text) as name:
+        assert run(tmp_path, "run", name, "--quiet").returncode == 0
     assert {*os.listdir(tmp_path)} == {"a.toml", "a.nc", "limit.nc", "own.nc"}
     assert run(tmp_path, "run", "own.nc", "-o", "again.nc").returncode == 0
 
