@@ -69,6 +69,9 @@ for order in itertools.permutations(sys.argv[1:]):
     slipsweep = importlib.import_module("slipsweep")
     for name in order + order:
         assert callable(getattr(slipsweep, name)), (order, name)
+for name, *numbers in ("sweep", 1.8), ("simulate", 1.8), ("friction_parameters",):
+    getattr(slipsweep, name)(5.0, 0.38, 3.55, *numbers)
+    assert all(callable(getattr(slipsweep, other)) for other in sys.argv[1:]), name
 print("well")
 """
 

@@ -99,7 +99,7 @@ def test_four_processes_compile_once(tmp_path: Path) -> None:
 
 def test_sweeps_at_once_on_an_empty_cache(tmp_path: Path) -> None:
     """The one that compiles computes the bits of those that load."""
-    outputs = {finish(process) for process in [start(SWEEP, tmp_path / "cache") for _ in range(3)]}
+    outputs = {finish(process) for process in [start(SWEEP, tmp_path / "cache") for _ in range(2)]}
     assert len(outputs) == 1
     kernels = files(tmp_path / "cache")
     assert len(kernels) == 1

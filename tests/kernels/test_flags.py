@@ -1,5 +1,6 @@
 """Every flag against its definition, in plain Python that shares nothing with the kernels."""
 
+import functools
 import math
 from typing import Any
 
@@ -60,6 +61,16 @@ def told(cells: dict[str, Any], model: Any, cycles: int, solver: str) -> xr.Data
     )
 
 
+@functools.cache
+def defined(number: int, names: tuple[str, ...], cycles: int, model: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Flags by their definitions, and those that are decided: the same for both solvers."""
+    cells = drawn(number, names)
+    optional = [cells.get(name, np.full(CELLS, math.nan)) for name in FRICTION]
+    interface = Interface(np.tan(np.radians(cells["theta"])), cells["mu_s"], cells["amplitude"], *optional)
+    options = (model.name, *(getattr(model, name, "") for name in ("rise", "recoupling")))
+    return flags_of_sine(interface, cycles, *options)
+
+
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 @pytest.mark.parametrize("model", [*MODELS, slipsweep.Newmark()], ids=str)
 def test_random_cells_have_the_flags_of_their_definitions(solver: str, model: Any) -> None:
@@ -67,10 +78,7 @@ def test_random_cells_have_the_flags_of_their_definitions(solver: str, model: An
     undecided = 0
     for number, names in enumerate(GIVEN):
         cells, cycles = drawn(number, names), 1 + number % 3
-        optional = [cells.get(name, np.full(CELLS, math.nan)) for name in FRICTION]
-        interface = Interface(np.tan(np.radians(cells["theta"])), cells["mu_s"], cells["amplitude"], *optional)
-        options = (model.name, *(getattr(model, name, "") for name in ("rise", "recoupling")))
-        expected, decided = flags_of_sine(interface, cycles, *options)
+        expected, decided = defined(number, names, cycles, model)
         found = told(cells, model, cycles, solver)
         flags = found.validity.values.astype(int)
         wrong = np.flatnonzero((flags ^ expected) & decided)

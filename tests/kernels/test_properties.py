@@ -1,7 +1,5 @@
 """What must hold for every block: scaling, signs, order, symmetry, and indifference to how a sweep is written."""
 
-import subprocess
-import sys
 from math import isclose, isnan, pi, radians, tan
 from typing import Any
 
@@ -503,14 +501,3 @@ def test_grazing_displacement_has_its_leading_term() -> None:
             exact = reference.solve(10.0, 0.6, amplitude, 1.0, yield_acceleration=onset, cycles=1, model="newmark")
             error = abs(mpf(value(result)) - exact.permanent_displacement) / exact.permanent_displacement
             assert error < 8 * mp.mpf(2) ** -52 / excess, "no digits lost beyond those of A/Uy - 1"
-
-
-@pytest.mark.parametrize("first", ["sweep", "simulate", "friction_parameters"])
-def test_public_functions_whichever_is_used_first(first: str) -> None:
-    """Loaded lazily, none hides another (`slipsweep.sweep` is a function, and also a module's name)."""
-    program = (
-        f"import slipsweep; slipsweep.{first}(5.0, 0.38, 3.55{', 1.8' if first != 'friction_parameters' else ''}); "
-        "assert all(callable(getattr(slipsweep, name)) for name in ('sweep', 'simulate', 'friction_parameters'))"
-    )
-    finished = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert finished.returncode == 0, finished.stderr
