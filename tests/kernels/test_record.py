@@ -543,6 +543,21 @@ def test_time_scale_and_polarity(shaking: Record, options: dict[str, Any]) -> No
         np.testing.assert_allclose(longer[name], 1.7**power * as_recorded[name], rtol=1e-15, err_msg=name)
 
 
+@pytest.mark.parametrize("step", [0.0, 0.25])
+def test_a_sweep_is_what_a_history_ends_with(shaking: Record, step: float) -> None:
+    """A history goes by the general rules through all pulses, a sweep by one loop through most; steps make plateaus."""
+    rng = np.random.default_rng(3)
+    record = Record(shaking.times, np.round(shaking.acceleration / step) * step) if step else shaking
+    for _ in range(25):
+        theta, onset, scale = rng.uniform(0.0, 20.0), rng.uniform(0.1, 3.0), rng.uniform(0.3, 2.0)
+        cell = {"theta": theta, "mu_s": tan(radians(theta)) + rng.uniform(0.05, 0.5), "yield_acceleration": onset}
+        swept = sweep(**choices(**cell, excitation=record, scale=scale))
+        history = slipsweep.simulate(**choices(**cell, excitation=record, scale=scale, times=[0.0, 1e4]))
+        np.testing.assert_allclose(
+            swept.permanent_displacement, history.relative_displacement[-1], rtol=1e-11, err_msg=str((cell, scale))
+        )
+
+
 @MODELS
 def test_scale_is_the_scaled_record(shaking: Record, options: dict[str, Any]) -> None:
     swept = sweep(5.0, 0.4, **choices(scale=[0.8, 1.3], **options, excitation=shaking))

@@ -380,8 +380,8 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
         # some 1 µs against 0.1, and more for a long record
         cost = max(16, recorded.pieces.shape[0] // 128)
+        own = newmark_kernels.record_of(recorded)
         if isinstance(problem.model, Newmark):
-            own = newmark_kernels.record_of(recorded)
 
             def call_newmark(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
                 tile, lanes = tile_of(grid), newmark_kernels.room_of()
@@ -390,7 +390,7 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
             return call_newmark, cost
 
         def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, targets, tile_of(grid))
+            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, own, targets, tile_of(grid))
 
         return call, cost
     assert isinstance(motion, Waveform)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
-from slipsweep.jit.elementary import rising_phase
+from slipsweep.jit.elementary import log, rising_phase
 from slipsweep.kernels.events import STRIP, root_of
 from slipsweep.model import equations as eq
 from slipsweep.model.variables import VALUELESS, Validity
@@ -308,9 +308,12 @@ def slope_root(block: Block, level: float, start: float, end: float) -> float:
 @scalar
 def relative_acceleration_root(block: Block, start: float, end: float) -> float:
     """x between start and end at which D = 0, whose sign changes."""
+    # friction is back at μs there, and most D are near 0: from the end Newton's steps would leave the bracket
+    static = math.copysign(block.g / block.decay_rate * log((block.mu_s + block.delta_mu) / block.mu_s), end)
+    first = static if min(start, end) < static < max(start, end) else end
     if relative_acceleration(block, end) >= 0.0:
-        return _relative_acceleration_root(block, start, end, end, 0.0)
-    return _relative_acceleration_root(block, end, start, end, 0.0)
+        return _relative_acceleration_root(block, start, end, first, 0.0)
+    return _relative_acceleration_root(block, end, start, first, 0.0)
 
 
 @scalar

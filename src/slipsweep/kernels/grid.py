@@ -250,13 +250,13 @@ def place_recorded(
 
 def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    wave: Wave, results: Results, tile: Tile,
+    wave: Wave, own: newmark.Record, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
     room = room_of(0)
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        record.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+        record.solve_cells(tile.cells, count, options, wave, own, room, tile.motion, tile.codes)
         place_recorded(grid, begin, count, runs, periods, results, tile)
 
 

@@ -12,7 +12,7 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block, Options, block_at, cell_of, response
 from slipsweep.kernels.cycle.eq4 import eq4_integrals
-from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, LEG_COLUMNS, MOST_LEGS, STATE_SIZE, Room
+from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, MOST_LEGS, Room, room_of
 from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
 from slipsweep.kernels.pulse import beginning, first_pulse
@@ -78,8 +78,7 @@ def history_room(wave: Wave) -> Room:
     longest = 0
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
-    legs = np.zeros((longest * MOST_LEGS + wave.pieces.shape[0] + 2, LEG_COLUMNS))
-    return Room(np.zeros(STATE_SIZE), legs, np.zeros((2, MOST_LEGS)))
+    return room_of(longest * MOST_LEGS + wave.pieces.shape[0] + 2)
 
 
 @scalar

@@ -10,37 +10,35 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import in_lanes, scalar
+from slipsweep.jit.elementary import exp
 
 #: From here on the moments' closed forms lose less than a digit; below, φ₃'s power series Σ (−z)^k / (k + 3)! is
-#: summed, whose first terms are enough where z is small, as on the short pieces of a record.
-_SERIES_END, _SHORT_SERIES_END = 2.0, 0.0625
+#: summed.  From `_DECAYED` on e^(−z) is 0.
+_SERIES_END, _DECAYED = 2.0, 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
-_SHORT_SERIES = 8
 
 
-@scalar
+@in_lanes
 def exponential_moments(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w(1 − w) over w from 0 to 1, for z ≥ 0.
 
     The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z = 2 that is
     summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
     """
+    # both without a branch, so that a loop over pieces becomes SIMD
+    small, large = min(z, _SERIES_END), max(z, _SERIES_END)
+    third = 0.0
+    for k in range(_SERIES.size - 1, -1, -1):
+        third = _SERIES[k] - small * third
+    early = 0.5 - small * third
+    whole = 1.0 - small * early
+    decayed = exp(-large) if large < _DECAYED else 0.0
+    all_over = (1.0 - decayed) / large
+    before, after = (1.0 - all_over) / large, (all_over - decayed) / large
     if z < _SERIES_END:
-        third = 0.0
-        for k in range((_SHORT_SERIES if z < _SHORT_SERIES_END else _SERIES.size) - 1, -1, -1):
-            third = _SERIES[k] - z * third
-        early = 0.5 - z * third
-        whole = 1.0 - z * early
         return whole, early, whole - early, early - 2.0 * third
-    decayed = math.exp(-z)
-    square = z * z
-    return (
-        (1.0 - decayed) / z,
-        (z - 1.0 + decayed) / square,
-        (1.0 - (1.0 + z) * decayed) / square,
-        (z - 2.0 + (z + 2.0) * decayed) / (square * z),
-    )
+    return all_over, before, after, (before - after) / large
 
 
 @scalar

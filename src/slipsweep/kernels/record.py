@@ -13,11 +13,13 @@ import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
+    EQ12,
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
     KD_NOT_POSITIVE,
     LIMIT_UNDEFINED,
     LITERAL,
+    MONOTONE,
     NEWMARK,
     NO_VALUE,
     NOT_RECOUPLED,
@@ -30,16 +32,18 @@ from slipsweep.kernels.block import (
     Options,
     block_of,
     cell_of,
+    inflection,
     remarks_on,
     response,
     settled,
     stays_below_yield,
 )
-from slipsweep.kernels.cycle.continuous import follow_through
-from slipsweep.kernels.cycle.legs import Room
+from slipsweep.kernels.cycle.common import Peak, common_pulse, enters
+from slipsweep.kernels.cycle.followed import follow_straight
+from slipsweep.kernels.cycle.legs import PULSE_ROWS, PULSES, Room
 from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import phase_at
-from slipsweep.kernels.newmark import add
+from slipsweep.kernels.newmark import Record, add
 from slipsweep.kernels.pulse import (
     DISPLACEMENT,
     HELD,
@@ -53,8 +57,14 @@ from slipsweep.kernels.pulse import (
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import BEGIN, END, LAST, TOP, Wave
 
+#: Rows of pulses laid out side by side: the stretch; Üg at its peak; where Üg comes to Üy, which piece, what is left of
+#: it, and when; the fields of the block that follow from the peak; D at Üy and at the peak.
+(
+    _STRETCH, _PEAK, _PIECE, _WIDTH, _BEGINS, _LIMIT, _RATIO, _MINIMUM, _DELTA, _DECAY, _VALIDITY, _AT_YIELD, _AT_PEAK,
+) = range(0, PULSE_ROWS * PULSES, PULSES)  # fmt: skip
 
-@scalar
+
+@in_lanes
 def block_in_pulse(cell: Cell, options: Options, peak: float) -> Block:
     """The block in a pulse of that peak, for Eqs. 7-11 and λ; its `amplitude` is the scale of the record."""
     own = block_of(
@@ -121,7 +131,7 @@ def continuous_pulse(
     """
     p, tau = beginning(block, wave, k)
     until, tau_until, ends, begins = end_of_following(block, wave, k, following)
-    gained, moved, most = follow_through(block, wave, p, tau, until, tau_until, options.wants_peak, room.zeros)
+    gained, moved, most = follow_straight(block, wave, p, tau, until, tau_until, options.wants_peak, room)
     state = room.state
     state[VELOCITY] = velocity + gained
     state[DISPLACEMENT] = velocity * (ends - phase_at(wave.pieces, p, tau)) + moved
@@ -142,8 +152,87 @@ def one_pulse(
     return pulse(block, options, wave, room, k, following, max(velocity, 0.0))
 
 
+@in_lanes
+def rate_at(block: Block, x: float) -> float:
+    """D(x), in a loop over blocks."""
+    mu = eq.friction_coefficient(x, block.mu_s, block.delta_mu, block.decay_rate, block.g)
+    return eq.relative_acceleration(x, mu, block.mu_s, block.tan_theta, block.g)
+
+
 @scalar
-def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndarray, j: int) -> tuple[float, float]:
+def lay_out(cell: Cell, options: Options, wave: Wave, record: Record, block: Block, k: int, pulses: np.ndarray) -> int:
+    """Lay out pulses from stretch k on side by side; their number, but for the one after them.
+
+    If none is after them, a stretch past the last that never begins stands for it.
+    """
+    count, scale = 0, cell.amplitude * record.unit
+    while count < PULSES and k < wave.height.size:
+        p, width = enters(record.lines, wave.stretch[k, 0], wave.stretch[k, 1], scale, block.yield_acceleration)
+        pulses[_STRETCH + count], pulses[_PEAK + count] = k, cell.amplitude * wave.height[k]
+        pulses[_PIECE + count], pulses[_WIDTH + count], pulses[_BEGINS + count] = p, width, wave.pieces[p, END] - width
+        k = first_pulse(block, wave, k + 1)
+        count += 1
+    for j in range(count, PULSES):
+        pulses[_STRETCH + j], pulses[_PEAK + j], pulses[_BEGINS + j] = k, pulses[_PEAK], math.inf
+    for j in range(PULSES):
+        peak = pulses[_PEAK + j]
+        own = block_in_pulse(cell, options, peak)
+        pulses[_LIMIT + j], pulses[_RATIO + j] = own.limiting_acceleration, own.acceleration_ratio
+        pulses[_MINIMUM + j], pulses[_DELTA + j] = own.minimum_friction, own.delta_mu
+        pulses[_DECAY + j], pulses[_VALIDITY + j] = own.decay_rate, own.validity
+        pulses[_AT_YIELD + j] = rate_at(own, own.yield_acceleration)
+        pulses[_AT_PEAK + j] = rate_at(own, peak)
+    return min(count, PULSES - 1)
+
+
+@scalar
+def laid_out(block: Block, pulses: np.ndarray, i: int) -> tuple[Block, Peak]:
+    """The block in pulse i of those that are laid out, and its peak."""
+    own = Block(
+        block.amplitude, block.yield_acceleration, pulses[_LIMIT + i], pulses[_RATIO + i], block.mu_s, block.tan_theta,
+        pulses[_MINIMUM + i], pulses[_DELTA + i], pulses[_DECAY + i], block.g, block.rise, block.sliding_mode,
+        int(pulses[_VALIDITY + i]),
+    )  # fmt: skip
+    return own, Peak(pulses[_PEAK + i], pulses[_AT_YIELD + i], pulses[_AT_PEAK + i])
+
+
+@scalar
+def remarks_in(cell: Cell, block: Block, peak: Peak) -> int:
+    """The flags of a pulse."""
+    remarks, continues = remarks_on(cell, block.acceleration_ratio), slides_on(block, peak.ground)
+    least, most = block.yield_acceleration, peak.ground - peak.rate_at_peak
+    governs = not continues and max(least - peak.rate_at_yield, most) <= least
+    if governs and (inflection(block) <= least or stays_below_yield(block, least, peak.ground)):
+        remarks = YIELD_GOVERNS | (remarks & ~FRICTION_ESTIMATED)
+    if not continues and block.rise == LITERAL and most <= 0.0:
+        remarks |= KD_NOT_POSITIVE
+    return remarks | (block.validity & FRICTION_NOT_DECAYING)
+
+
+@scalar
+def recorded_pulse(
+    block: Block, peak: Peak, options: Options, wave: Wave, record: Record, i: int, following: int, velocity: float,
+    room: Room,
+) -> Pulse:  # fmt: skip
+    """`one_pulse` of pulse i of those laid out; a common one by its own loop."""
+    state, pulses, k = room.state, room.pulses, int(room.pulses[_STRETCH + i])
+    if block.rise == MONOTONE and options.recoupling == EQ12 and not slides_on(block, peak.ground):
+        p, width, scale = int(pulses[_PIECE + i]), pulses[_WIDTH + i], block.amplitude * record.unit
+        end = wave.stretch[k, 1]
+        slide = common_pulse(block, peak, record.lines, scale, p, width, end, max(velocity, 0.0))
+        if not math.isnan(slide.displacement):
+            state[SLIPS] += slide.slips
+            state[VELOCITY], state[DISPLACEMENT], state[HELD] = slide.velocity, slide.displacement, slide.held
+            if slide.slides:
+                attenuate(state, pulses[_BEGINS + i + 1] - wave.pieces[end - 1, END])
+            return Pulse(state[VELOCITY], state[DISPLACEMENT], slide.peak, 0.0, 0.0, 0)
+    return one_pulse(block, options, wave, k, following, peak.ground, velocity, room)
+
+
+@scalar
+def respond(
+    cell: Cell, options: Options, wave: Wave, record: Record, room: Room, codes: np.ndarray, j: int
+) -> tuple[float, float]:
     """W and the largest V of a block of the paper's model, pulse by pulse; `cell.amplitude` is the scale.
 
     Into column j of `codes`: slips from rest, stick-slip and continuous pulses (−1 where there is no value), validity.
@@ -156,23 +245,18 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
         validity |= UPLIFT
     room.state[SLIPS] = 0.0
     velocity, displacement, lost, highest = 0.0, 0.0, 0.0, 0.0
-    stick_slips, continuous = 0, 0
+    stick_slips, continuous, count, i = 0, 0, 0, 0
     k = first_pulse(block, wave, 0)
     while k < wave.height.size and validity & NO_VALUE == 0:
-        following, peak = first_pulse(block, wave, k + 1), scale * wave.height[k]
-        block = block_in_pulse(cell, options, peak)
-        validity |= block.validity & FRICTION_NOT_DECAYING
-        continues = slides_on(block, peak)
-        remarks = remarks_on(cell, block.acceleration_ratio)
-        if not continues and stays_below_yield(block, block.yield_acceleration, peak):
-            remarks = YIELD_GOVERNS | (remarks & ~FRICTION_ESTIMATED)
-        validity |= remarks
-        if not continues and block.rise == LITERAL and response(block, peak) <= 0.0:
-            validity |= KD_NOT_POSITIVE
+        if i == count:
+            count, i = lay_out(cell, options, wave, record, block, k, room.pulses), 0
+        block, peak = laid_out(block, room.pulses, i)
+        validity |= remarks_in(cell, block, peak)
         if validity & NO_VALUE:
             break
-        now = one_pulse(block, options, wave, k, following, peak, velocity, room)
-        if continues:
+        following = int(room.pulses[_STRETCH + i + 1])
+        now = recorded_pulse(block, peak, options, wave, record, i, following, velocity, room)
+        if slides_on(block, peak.ground):
             continuous += 1
             if velocity == 0.0:
                 room.state[SLIPS] += 1.0
@@ -186,7 +270,7 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
         displacement, lost = add(displacement, lost, now.displacement)
         if math.isnan(displacement + highest) and validity & NO_VALUE == 0:
             validity |= UNSOLVED
-        k = following
+        k, i = following, i + 1
     displacement += lost
     codes[3, j] = settled(validity, displacement)
     if validity & NO_VALUE:
@@ -198,8 +282,9 @@ def respond(cell: Cell, options: Options, wave: Wave, room: Room, codes: np.ndar
 
 @scalar
 def solve_cells(
-    cells: np.ndarray, count: int, options: Options, wave: Wave, room: Room, motion: np.ndarray, codes: np.ndarray
-) -> None:
+    cells: np.ndarray, count: int, options: Options, wave: Wave, record: Record, room: Room, motion: np.ndarray,
+    codes: np.ndarray,
+) -> None:  # fmt: skip
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and the codes of `respond`."""
     for j in range(count):
-        motion[0, j], motion[1, j] = respond(cell_of(cells, j), options, wave, room, codes, j)
+        motion[0, j], motion[1, j] = respond(cell_of(cells, j), options, wave, record, room, codes, j)

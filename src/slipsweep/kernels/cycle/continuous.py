@@ -13,6 +13,7 @@ from slipsweep.kernels.block import (
     Block,
     Motion,
     Options,
+    inflection,
     opposite,
     relative_acceleration,
     relative_acceleration_root,
@@ -32,6 +33,11 @@ def zeros_of_relative_acceleration(block: Block, end: float, zeros: np.ndarray) 
     """Where on the way from Üg = 0 to `end` D changes its sign; their number, or −1 if one is not found."""
     count = 0
     x = math.copysign(0.0, end)
+    inner = inside(x, end)
+    if inflection(block) <= 0.0 and opposite(relative_acceleration(block, inner), relative_acceleration(block, end)):
+        # D bends to one side only
+        zeros[0] = relative_acceleration_root(block, inner, end)
+        return -1 if math.isnan(zeros[0]) else 1
     for _ in range(zeros.size):
         target = next_break(block, x, end)
         inner = inside(x, target)

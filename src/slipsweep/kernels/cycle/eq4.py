@@ -8,14 +8,16 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.decorators import in_lanes, scalar, summed
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels import linear
 from slipsweep.kernels.block import (
     Block,
     friction,
 )
+from slipsweep.kernels.cycle.legs import LAGS
 from slipsweep.kernels.excitation import offset_at, plane
+from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import ARC, COEFFICIENTS, DEGREE, TERM, TOP
 
 #: 16 Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
@@ -26,17 +28,16 @@ NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16
 PANEL_BOUNDS = (6.0, 18.0, 42.0, math.inf)
 
 
-@scalar
+@in_lanes
 def straight_lag(block: Block, x: float, change: float, width: float) -> tuple[float, float, float, float]:
     """`lag_integrals` where |Üg| goes along a straight line, by `change`: closed forms.
 
     The exponential is taken from the end where the friction is larger, so that its argument is
     never positive: nothing overflows, however large λ is.
     """
-    largest = friction(block, min(x, x + change))
-    whole, early, late, both = linear.exponential_moments(block.decay_rate / block.g * abs(change))
-    if change < 0.0:
-        early, late = late, early
+    largest = eq.friction_coefficient(min(x, x + change), block.mu_s, block.delta_mu, block.decay_rate, block.g)
+    whole, larger, smaller, both = linear.exponential_moments(block.decay_rate / block.g * abs(change))
+    early, late = (smaller, larger) if change < 0.0 else (larger, smaller)
     kept = block.mu_s - block.tan_theta
     return (
         (block.mu_s - largest * whole) * width,
@@ -44,6 +45,23 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> tuple[f
         (kept * (x + 0.5 * change) - largest * (x * whole + change * late)) * width,
         (kept * (0.5 * x + change / 6.0) - largest * (x * early + change * both)) * width * width,
     )
+
+
+@scalar
+def gains_of_straight(block: Block, x: float, change: float, width: float) -> tuple[float, float]:
+    """`eq4_integrals` where Üg > 0 goes along a straight line, by `change`."""
+    first, second, first_x, second_x = straight_lag(block, x, change, width)
+    return block.g * first + block.tan_theta * first_x, block.g * second + block.tan_theta * second_x
+
+
+@scalar
+def straight_gains(block: Block, rows: np.ndarray) -> None:
+    """`eq4_integrals` in lanes: rows of |Üg|, its change, the length and the side (±1) in, the two gains out."""
+    for j in range(LAGS):
+        first, second, first_x, second_x = straight_lag(block, rows[j], rows[LAGS + j], rows[2 * LAGS + j])
+        side_g = rows[3 * LAGS + j] * block.g
+        rows[4 * LAGS + j] = side_g * first + block.tan_theta * first_x
+        rows[5 * LAGS + j] = side_g * second + block.tan_theta * second_x
 
 
 @scalar

@@ -36,8 +36,16 @@ STATE_SIZE = STATE_ROWS + 7
 MOST_LEGS = 32
 
 
+#: Straight pieces whose integrals of Eq. 4 are found side by side, in lanes (`eq4.straight_gains`).
+LAGS = 16
+
+#: Pulses of a record whose friction is found side by side (`record.lay_out`).
+PULSES = 16
+PULSE_ROWS = 13
+
+
 class Room(NamedTuple):
-    """Where a block is followed: its state, a log of its legs, and zeros of D on either side of Üg = 0.
+    """Where a block is followed: its state, a log of its legs, zeros of D on either side of Üg = 0, and lanes.
 
     One for all cells: a function that makes an array counts the references to every array it is handed.
     """
@@ -45,6 +53,8 @@ class Room(NamedTuple):
     state: np.ndarray
     legs: np.ndarray
     zeros: np.ndarray
+    straight: np.ndarray
+    pulses: np.ndarray
 
 
 #: Kinds of legs, and the columns of a log of them, which `history` samples: kind, piece, phase on
@@ -57,7 +67,13 @@ LEG_COLUMNS = 8
 @scalar
 def room_of(legs: int) -> Room:
     """Room, with a log of so many legs; made in kernels, where the compiler knows that nothing else lies there."""
-    return Room(np.zeros(STATE_SIZE), np.zeros((legs, LEG_COLUMNS)), np.empty((2, MOST_LEGS)))
+    return Room(
+        np.zeros(STATE_SIZE),
+        np.zeros((legs, LEG_COLUMNS)),
+        np.empty((2, MOST_LEGS)),
+        np.empty(6 * LAGS),
+        np.empty(PULSE_ROWS * PULSES),
+    )
 
 
 @in_lanes
