@@ -153,6 +153,20 @@ def test_a_store_is_not_open_to_readers_before_it_is_complete(tmp_path: Path) ->
     run(path, overwrite=True)
 
 
+@pytest.mark.parametrize("name", ["checksums/chunk_checksum", "theta", "permanent_displacement"])
+def test_a_stopped_store_that_lost_an_array_is_begun_anew(results: Path, tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.zarr"
+    with pytest.raises(Stop):
+        run(path, solved=stopping(20))
+    (tmp_path / "a.zarr.parts" / "data.zarr" / name / "zarr.json").unlink()
+    numbers: list[int] = []
+    run(path, resume=True, solved=counting(numbers))
+    assert numbers == list(range(60))
+    xr.testing.assert_identical(
+        xr.open_zarr(path).drop_attrs().compute(), xr.open_zarr(results / "grid.zarr").drop_attrs().compute()
+    )
+
+
 @pytest.mark.parametrize("split", [False, True, None], ids=["one file", "split", "zarr"])
 def test_every_changed_byte_of_the_results_is_found(results: Path, tmp_path: Path, split: bool | None) -> None:
     source = results / {False: "grid.nc", True: "grid", None: "grid.zarr"}[split]

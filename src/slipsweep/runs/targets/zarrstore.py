@@ -64,7 +64,8 @@ class ZarrStore:
         self.writer = StoreWriter(self.place, self.results, secrets.token_hex(8))
 
     def _head_checksum(self) -> str:
-        return zarr_store.head_checksum(self.place, self.results, self.contents.variables)
+        # values of results, and of the checksums, come later
+        return zarr_store.head_checksum(self.place, {*self.results, CHECKSUMS}, [*self.contents.variables, CHECKSUMS])
 
     def create(self, manifest: parts.Manifest) -> None:
         """Make the arrays."""
@@ -102,7 +103,7 @@ class ZarrStore:
     def finish(self, finished: Mapping[int, str]) -> None:
         """Write the checksums of the chunks, and make the group (RunError: the store has been taken away)."""
         if isinstance(self.place, Path):
-            for name in self.contents.variables:
+            for name in (*self.contents.variables, CHECKSUMS):
                 if not (self.place / name / "zarr.json").exists():
                     raise removed(self.place / name)
         values = parts.checksum_rows(finished)
