@@ -152,9 +152,9 @@ def drawn(ratios: dict[str, dict[str, float]], path: Path) -> None:
 
 def main() -> None:
     """Measure, write the table and draw it."""
-    given = arguments(__doc__, counts={"commits": 10, "rounds": 3})
+    given = arguments(__doc__, counts={"commits": 10, "rounds": 2})
     commits = [git("rev-parse", "HEAD")] if given.tiny else some_commits(given.commits)
-    found = measured(commits, 1, 1e-3) if given.tiny else measured(commits, given.rounds, 1.0)
+    found = measured(commits, 1, 1e-3) if given.tiny else measured(commits, given.rounds, 0.25)
     base = next(iter(found.values()))
     ratios = {
         commit: {task: value / base[task] for task, value in taken.items() if task in base}
