@@ -107,7 +107,8 @@ def lay_out(commit: str, folder: Path) -> None:
 def seconds_of(folder: Path, many: float) -> dict[str, float]:
     """What every task takes with the sources in a folder."""
     record = ROOT / "sweeps" / "data" / "synthetic.csv"
-    own = {"PYTHONPATH": str(folder / "src"), "NUMBA_NUM_THREADS": "1"}
+    # a folder of its own for compiled code: in a common one only that of the latest four versions is kept
+    own = {"PYTHONPATH": str(folder / "src"), "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, "-c", CHILD, str(record), str(many)],
         cwd=folder, env=os.environ | own, check=True, capture_output=True, text=True,
@@ -152,9 +153,9 @@ def drawn(ratios: dict[str, dict[str, float]], path: Path) -> None:
 
 def main() -> None:
     """Measure, write the table and draw it."""
-    given = arguments(__doc__, counts={"commits": 10, "rounds": 2})
+    given = arguments(__doc__, counts={"commits": 10, "rounds": 3})
     commits = [git("rev-parse", "HEAD")] if given.tiny else some_commits(given.commits)
-    found = measured(commits, 1, 1e-3) if given.tiny else measured(commits, given.rounds, 0.25)
+    found = measured(commits, 1, 1e-3) if given.tiny else measured(commits, given.rounds, 1.0)
     base = next(iter(found.values()))
     ratios = {
         commit: {task: value / base[task] for task, value in taken.items() if task in base}
