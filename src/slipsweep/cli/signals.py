@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-#: Modules and packages whose locks an exception from outside would leave held for ever: they take
+#: Modules and packages, a dot behind each, whose locks an exception from outside would leave held for ever: they take
 #: them by calls, and between a call and its `try` a signal may come.  Seen: one of some 60 interrupted runs hung.
-_LOCKING = ("threading", "queue", "logging", "concurrent.futures")
+_LOCKING = ("threading.", "queue.", "logging.", "concurrent.futures.")
 
 #: Seconds after which a signal that could not be raised comes once more, and how often at most: ten seconds in all.
 _AGAIN, _MOST = 0.02, 500
@@ -77,7 +77,7 @@ def interrupting() -> Iterator[None]:
 def _in_locking(frame: FrameType | None) -> bool:
     """Whether a function of a module that holds locks is under way."""
     while frame is not None:
-        if f"{frame.f_globals.get('__name__')}.".startswith(tuple(f"{name}." for name in _LOCKING)):
+        if f"{frame.f_globals.get('__name__')}.".startswith(_LOCKING):
             return True
         frame = frame.f_back
     return False

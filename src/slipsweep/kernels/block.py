@@ -339,14 +339,6 @@ def whole_lanes(count: int) -> int:
 
 
 @in_lanes
-def lane_of(block: Block, lanes: np.ndarray, j: int) -> None:
-    """Lay a block out as lane j, but for the phase at which it comes to Üy."""
-    lanes[AMPLITUDE + j], lanes[YIELD + j] = block.amplitude, block.yield_acceleration
-    lanes[MU_S + j], lanes[TAN_THETA + j] = block.mu_s, block.tan_theta
-    lanes[DELTA_MU + j], lanes[DECAY + j] = block.delta_mu, block.decay_rate / block.g
-
-
-@in_lanes
 def lane_friction(lanes: np.ndarray, j: int, x: float) -> float:
     """μ(x) of a lane: Eq. 6 for λ/g, so that no g is divided by."""
     return eq.friction_coefficient(x, lanes[MU_S + j], lanes[DELTA_MU + j], lanes[DECAY + j], 1.0)

@@ -26,11 +26,15 @@ _YIELD, _V, _W, _BEFORE, _LOST, _PEAK, _SLIPS, _PULSES, _SLIDES = range(0, 9 * L
 LANES_SIZE = 9 * LANES
 
 
-class Record(NamedTuple):
-    """A record as Newmark's block takes it.
+#: Columns of the lines of a record: the first, the last and the larger value of a piece, and its length.
+FIRST_VALUE, LAST_VALUE, LARGER_VALUE, LENGTH = range(4)
 
-    `lines` (pieces, 4) has the first, the last and the larger value of each piece and its length, `height` (stretches,)
-    the peaks.  Values are in units of `unit`, a power of two near the largest: their squares are doubles.
+
+class Record(NamedTuple):
+    """A record as the straight lines that it is, for loops over its pieces.
+
+    `lines` (pieces, 4) has the columns above, `height` (stretches,) the peaks.  Values are in units of `unit`, a power
+    of two near the largest: their squares are doubles.
     """
 
     lines: np.ndarray
@@ -181,8 +185,8 @@ def walk(wave: Wave, record: Record, lanes: np.ndarray, least: float, most: floa
     """Follow lanes through the record; from where all are at rest to the next pulse above the `least` Üy at once."""
     lines = record.lines
     pieces, stretches, p, k, count = lines.shape[0], record.height.size, 0, 0, 0
-    if pieces > 0 and lines[0, 0] > least:
-        begin(lanes, 0.0, lines[0, 0], 0.0)
+    if pieces > 0 and lines[0, FIRST_VALUE] > least:
+        begin(lanes, 0.0, lines[0, FIRST_VALUE], 0.0)
         count = sliding(lanes)
     while True:
         if count == 0:
@@ -191,13 +195,13 @@ def walk(wave: Wave, record: Record, lanes: np.ndarray, least: float, most: floa
             if k == stretches:
                 return
             p = max(p, wave.stretch[k, 0])
-            while p < wave.stretch[k, 1] and lines[p, 2] <= least:
+            while p < wave.stretch[k, 1] and lines[p, LARGER_VALUE] <= least:
                 p += 1
             if p == wave.stretch[k, 1]:
                 continue
         elif p == pieces:
             return
-        count = along(lanes, least, most, lines[p, 0], lines[p, 1], lines[p, 3], count)
+        count = along(lanes, least, most, lines[p, FIRST_VALUE], lines[p, LAST_VALUE], lines[p, LENGTH], count)
         p += 1
 
 

@@ -86,7 +86,6 @@ class SampleStatistics:
         }
         modes_known = [int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING]
         flags_known = [int(flag) for flag in Validity]
-        unstable_at = flags_known.index(Validity.STATICALLY_UNSTABLE)
 
         def work(first: int, last: int) -> None:
             with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused below
@@ -95,15 +94,18 @@ class SampleStatistics:
                     values.sort()  # NaN goes last
                     count = int(np.searchsorted(values, np.nan))
                     if modes is not None:
-                        found["mode_share"][row] = [np.count_nonzero(modes[row] == mode) for mode in modes_known]
+                        shares = [np.count_nonzero(modes[row] == mode) / samples for mode in modes_known]
+                        found["mode_share"][row] = shares
                     # of most flags there is none
-                    there_are = int(np.bitwise_or.reduce(flags[row]))
-                    flagged = [np.count_nonzero(flags[row] & flag) if there_are & flag else 0 for flag in flags_known]
-                    found["flag_share"][row] = flagged
+                    raised = int(np.bitwise_or.reduce(flags[row]))
+                    flagged = {
+                        flag: np.count_nonzero(flags[row] & flag) if raised & flag else 0 for flag in flags_known
+                    }
+                    found["flag_share"][row] = [number / samples for number in flagged.values()]
                     found["valueless_share"][row] = (samples - count) / samples
                     there, square = values[:count], squares[row][:, None]
                     # these slide without any shaking: their displacement has no value and exceeds every threshold
-                    unstable = flagged[unstable_at]
+                    unstable = flagged[Validity.STATICALLY_UNSTABLE]
                     if count + unstable:
                         above = count - np.searchsorted(there, thresholds * square, side="right")
                         found["exceedance_probability"][row] = (above + unstable) / (count + unstable)
@@ -113,8 +115,6 @@ class SampleStatistics:
 
         # sorting and counting take about an eighth of what solving takes
         threads.spread(rows, work, max(samples // 8, 1))
-        for name in {"mode_share", "flag_share"} & found.keys():
-            found[name] /= samples
         for name in ("displacement_quantile", "mean_displacement"):
             there = found["valueless_share"][:, None] < 1.0
             wrong = (~np.isfinite(found[name].reshape(*squares.shape, -1)).all(axis=-1)) & there

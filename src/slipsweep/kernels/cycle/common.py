@@ -21,9 +21,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.cycle.eq4 import gains_of_straight
 from slipsweep.kernels.linear import held_stop
-
-#: Columns of `newmark.Record.lines`: value at the beginning, at the end, the larger one, length.
-_FIRST, _LAST, _LARGER, _LENGTH = range(4)
+from slipsweep.kernels.newmark import FIRST_VALUE, LARGER_VALUE, LAST_VALUE, LENGTH
 
 
 class Peak(NamedTuple):
@@ -77,10 +75,10 @@ def levels_of(block: Block, peak: Peak, velocity: float) -> Levels:
 @scalar
 def enters(lines: np.ndarray, p: int, end: int, scale: float, least: float) -> tuple[int, float]:
     """The first piece from p on, before `end`, on which Üg comes to Üy, and how long it lasts from there."""
-    while p < end - 1 and scale * lines[p, _LARGER] <= least:
+    while p < end - 1 and scale * lines[p, LARGER_VALUE] <= least:
         p += 1
-    x, x_end = scale * lines[p, _FIRST], scale * lines[p, _LAST]
-    return p, lines[p, _LENGTH] if x >= least else lines[p, _LENGTH] * ((x_end - least) / (x_end - x))
+    x, x_end = scale * lines[p, FIRST_VALUE], scale * lines[p, LAST_VALUE]
+    return p, lines[p, LENGTH] if x >= least else lines[p, LENGTH] * ((x_end - least) / (x_end - x))
 
 
 @scalar
@@ -120,14 +118,14 @@ def common_pulse(
     none = Slide(0.0, math.nan, 0.0, 0.0, 0.0, 0, False, 0.0)
     least, levels = block.yield_acceleration, levels_of(block, peak, velocity)
     onset = levels.onset
-    if math.isnan(onset + levels.switch) or scale * lines[p, _FIRST] > least:
+    if math.isnan(onset + levels.switch) or scale * lines[p, FIRST_VALUE] > least:
         return none
     now = Slide(velocity, 0.0, levels.held, levels.switch, velocity, 0, velocity > 0.0, least)
     x, fell = least, False
     for q in range(p, end):
         if q > p:
-            x, width = scale * lines[q, _FIRST], lines[q, _LENGTH]
-        x_end, after_fall = scale * lines[q, _LAST], fell
+            x, width = scale * lines[q, FIRST_VALUE], lines[q, LENGTH]
+        x_end, after_fall = scale * lines[q, LAST_VALUE], fell
         fell = x > x_end
         rate, rate_end = x - now.held, x_end - now.held
         after = now.velocity + 0.5 * (rate + rate_end) * width
