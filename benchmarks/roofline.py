@@ -18,6 +18,8 @@ from benchmarks.grids import regime_cells
 from benchmarks.machine import alternate, arguments, cores, measured_on, number, table
 from benchmarks.report import displacement, size_of, steps_taken
 from slipsweep import Validity
+from slipsweep.jit.decorators import in_lanes
+from slipsweep.jit.inner.sealed import sealed
 
 #: Operations of the building blocks; a fused multiply-add is one, a division or root is one.
 EXP, LOG, VERSINE, ARCSINE = 20, 20, 13, 23
@@ -45,17 +47,20 @@ CYCLE_OPERATIONS = {
 STEP_OPERATIONS = {"stick_slip": EXP // 2 + NODE + 4, "continuous": EXP + NODE + 4, "newmark": 6}
 
 
-@njit(nogil=True, fastmath={"contract"})
+@in_lanes
+def _sixteen(x: float) -> float:
+    x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
+    x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
+    x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
+    return (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
+
+
+@sealed  # as kernels are compiled, for registers as wide
 def _multiply_add(values: np.ndarray, turns: int) -> None:
     """16 dependent multiply-adds on every value, `turns` times; the values stay in the first-level cache."""
     for _ in range(turns):
         for i in range(values.size):
-            x = values[i]
-            x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
-            x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
-            x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
-            x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
-            values[i] = x
+            values[i] = _sixteen(values[i])
 
 
 @njit(nogil=True)

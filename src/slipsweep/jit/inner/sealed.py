@@ -16,6 +16,7 @@ from numba.core.compiler import Compiler
 
 from slipsweep.jit.inner.asked_once import asked_once
 from slipsweep.jit.inner.need import need
+from slipsweep.jit.inner.parts import WideLibrary
 from slipsweep.jit.interrupts import heard_later
 
 need(
@@ -29,7 +30,7 @@ need(JitEngine, finalize_object="self")
 need(Compiler, __init__="self typingctx targetctx library args return_type flags locals", compile_extra="self func")
 
 
-class _Library(JITCodeLibrary):
+class _Library(WideLibrary):
     """Machine code of a kernel with functions of its own."""
 
     def _finalize_final_module(self) -> None:
