@@ -64,6 +64,7 @@ class Kernel:
         functools.update_wrapper(self, function)
         self._function = function
         self._dispatcher: Callable[..., Any] | None = None
+        self._expected = False
 
     def __call__(self, *args: Any) -> Any:
         """Run on `args`; their types must be those of the first call."""
@@ -75,7 +76,8 @@ class Kernel:
 
     def expect(self, perhaps: bool = False) -> None:
         """Say that the kernel will be called, or `perhaps`: if it is not kept, it counts among those to be compiled."""
-        if self._dispatcher is None and not numba.config.DISABLE_JIT:
+        if self._dispatcher is None and not self._expected and not numba.config.DISABLE_JIT:
+            self._expected = True  # a small sweep takes no longer than to look for it on disk
             folder = cache_folder()
             if folder is None or not folders.has(folder, self._function):
                 compiling.expect(self, perhaps)

@@ -114,6 +114,8 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     """
     import numpy as np
 
+    if type(values) is float:  # as most are, and none needs what follows
+        return np.asarray(values)
     array: Any = computed(values)
     among = array if isinstance(array, (list, tuple)) else [array]
     masked = sum(int(np.ma.count_masked(one)) for one in among if isinstance(one, np.ma.MaskedArray))
