@@ -83,20 +83,11 @@ def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: 
 
 
 @summed
-def lag_integrals(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float
+def curved_lag(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float
 ) -> tuple[float, float, float, float]:
-    """What Eq. 4 takes the block behind the plane over a part of piece p.
-
-    ∫ (μs − μ) dτ and ∫ |x| (μs − tan θ − μ) dτ, each followed by itself with the weight end − τ: on
-    the side ±1 of Üg = 0 the relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ).
-    Apart, because over a symmetric cycle the first must cancel to the last digit.
-    """
-    amplitude = block.amplitude
-    x_start, x_end = abs(plane(pieces, p, amplitude, start)), abs(plane(pieces, p, amplitude, end))
-    if int(pieces[p, DEGREE]) <= 1:
-        return straight_lag(block, x_start, x_end - x_start, end - start)
-    mu_s, kept = block.mu_s, block.mu_s - block.tan_theta
+    """`lag_integrals` where |Üg| goes along a curve: Gauss-Legendre quadrature, panel by panel."""
+    amplitude, mu_s, kept = block.amplitude, block.mu_s, block.mu_s - block.tan_theta
     decay = block.decay_rate / block.g
     rising = x_start <= x_end
     least = min(x_start, x_end)
@@ -124,6 +115,23 @@ def lag_integrals(
         if e_foldings <= bound:
             break
     return first, second, first_x, second_x
+
+
+@scalar
+def lag_integrals(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float
+) -> tuple[float, float, float, float]:
+    """What Eq. 4 takes the block behind the plane over a part of piece p.
+
+    ∫ (μs − μ) dτ and ∫ |x| (μs − tan θ − μ) dτ, each followed by itself with the weight end − τ: on
+    the side ±1 of Üg = 0 the relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ).
+    Apart, because over a symmetric cycle the first must cancel to the last digit.
+    """
+    x_start = abs(plane(pieces, p, block.amplitude, start))
+    x_end = abs(plane(pieces, p, block.amplitude, end))
+    if int(pieces[p, DEGREE]) <= 1:
+        return straight_lag(block, x_start, x_end - x_start, end - start)
+    return curved_lag(block, pieces, p, start, end, x_start, x_end)
 
 
 @scalar
