@@ -26,8 +26,8 @@ PACKAGE = Path(__file__).parents[1]
 RESULTS: tuple[str, ...] = ("files/spec.py", "files/checksums.py", "files/netcdf.py", "files/zarr_store.py")
 MACHINE_CODE = "kernels/"
 
-#: How a string with a blank begins in what `_append_code` writes.
-_TEXT = "text "
+#: Where statements lie in other statements.
+_BLOCKS = ("body", "orelse", "handlers", "finalbody", "cases")
 
 #: Versions of the sources whose parts are kept.
 _KEPT = 4
@@ -111,9 +111,10 @@ def parsed(name: str, text: bytes, names: Collection[str], package: str) -> Sour
     tree = ast.parse(text)
     imports = {_source(module, names) for module in _imports(tree, name, package)}
     code: list[str] = []
-    _append_code(tree, code, True)
-    machine_code = (part for part in code if not part.startswith(_TEXT))
-    return Source(_digest(code), _digest(machine_code), sorted(filter(None, imports)))
+    texts: list[str] = []
+    _append_code(tree, code, texts)
+    machine_code = _digest(code)
+    return Source(_digest([machine_code, *texts]), machine_code, sorted(filter(None, imports)))
 
 
 def _imports(tree: ast.AST, name: str, package: str) -> Iterator[list[str]]:
@@ -134,7 +135,8 @@ def _imports(tree: ast.AST, name: str, package: str) -> Iterator[list[str]]:
             where += [node.module] if node.module else []
             full = [".".join([*where, alias.name]) for alias in node.names]
         yield from (parts[1:] for module in full if (parts := module.split("."))[0] == package)
-        todo += (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr))
+        for block in _BLOCKS:
+            todo += getattr(node, block, ())
 
 
 def _source(module: list[str], names: Collection[str]) -> str | None:
@@ -146,8 +148,8 @@ def _source(module: list[str], names: Collection[str]) -> str | None:
     return None
 
 
-def _append_code(node: Any, code: list[str], texts: bool) -> None:
-    """Append a tree as text, the same for all versions of Python; messages of errors only if `texts`."""
+def _append_code(node: Any, code: list[str], texts: list[str] | None) -> None:
+    """Append a tree as text, the same for all versions of Python, but texts, strings with a blank, to `texts`."""
     if isinstance(node, list):
         for item in node:
             # a string by itself is a docstring
@@ -155,7 +157,7 @@ def _append_code(node: Any, code: list[str], texts: bool) -> None:
                 _append_code(item, code, texts)
     elif isinstance(node, ast.AST):
         code.append(f"({type(node).__name__}")
-        texts = texts and not isinstance(node, ast.Raise)
+        texts = None if isinstance(node, ast.Raise) else texts  # messages of errors count for nothing
         for name in node._fields:
             value = getattr(node, name, None)
             # whether a name is read or written is said by where it stands
@@ -165,8 +167,8 @@ def _append_code(node: Any, code: list[str], texts: bool) -> None:
         code.append(")")
     elif not isinstance(node, str) or " " not in node:
         code.append(repr(node))
-    elif texts:
-        code.append(f"{_TEXT}{node!r}")
+    elif texts is not None:
+        texts.append(node)
 
 
 def _digest(parts: Iterable[str]) -> str:
