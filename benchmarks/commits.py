@@ -1,18 +1,21 @@
 """What solvers took from commit to commit: ``python -m benchmarks.commits`` writes commits.csv and commits.png.
 
-The sources of some commits since `BASE` are laid out in a folder and run in turn by this Python: one process a commit
-and round, one thread, the least of three calls, and the least of all rounds.  Figures are over those of `BASE`, and say
-something on any machine.  A commit that does not know what is asked for has no figure for it.
+The sources of some commits since `BASE` are laid out in a folder and run by this Python, a process for each, of one
+thread.  In every round each does a task once, one after the other within a second: what slows the machine slows all.
+A figure is the median over the rounds of the time over that of `BASE`, and says something on any machine.  A commit
+that does not know what is asked for has no figure for it.
 """
 
 import csv
 import io
-import json
+import math
 import os
+import statistics
 import subprocess
 import sys
 import tarfile
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 import matplotlib
@@ -25,9 +28,15 @@ from benchmarks.machine import ROOT, arguments, measured_on
 #: The version that goals of speed are stated against.
 BASE = "0c4c6a1"
 
-#: Solves every task with the slipsweep that it finds, by whichever of its interfaces there is.
+#: What is timed, by the names that `CHILD` knows.
+TASKS = (
+    "sine, displacement", "sine, all results", "cosine", "triangle", "three harmonics", "step, rectangle",
+    "step, Simpson", "record, friction law", "record, Newmark",
+)  # fmt: skip
+
+#: Solves the tasks it is told, with the slipsweep that it finds, by whichever of its interfaces there is.
 CHILD = """
-import json, sys, time
+import sys, time
 import numpy as np
 import slipsweep
 
@@ -69,19 +78,13 @@ tasks = {
     "record, friction law": recorded,
     "record, Newmark": lambda: recorded(model="newmark"),
 }
-seconds = {}
-for name, task in tasks.items():
+for line in sys.stdin:
+    start = time.process_time()
     try:
-        task()
+        tasks[line.strip()]()
+        print(time.process_time() - start, flush=True)
     except Exception:
-        continue
-    taken = []
-    for _ in range(3):
-        start = time.process_time()
-        task()
-        taken.append(time.process_time() - start)
-    seconds[name] = min(taken)
-print(json.dumps(seconds))
+        print("nan", flush=True)
 """
 
 
@@ -104,71 +107,90 @@ def lay_out(commit: str, folder: Path) -> None:
         tar.extractall(folder, filter="data")
 
 
-def seconds_of(folder: Path, many: float) -> dict[str, float]:
-    """What every task takes with the sources in a folder."""
+def started(folder: Path, many: float) -> subprocess.Popen[str]:
+    """A process that solves with the sources in a folder."""
     record = ROOT / "sweeps" / "data" / "synthetic.csv"
     # a folder of its own for compiled code: in a common one only that of the latest four versions is kept
     own = {"PYTHONPATH": str(folder / "src"), "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_NUM_THREADS": "1"}
-    done = subprocess.run(
+    return subprocess.Popen(
         [sys.executable, "-c", CHILD, str(record), str(many)],
-        cwd=folder, env=os.environ | own, check=True, capture_output=True, text=True,
+        cwd=folder, env=os.environ | own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
-    found: dict[str, float] = json.loads(done.stdout)
+
+
+def ask(child: subprocess.Popen[str], task: str) -> None:
+    """Have a task done."""
+    assert child.stdin
+    child.stdin.write(f"{task}\n")
+    child.stdin.flush()
+
+
+def answer(child: subprocess.Popen[str]) -> float:
+    """What it took; NaN where it cannot be done."""
+    assert child.stdout
+    return float(child.stdout.readline())
+
+
+def measured(commits: list[str], rounds: int, many: float) -> dict[str, dict[str, list[float]]]:
+    """Seconds of every round by task and commit; a round before the others compiles, all commits at the same time."""
+    found: dict[str, dict[str, list[float]]] = {task: {} for task in TASKS}
+    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        children = {}
+        for commit in commits:
+            lay_out(commit, Path(name) / commit)
+            children[commit] = stack.enter_context(started(Path(name) / commit, many))
+        for task, taken in found.items():
+            for child in children.values():
+                ask(child, task)
+            taken |= {commit: [] for commit, child in children.items() if math.isfinite(answer(child))}
+            for _ in range(rounds):
+                for commit, seconds in taken.items():
+                    ask(children[commit], task)
+                    seconds.append(answer(children[commit]))
+        for child in children.values():
+            assert child.stdin
+            child.stdin.close()
     return found
 
 
-def measured(commits: list[str], rounds: int, many: float) -> dict[str, dict[str, float]]:
-    """Seconds by commit and task; a round before the others compiles."""
-    least: dict[str, dict[str, float]] = {commit: {} for commit in commits}
-    with tempfile.TemporaryDirectory() as name:
-        folders = {commit: Path(name) / commit for commit in commits}
-        for commit, folder in folders.items():
-            lay_out(commit, folder)
-            seconds_of(folder, 1e-3)
-        for _ in range(rounds):
-            for commit, folder in folders.items():
-                for task, seconds in seconds_of(folder, many).items():
-                    least[commit][task] = min(seconds, least[commit].get(task, seconds))
-    return least
-
-
-def drawn(ratios: dict[str, dict[str, float]], path: Path) -> None:
-    """Time over that of `BASE`, a panel a task: nothing to tell apart by colour."""
-    tasks = list(dict.fromkeys(task for found in ratios.values() for task in found))
+def drawn(ratios: dict[str, dict[str, float]], commits: list[str], path: Path) -> None:
+    """Time over that of `BASE` by task and commit, a panel a task: nothing to tell apart by colour."""
     figure, panels = plt.subplots(3, 3, figsize=(9.0, 6.5), sharex=True, sharey=True, layout="constrained")
-    for panel, task in zip(panels.flat, tasks, strict=False):
-        places = [place for place, found in enumerate(ratios.values()) if task in found]
-        values = [found[task] for found in ratios.values() if task in found]
+    for panel, (task, found) in zip(panels.flat, ratios.items(), strict=True):
+        places = [place for place, commit in enumerate(commits) if commit in found]
+        values = [found[commit] for commit in commits if commit in found]
         panel.plot(places, values, "o-", color="black", markersize=3, linewidth=1)
         panel.axhline(1.0, color="0.6", linewidth=0.8, zorder=0)
         panel.set_yscale("log", base=2)
         panel.yaxis.set_major_formatter("{x:.3g}")
         panel.set_title(f"{task}: {values[-1]:.2f}" if values else task, fontsize=9, loc="left")
-        panel.set_xticks(range(len(ratios)), [commit[:7] for commit in ratios], rotation=90, fontsize=7)
-    for panel in list(panels.flat)[len(tasks) :]:
-        panel.set_visible(False)
+        panel.set_xticks(range(len(commits)), [commit[:7] for commit in commits], rotation=90, fontsize=7)
     figure.supylabel(f"processor time over that of {BASE}", fontsize=9)
     figure.savefig(path, dpi=130)
 
 
 def main() -> None:
     """Measure, write the table and draw it."""
-    given = arguments(__doc__, counts={"commits": 10, "rounds": 3})
+    given = arguments(__doc__, counts={"commits": 10, "rounds": 15})
     commits = [git("rev-parse", "HEAD")] if given.tiny else some_commits(given.commits)
     found = measured(commits, 1, 1e-3) if given.tiny else measured(commits, given.rounds, 1.0)
-    base = next(iter(found.values()))
     ratios = {
-        commit: {task: value / base[task] for task, value in taken.items() if task in base}
-        for commit, taken in found.items()
+        task: {
+            commit: statistics.median(a / b for a, b in zip(seconds, taken[commits[0]], strict=True))
+            for commit, seconds in taken.items()
+        }
+        for task, taken in found.items()
     }
     with (given.folder / "commits.csv").open("w", newline="", encoding="utf-8") as file:
         file.write(f"# {measured_on()}\n")
         rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["commit", "date", "task", "seconds", f"over_{BASE}"])
-        for commit, taken in found.items():
+        rows.writerow(["commit", "date", "task", "least_seconds", f"over_{BASE}"])
+        for commit in commits:
             date = git("show", "-s", "--format=%cI", commit)
-            rows.writerows([commit[:10], date, task, f"{s:.4g}", f"{s / base[task]:.3f}"] for task, s in taken.items())
-    drawn(ratios, given.folder / "commits.png")
+            for task, taken in found.items():
+                if commit in taken:
+                    rows.writerow([commit[:10], date, task, f"{min(taken[commit]):.4g}", f"{ratios[task][commit]:.3f}"])
+    drawn(ratios, commits, given.folder / "commits.png")
 
 
 if __name__ == "__main__":
