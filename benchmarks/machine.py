@@ -85,8 +85,11 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def number(value: float, digits: int = 3) -> str:
     """`value` to a few digits, as people write it."""
-    if value == 0 or 1e-3 <= abs(value) < 1e5:
-        return f"{value:#.{digits}g}".rstrip(".") if value else "0"
+    if value == 0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e5:
+        rounded = float(f"{value:.{digits}g}")
+        return f"{rounded:.0f}" if abs(rounded) >= 10.0 ** (digits - 1) else f"{value:#.{digits}g}"
     return f"{value:.{max(digits - 2, 0)}e}"
 
 
