@@ -29,7 +29,7 @@ def interrupting() -> Iterator[None]:
     """Make Ctrl-C and SIGTERM raise `Interrupted`, once: cleaning up is not interrupted again."""
     # a signal that the caller ignores (nohup, a shell's background job) stays ignored
     watched = [s for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) is not signal.SIG_IGN]
-    postponed, ended = 0, False
+    postponed, ended, main = 0, False, _thread.get_ident()
 
     def interrupt(signum: int, frame: FrameType | None) -> None:
         nonlocal postponed
@@ -48,7 +48,9 @@ def interrupting() -> Iterator[None]:
     def come_again(signum: signal.Signals) -> None:
         def wait() -> None:
             time.sleep(_AGAIN)
-            if not ended:
+            if not ended and hasattr(signal, "pthread_kill"):
+                signal.pthread_kill(main, signum)  # ends what the thread waits for, as `interrupt_main` would not
+            elif not ended:
                 _thread.interrupt_main(signum)
 
         # a `threading.Thread` would take locks that may be held
