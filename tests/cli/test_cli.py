@@ -13,10 +13,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import llvmlite.binding
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from llvmlite.binding.ffi import ObjectRef
 
 from slipsweep import cli
 from slipsweep.cli.signals import Interrupted, interrupting
@@ -218,36 +220,50 @@ def test_a_signal_inside_a_destructor_is_not_lost(
     assert before == ([signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)], sys.unraisablehook)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends signals")
-def test_a_signal_leaves_no_lock_held() -> None:
-    """Between the call that takes a lock and what gives it back, an exception would leave it held for ever."""
-    semaphore = threading.Semaphore(0)
+def interrupted_at(event: str, function: Any, act: Callable[[], object]) -> list[object]:
+    """Interrupt at an event of a function that `act` calls; what `act` returned, if it could."""
     sent: list[signal.Signals] = []
+    returned: list[object] = []
 
-    def trace(frame: FrameType, event: str, _: object) -> Any:
-        if event == "return" and frame.f_code is threading.Condition.__enter__.__code__ and not sent:
+    def trace(frame: FrameType, what: str, _: object) -> Any:
+        if what == event and frame.f_code is function.__code__ and not sent:
             sent.append(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
         return trace
 
-    def take() -> None:
+    def run() -> None:
         before = sys.gettrace()
         sys.settrace(trace)
         try:
-            semaphore.acquire(timeout=0)
+            returned.append(act())
         finally:
             sys.settrace(before)
         time.sleep(60.0)  # it is raised here, and does not wait for the end
 
     started = time.monotonic()
     with pytest.raises(Interrupted), interrupting():
-        take()
+        run()
     assert sent
     assert time.monotonic() - started < 30.0
+    return returned
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+def test_a_signal_leaves_no_lock_held() -> None:
+    """Between the call that takes a lock and what gives it back, an exception would leave it held for ever."""
+    semaphore = threading.Semaphore(0)
+    interrupted_at("return", threading.Condition.__enter__, lambda: semaphore.acquire(timeout=0))
     another = threading.Thread(target=semaphore.release, daemon=True)
     another.start()
     another.join(10.0)
     assert not another.is_alive()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+def test_a_signal_leaves_no_object_of_llvm_half_made() -> None:
+    """One that is not made to the end prints a traceback when it goes."""
+    (context,) = interrupted_at("call", ObjectRef.__init__, llvmlite.binding.create_context)
+    assert isinstance(context, ObjectRef)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")

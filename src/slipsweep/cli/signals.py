@@ -9,9 +9,10 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-#: Modules and packages, a dot behind each, whose locks an exception from outside would leave held for ever: they take
-#: them by calls, and between a call and its `try` a signal may come.  Seen: one of some 60 interrupted runs hung.
-_LOCKING = ("threading.", "queue.", "logging.", "concurrent.futures.")
+#: Modules and packages, a dot behind each, in which nothing is raised.  Locks of threads are taken by calls, and
+#: between a call and its `try` a signal may come: they would stay held for ever (seen: one of some 60 interrupted runs
+#: hung).  Objects of llvmlite that are not made to the end print so when they go (one of 58).
+_NOT_IN = ("threading.", "queue.", "logging.", "concurrent.futures.", "llvmlite.")
 
 #: Seconds after which a signal that could not be raised comes once more, and how often at most: ten seconds in all.
 _AGAIN, _MOST = 0.02, 500
@@ -33,7 +34,7 @@ def interrupting() -> Iterator[None]:
 
     def interrupt(signum: int, frame: FrameType | None) -> None:
         nonlocal postponed
-        if _in_locking(frame) and postponed < _MOST:
+        if _is_in_them(frame) and postponed < _MOST:
             postponed += 1
             come_again(signal.Signals(signum))
             return
@@ -76,10 +77,10 @@ def interrupting() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _in_locking(frame: FrameType | None) -> bool:
-    """Whether a function of a module that holds locks is under way."""
+def _is_in_them(frame: FrameType | None) -> bool:
+    """Whether a function of a module in which nothing is raised is under way."""
     while frame is not None:
-        if f"{frame.f_globals.get('__name__')}.".startswith(_LOCKING):
+        if f"{frame.f_globals.get('__name__')}.".startswith(_NOT_IN):
             return True
         frame = frame.f_back
     return False
