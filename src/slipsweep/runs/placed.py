@@ -8,8 +8,8 @@ checked byte by byte.
 Left to itself the system would keep what is written in memory first, where every 4 KB that it has not
 at hand cost from 0.2 to 2.5 µs: 1.9 GB took the netCDF library 2.6 s of processor so.  Written directly
 they took 0.1 s of it, at the disk's own 2.4 GB/s (``python -m benchmarks.large_sweeps``).  Written in the ordinary
-way, each chunk followed by `posix_fadvise` (DONTNEED), they took 0.8 and 2.3 times as long as this, in two sets of
-turns on a disk that others used, and `run` as a whole 1.2 s of the system's processor time instead of 0.4; on tmpfs
+way, each chunk followed by `posix_fadvise` (DONTNEED), they took 0.8, 2.3 and 0.9 times as long as this, in three sets
+of turns on disks that others used, and `run` as a whole 1.2 s of the system's processor time instead of 0.4; on tmpfs
 it made no difference.
 """
 
