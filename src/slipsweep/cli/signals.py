@@ -12,7 +12,7 @@ from typing import Any
 #: Modules and packages, a dot behind each, in which nothing is raised.  Locks of threads are taken by calls, and
 #: between a call and its `try` a signal may come: they would stay held for ever (seen: one of some 60 interrupted runs
 #: hung).  Objects of llvmlite that are not made to the end print so when they go (one of 58).
-_NOT_IN = ("threading.", "queue.", "logging.", "concurrent.futures.", "llvmlite.")
+_SHIELDED = ("threading.", "queue.", "logging.", "concurrent.futures.", "llvmlite.")
 
 #: Seconds after which a signal that could not be raised comes once more, and how often at most: ten seconds in all.
 _AGAIN, _MOST = 0.02, 500
@@ -34,7 +34,7 @@ def interrupting() -> Iterator[None]:
 
     def interrupt(signum: int, frame: FrameType | None) -> None:
         nonlocal postponed
-        if _is_in_them(frame) and postponed < _MOST:
+        if _is_shielded(frame) and postponed < _MOST:
             postponed += 1
             come_again(signal.Signals(signum))
             return
@@ -77,10 +77,10 @@ def interrupting() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _is_in_them(frame: FrameType | None) -> bool:
-    """Whether a function of a module in which nothing is raised is under way."""
+def _is_shielded(frame: FrameType | None) -> bool:
+    """Whether a function of a shielded module is under way."""
     while frame is not None:
-        if f"{frame.f_globals.get('__name__')}.".startswith(_NOT_IN):
+        if f"{frame.f_globals.get('__name__')}.".startswith(_SHIELDED):
             return True
         frame = frame.f_back
     return False

@@ -299,7 +299,7 @@ def _amplitudes(arrays: Mapping[str, Array]) -> int:
 
 def _is_plain_sine(motion: Waveform | Record | Suite) -> bool:
     """Whether a motion is a sine without ramps, for which there are shorter ways."""
-    return isinstance(motion, Sine) and motion.ramp_in == 0.0 == motion.ramp_out
+    return isinstance(motion, Sine) and motion == Sine(motion.cycles)
 
 
 def _solve_into(results: Arrays, asked: Request) -> None:
