@@ -5,21 +5,23 @@ else.  Operations are counted from the formulas, not from the code: what is left
 everything that is not the mathematics costs nothing.
 """
 
+import functools
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 import slipsweep
 from benchmarks.grids import regime_cells
 from benchmarks.machine import alternate, arguments, cores, measured_on, number, table
 from benchmarks.report import displacement, size_of, steps_taken
 from slipsweep import Validity
+from slipsweep.jit import form
 from slipsweep.jit.decorators import in_lanes
-from slipsweep.jit.inner.sealed import sealed
 
 #: Operations of the building blocks; a fused multiply-add is one, a division or root is one.
 EXP, LOG, VERSINE, ARCSINE = 20, 20, 13, 23
@@ -49,18 +51,27 @@ STEP_OPERATIONS = {"stick_slip": EXP // 2 + NODE + 4, "continuous": EXP + NODE +
 
 @in_lanes
 def _sixteen(x: float) -> float:
+    """16 multiply-adds, each of which waits for the one before."""
     x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
     x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
     x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
     return (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1
 
 
-@sealed  # as kernels are compiled, for registers as wide
-def _multiply_add(values: np.ndarray, turns: int) -> None:
-    """16 dependent multiply-adds on every value, `turns` times; the values stay in the first-level cache."""
+def _turns(values: np.ndarray, turns: int) -> None:
+    """16 multiply-adds on every value, `turns` times; the values stay in the first-level cache."""
     for _ in range(turns):
         for i in range(values.size):
             values[i] = _sixteen(values[i])
+
+
+@functools.cache
+def _multiply_add() -> Callable[[np.ndarray, int], None]:
+    """`_turns`, compiled as kernels are: for registers as wide."""
+    compiled: Callable[[np.ndarray, int], None] = form.compiled(
+        _turns, (types.float64[::1], types.int64), None, nullcontext()
+    )
+    return compiled
 
 
 @njit(nogil=True)
@@ -79,10 +90,10 @@ def _fill(a: np.ndarray) -> None:
 def slot(tiny: bool) -> float:
     """Processor time of one multiply-add in registers on one core, s: a slot, in which machines compare."""
     values, turns, times = np.ones(1024), 10 if tiny else 20_000, []
-    _multiply_add(values, 1)  # compiled before the clock starts
+    multiply_add = _multiply_add()  # compiled before the clock starts
     for _ in range(5):
         start = time.process_time()
-        _multiply_add(values, turns)
+        multiply_add(values, turns)
         times.append((time.process_time() - start) / (values.size * 16 * turns))
     return min(times)  # a ceiling is the best that was seen
 
@@ -98,8 +109,9 @@ def ceilings(tiny: bool) -> dict[str, float]:
     size, turns = (10_000, 10) if tiny else (20_000_000, 20_000)
     small = [np.ones(1024) for _ in range(cores())]
     large = [[np.ones(size) for _ in range(3)] for _ in range(cores())]
+    multiply_add = _multiply_add()
     work: dict[str, Callable[[], object]] = {
-        "multiply-add": _on_all_cores(lambda core: _multiply_add(small[core], turns)),
+        "multiply-add": _on_all_cores(lambda core: multiply_add(small[core], turns)),
         "triad": _on_all_cores(lambda core: _triad(*large[core])),
         "fill": _on_all_cores(lambda core: _fill(large[core][0])),
         "fresh": _on_all_cores(lambda core: np.full(size, 1.0)),
