@@ -21,7 +21,7 @@ from slipsweep.jit.interrupts import heard_later
 
 need(
     JITCodeLibrary,
-    _finalize_final_module="self",
+    _optimize_final_module="self",
     enable_object_caching="self",
     _final_module=None,
 )
@@ -31,13 +31,18 @@ need(Compiler, __init__="self typingctx targetctx library args return_type flags
 
 
 class _Library(WideLibrary):
-    """Machine code of a kernel with functions of its own."""
+    """Machine code of a kernel with functions of its own.
 
-    def _finalize_final_module(self) -> None:
+    LLVM knows all their callers once they are internal: it drops arguments that nobody reads (a wave and a table of
+    steps are a hundred words) and inlines what has one caller.  Seen: steps take 0.5 (32 a cycle) to 0.75 of the time,
+    triangles 0.8, squares 0.65, the law under records 0.87; the sine's kernel some 0.4 s more to compile, of 12.
+    """
+
+    def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
                 function.linkage = "internal"
-        super()._finalize_final_module()
+        super()._optimize_final_module()
 
 
 class _Compiler(Compiler):
