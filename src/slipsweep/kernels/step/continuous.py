@@ -90,9 +90,9 @@ def steps_along(block: Block, p: int, i: int, until: int, room: Room) -> None:
     steps, state, lanes = room.steps, room.state, room.lanes
     while i < until:
         at, most = steps.offset[p] + i, min(until - i, AHEAD - 1)
-        eq4_rates(block, steps.nodes, at, RATE, lanes)
+        eq4_rates(block, steps.nodes, at, most, RATE, lanes)
         if steps.rule == SIMPSON:
-            eq4_rates(block, steps.middles, at, MIDDLE, lanes)
+            eq4_rates(block, steps.middles, at, most, MIDDLE, lanes)
         taken = steps_to_turn(most, lanes)
         if state[LAYER] > 0.0:
             for k in range(taken):

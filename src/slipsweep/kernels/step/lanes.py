@@ -39,12 +39,13 @@ def room_of(steps: Steps) -> Room:
 
 
 @scalar
-def eq4_rates(block: Block, w: np.ndarray, at: int, row: int, lanes: np.ndarray) -> None:
-    """D at the nodes w[at:] into a row of the lanes."""
+def eq4_rates(block: Block, w: np.ndarray, at: int, most: int, row: int, lanes: np.ndarray) -> None:
+    """D at the nodes w[at:] of `most` steps into a row of the lanes, in whole registers."""
     amplitude, mu_s, tan_theta, g = block.amplitude, block.mu_s, block.tan_theta, block.g
     delta_mu, decay = block.delta_mu, block.decay_rate / block.g
-    source, target = w[at : at + AHEAD], lanes[row : row + AHEAD]
-    for k in range(AHEAD):
+    count = (most | 7) + 1
+    source, target = w[at : at + count], lanes[row : row + count]
+    for k in range(count):
         x = amplitude * source[k]
         mu = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
         target[k] = eq.relative_acceleration(x, mu, mu_s, tan_theta, g)

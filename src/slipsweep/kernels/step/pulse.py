@@ -268,7 +268,7 @@ def steps_to_event(block: Block, p: int, i: int, most: int, state: np.ndarray, r
         for k in range(AHEAD):
             lanes[EQ4 + k] = math.inf
     else:
-        eq4_rates(block, steps.nodes, at, EQ4, lanes)
+        eq4_rates(block, steps.nodes, at, most, EQ4, lanes)
     w = steps.nodes[at : at + AHEAD]
     for k in range(AHEAD):
         lanes[X + k] = amplitude * w[k]
@@ -297,7 +297,7 @@ def rise_ahead(block: Block, p: int, i: int, state: np.ndarray, room: Room) -> i
     if state[SLIDES] == 0.0:
         return most
     if steps.rule == SIMPSON and follows:
-        eq4_rates(block, steps.middles, at, MIDDLE, lanes)
+        eq4_rates(block, steps.middles, at, most, MIDDLE, lanes)
     elif steps.rule == SIMPSON:
         held_rates(amplitude, state[HELD], steps.middles, at, MIDDLE, lanes)
     taken = advance(steps, p, most, True, state, lanes)
