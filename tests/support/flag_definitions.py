@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ class Interface:
     given_minimum: Floats
     g: float = 9.81
 
-    @property
+    @cached_property
     def yield_acceleration(self) -> Floats:
         return np.where(
             np.isnan(self.given_yield),
@@ -83,25 +84,25 @@ class Interface:
             self.given_yield,
         )
 
-    @property
+    @cached_property
     def denominator(self) -> Floats:
         return 1.0 - self.tan_theta * (self.mu_s - self.tan_theta)
 
-    @property
+    @cached_property
     def ratio(self) -> Floats:
         return self.amplitude * self.denominator / (self.yield_acceleration + self.g * self.mu_s)
 
-    @property
+    @cached_property
     def minimum(self) -> Floats:
         estimate = np.where(self.ratio <= 1.0, self.mu_s**2 * self.ratio, 0.01)
         return np.where(np.isnan(self.given_minimum), estimate, self.given_minimum)
 
-    @property
+    @cached_property
     def delta(self) -> Floats:
         estimate = self.mu_s * (np.where(self.ratio <= 1.0, 1.0 / self.ratio, self.ratio) - 1.0)
         return np.where(np.isnan(self.given_delta), estimate, self.given_delta)
 
-    @property
+    @cached_property
     def decay(self) -> Floats:
         with np.errstate(invalid="ignore", divide="ignore"):
             estimate = self.g / self.amplitude * np.log((self.mu_s + self.delta) / self.minimum)
@@ -117,11 +118,9 @@ class Interface:
 
     def highest_eq4(self) -> Floats:
         """The largest Eq. 4 on the rise from Üy to the peak."""
-        highest = np.full(self.amplitude.shape, -np.inf)
-        for share in np.linspace(0.0, 1.0, 1001):
-            x = self.yield_acceleration + share * (self.amplitude - self.yield_acceleration)
-            highest = np.fmax(highest, self.eq4(x))
-        return highest
+        shares = np.linspace(0.0, 1.0, 1001)[:, np.newaxis]
+        x = self.yield_acceleration + shares * (self.amplitude - self.yield_acceleration)
+        return np.asarray(np.fmax.reduce(self.eq4(x), initial=-np.inf))
 
 
 def flags_of_sine(
