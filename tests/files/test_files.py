@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import netCDF4
@@ -13,6 +12,7 @@ import pytest
 
 from slipsweep.files.results import ResultFile
 from slipsweep.model.variables import Validity
+from tests.support.commands import command
 
 #: Missing values, every sliding mode and four flags.
 GRID = """
@@ -111,7 +111,6 @@ def run(*arguments: str | Path, folder: Path) -> str:
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one file of every kind."""
     folder = tmp_path_factory.mktemp("files")
-    slipsweep = (sys.executable, "-m", "slipsweep")
     (folder / "motions").mkdir()
     for name, sign in (("a", 1), ("Düzce", -1)):
         rows = (f"{at / 20},{sign * 3 * (at % 7 - 3)}\n" for at in range(60 + sign))
@@ -126,11 +125,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("pairs", PAIRS),
     ):
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
-        run(*slipsweep, "run", f"{name}.toml", "--quiet", folder=folder)
-    run(
-        *slipsweep, "simulate", "--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8",
-        "--cycles", "2", "--points", "16", "-o", "history.nc", "--quiet", folder=folder,
-    )  # fmt: skip
+        assert command(folder, "run", f"{name}.toml", "--quiet").returncode == 0
+    block = ("--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8")
+    done = command(folder, "simulate", *block, "--cycles", "2", "--points", "16", "-o", "history.nc", "--quiet")
+    assert done.returncode == 0
     return folder
 
 
