@@ -1,6 +1,7 @@
 """What kernels and results depend on is found: the code of every source that they use counts, and no text does."""
 
 import ast
+import functools
 import shutil
 import subprocess
 import sys
@@ -78,6 +79,7 @@ def test_what_kernels_load_is_found(tmp_path: Path) -> None:
     assert needed <= set(reached(known_sources(sources.PACKAGE), sources.MACHINE_CODE))
 
 
+@functools.cache
 def every_source() -> dict[str, Source]:
     """All sources of the package, whether keys depend on them or not."""
     texts = {path.relative_to(sources.PACKAGE).as_posix(): path.read_bytes() for path in sources.PACKAGE.rglob("*.py")}
@@ -206,6 +208,8 @@ def test_circles_end() -> None:
 
 def test_damaged_notes_are_made_anew(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(folders, "base", lambda: tmp_path)
+    for folder in ("grid", "kernels/cycle", "kernels/sine", "kernels/step", "motion"):  # fewer to parse each time
+        shutil.rmtree(package / folder)
     right = known_sources(package)
     (kept,) = tmp_path.glob("sources-*.json")
     content = kept.read_bytes()
