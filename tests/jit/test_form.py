@@ -90,10 +90,16 @@ for owner, name in dict.fromkeys([*NEEDED, *imported()]):
         continue
     take_away(owner, name)
     try:
-        alone = numba_alone()
-    except Exception:  # nobody can do without what numba itself cannot do without
-        alone = False
-    print(f"{owner.__name__}.{name}", *(ours() if alone else ("numba needs it", "")), sep="|", flush=True)
+        outcome = ours()
+    except Exception as error:
+        outcome = type(error).__name__, ""
+        try:
+            alone = numba_alone()
+        except Exception:  # nobody can do without what numba itself cannot do without
+            alone = False
+        if not alone:
+            outcome = "numba needs it", ""
+    print(f"{owner.__name__}.{name}", *outcome, sep="|", flush=True)
     os._exit(0)
 """
 
