@@ -51,7 +51,7 @@ STRONG = "[axes.amplitude]\nvalues = [1, 2, 4, 7, 11]\n"
 #: Rows after the frequency: what a chunk of some of them gives lies in many places of the file.
 CASES = "".join(
     f'[[cases]]\nlabel = "no. {i}"\ntheta = {3 * i}\nmu_s = {0.3 + 0.075 * i:.3f}\nstructure_frequency = 2\n'
-    for i in range(5)
+    for i in (0, 2, 4)
 )
 
 DRAWN = """
@@ -86,14 +86,14 @@ BLOCKS = CASES.replace("structure_frequency = 2\n", "")
 POOLED = 'over = ["motion", "polarity"]\n'
 
 #: Of each block there is a case for each motion and strength.
-FEW_BLOCKS = BLOCKS.partition('[[cases]]\nlabel = "no. 2"')[0]
+FEW_BLOCKS = BLOCKS.partition('[[cases]]\nlabel = "no. 4"')[0]
 
 
 #: Motions of different lengths, and pairs of components.
 SUITE = Suite((SHORT, Record.sampled(SHORT.acceleration[:25] * 1.5, 0.03, "other.csv")))
 PAIRS = Suite((Pair(SHORT, Record.sampled(SHORT.acceleration[::-1], 0.05)), Pair(SHORT, SHORT)), ("a", "b"))
 AZIMUTHS = "[axes.azimuth]\nvalues = [0, 20, 90]\n"
-STRENGTHS = "[axes.pgv]\nvalues = [0.1, 0.2, 0.4, 0.7, 1.1]\n"
+STRENGTHS = "[axes.pgv]\nvalues = [0.1, 0.4, 1.1]\n"
 
 
 def recorded(text: str, record: Record | Suite = SHORT) -> spec.SweepSpec:
@@ -125,7 +125,7 @@ PLANS: dict[str, Callable[[], Job]] = {
     "samples of a record": lambda: sweep_job(recorded(STRONG + BLOCKS + DRAWN)),
     "limits of a record": lambda: limit_job(recorded(BLOCKS), [0.001, 0.1]),
     "suite": lambda: sweep_job(recorded(STRENGTHS + FEW_BLOCKS, SUITE)),
-    "pairs": lambda: sweep_job(recorded(STRONG + AZIMUTHS + FEW_BLOCKS, PAIRS)),
+    "pairs": lambda: sweep_job(recorded(STRONG.replace("1, 2, 4, 7", "1, 4") + AZIMUTHS + FEW_BLOCKS, PAIRS)),
     "samples of a suite": lambda: sweep_job(
         recorded(STRENGTHS + FEW_BLOCKS + DRAWN.replace("amplitude", "pgv"), SUITE)
     ),
@@ -265,7 +265,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(
     tmp_path: Path, written: Callable[..., Written], name: str, split: bool
 ) -> None:
     job = PLANS[name]()
-    stopped(job, tmp_path / "a", 2, chunk_cells=6, split=split)
+    stopped(job, tmp_path / "a", 1, chunk_cells=6, split=split)
     numbers: list[int] = []
 
     def counted(*arguments: Any) -> Any:
@@ -274,7 +274,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(
             yield found
 
     store.run(job, tmp_path / "a", command="x", resume=True, split=split, solved=counted)
-    assert numbers[0] == 2
+    assert numbers[0] == 1
     whole = written(name, 6, split=split).path
     for path in sorted(whole.iterdir()) if split else [whole]:
         assert stored(tmp_path / "a" / path.name if split else tmp_path / "a") == stored(path)
@@ -321,7 +321,7 @@ def test_what_is_complete_but_of_another_sweep_is_refused(tmp_path: Path) -> Non
     ):
         with pytest.raises(InputError, match=f"{name}: exists already, and is not the complete result.*{message}"):
             store.run(job, tmp_path / name, command="x", resume=True, solved=unsolved)
-    with pytest.raises(InputError, match="it has 14 files of 15"):
+    with pytest.raises(InputError, match="it has 9 files of 10"):
         store.run(sweep_job(sweep), tmp_path / "split", command="x", resume=True, split=True, solved=unsolved)
     assert {path: path.read_bytes() for path in tmp_path.glob("*.nc")} == before
     # without --resume nothing is looked at
@@ -347,7 +347,7 @@ def test_commands_say_that_all_is_there(
 
 def test_limits_go_on_with_the_same_question_only(tmp_path: Path) -> None:
     sweep = spec.parse(AXES + CASES, "a.toml")
-    stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 2, chunk_cells=6)
+    stopped(limit_job(sweep, 0.05), tmp_path / "a.nc", 1, chunk_cells=6)
     for other, message in (
         (limit_job(sweep, 0.06), r"--displacement was 0\.05, is 0\.06"),
         (limit_job(sweep, 0.05, 20.0), r"--maximum-amplitude was none, is 20"),
