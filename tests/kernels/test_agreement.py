@@ -20,8 +20,8 @@ def _count() -> Iterator[None]:
     print(f"\n{compared.total()} comparisons: {dict(compared)}")
 
 
-@settings(reproducible, max_examples=200)
-@given(group=agreement.groups)
+@settings(reproducible, max_examples=100)
+@given(group=agreement.large_groups)
 def test_solvers_agree(group: agreement.Group) -> None:
     """Some 6,000 cells under all options; ``python -m benchmarks.agreement`` draws more of them."""
     found = list(agreement.compare(group))
