@@ -5,7 +5,7 @@ reached: noise taken for motion would shift both.  The spline has as many coeffi
 its correction for few samples, asks for: few under a smooth motion, many under a sharp one or without noise.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,10 +65,16 @@ class TableMotion:
     shapes: Floats
     noise: float
     coefficients: int
+    _last: list[tuple[Floats, Record]] = field(default_factory=list, init=False, repr=False)
 
     def record(self, wrong: Floats) -> Record:
-        """The motion as a record, wrong by so many standard deviations of each shape."""
-        return Record(self.times, self.acceleration + self.shapes @ wrong)
+        """The motion as a record, wrong by so many standard deviations of each shape.
+
+        The last one is kept, and with it its pieces: parameters are tried on one motion many times.
+        """
+        if not self._last or not np.array_equal(self._last[0][0], wrong):
+            self._last[:] = [(wrong.copy(), Record(self.times, self.acceleration + self.shapes @ wrong))]
+        return self._last[0][1]
 
     def with_line(self, line: Floats, deviation: float) -> "TableMotion":
         """One more way to be wrong: a line (given at `times`), whose standard deviation is known so far."""
