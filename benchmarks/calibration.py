@@ -74,9 +74,9 @@ def one(mode: str, noise: float, seed: int) -> list[list[float]]:
 def repeated(mode: str, noise: float, repetitions: int, together: bool = True) -> np.ndarray:
     """`one` for so many seeds, on all cores if `together`: repetition, parameter, result."""
     task = partial(one, mode, noise)
-    task(0)  # compiled once, for all processes
     if not together:
         return np.array([task(seed) for seed in range(repetitions)])
+    task(0)  # compiled once, for all processes
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(cores()) as pool:
         return np.array(list(pool.map(task, range(repetitions), chunksize=5)))
@@ -165,7 +165,7 @@ def report(noisy: Mapping[str, np.ndarray], calm: Mapping[str, np.ndarray]) -> s
 def main() -> None:
     """Measure, write calibration.md."""
     given = arguments(__doc__, counts={"repetitions": 500})
-    repetitions = 2 if given.tiny else given.repetitions
+    repetitions = 1 if given.tiny else given.repetitions
     noisy = {mode: repeated(mode, NOISE, repetitions, not given.tiny) for mode in CALIBRATED}
     calm = {mode: repeated(mode, 0.001, max(repetitions // 25, 1), not given.tiny) for mode in CALIBRATED}
     Path(given.folder / "calibration.md").write_text(report(noisy, calm), encoding="utf-8")

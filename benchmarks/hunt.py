@@ -93,7 +93,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         sources = Sources(Path(folder))
         for name, kind in KINDS.items():
-            count = 5 if wanted.tiny else max(5, kind.count * wanted.percent // 100)
+            count = 2 if wanted.tiny else max(5, kind.count * wanted.percent // 100)
             endings = draw(name, kind, sources, count, seed)
             rows += endings.rows()
             faults += len(endings.faults)
