@@ -10,7 +10,6 @@ import xarray as xr
 from slipsweep import InputError, Mendez, Record, limit_amplitude, read_record, sweep
 from slipsweep.model.variables import RECORD_COUNTS, LimitStatus
 from tests.support.commands import command
-from tests.support.processes import slipsweep
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 
@@ -130,7 +129,7 @@ def test_on_the_command_line(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found.record_acceleration, record.acceleration)
     # of a result as of its sweep file
     assert command(tmp_path, "run", "a.toml", "-q").returncode == 0
-    again = slipsweep(tmp_path, "limit", "a.nc", "-d", "5cm", "-d", "20cm", "-o", "m.nc", "--workers", "1")
+    again = command(tmp_path, "limit", "a.nc", "-d", "5cm", "-d", "20cm", "-o", "m.nc", "-q")
     assert (again.returncode, again.stderr) == (0, "")
     with xr.open_dataset(tmp_path / "l.nc") as one, xr.open_dataset(tmp_path / "m.nc") as other:
         xr.testing.assert_equal(one, other)

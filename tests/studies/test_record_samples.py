@@ -11,7 +11,6 @@ from slipsweep import InputError, Record, Suite, read_record, sample, sweep
 from slipsweep.model.variables import Validity
 from slipsweep.studies.sampling import check_sampling
 from tests.support.commands import command
-from tests.support.processes import slipsweep
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 SAMPLES = 64
@@ -214,7 +213,7 @@ def test_sweep_files(tmp_path: Path) -> None:
         for name in expected.data_vars:
             np.testing.assert_allclose(found[name], expected[name], rtol=1e-14, err_msg=str(name))
     assert command(tmp_path, "info", "a.nc").returncode == 0
-    again = slipsweep(tmp_path, "run", "a.nc", "-o", "b.nc", "-q", "--workers", "1")
+    again = command(tmp_path, "run", "a.nc", "-o", "b.nc", "-q")
     assert (again.returncode, again.stderr) == (0, "")
     with xr.open_dataset(tmp_path / "a.nc") as one, xr.open_dataset(tmp_path / "b.nc") as other:
         xr.testing.assert_equal(one, other)

@@ -1,8 +1,6 @@
 """Suites in sweep files: what a run writes, chunks, kills, workers, that it repeats itself, and what is refused."""
 
 import importlib.util
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +20,7 @@ from slipsweep.motion.intensity import intensity_measures
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import limit_job, sweep_job
 from tests.studies.test_record_sweeps import assert_same_data, stored
+from tests.support.commands import command
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 
@@ -80,13 +79,6 @@ def folder(tmp_path: Path) -> Path:
 
 def run(source: Path, path: Path, **options: Any) -> store.Report:
     return store.run(sweep_job(spec.load(source)), path, command="slipsweep run a.toml", **options)
-
-
-def command(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "slipsweep", *map(str, arguments)],
-        capture_output=True, text=True, env=os.environ, cwd=folder, check=False,
-    )  # fmt: skip
 
 
 # ---------------------------------------------------------------------------- what is written
@@ -195,28 +187,20 @@ def test_an_interrupted_run_goes_on_but_not_with_other_motions(folder: Path) -> 
     assert_same_data(folder / "a.nc", folder / "b.nc")
 
 
-@pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="needs the extra cluster")
-def test_workers_give_the_same(folder: Path) -> None:
-    done = command("run", "a.toml", "-o", "a.nc", "--workers", 2, "--quiet", folder=folder)
-    assert done.returncode == 0, done.stderr
-    run(folder / "a.toml", folder / "b.nc")
-    assert_same_data(folder / "a.nc", folder / "b.nc")
-
-
 # --------------------------------------------------------------------------------- commands
 
 
 def test_info_and_export_show_the_motions(folder: Path) -> None:
     (folder / "motions" / "m4.csv").write_text((folder / "motions" / "m0.csv").read_text())
-    done = command("run", "a.toml", folder=folder)
+    done = command(folder, "run", "a.toml")
     assert "the same motion under several labels: m0, m4" in done.stdout
-    lines = command("info", "a.nc", folder=folder).stdout.splitlines()
+    lines = command(folder, "info", "a.nc").stdout.splitlines()
     at = lines.index("motions, as recorded:")
     assert lines[at + 1].split()[:3] == ["motion", "samples", "interval"]
     assert [line.split()[:3] for line in lines[at + 2 : at + 5]] == [
         ["m0", "150", "0.01"], ["m1", "80", "0.02"], ["m2", "200", "0.005"],
     ]  # fmt: skip
-    assert command("export", "a.nc", "-o", "a.csv", "--quiet", folder=folder).returncode == 0
+    assert command(folder, "export", "a.nc", "-o", "a.csv", "--quiet").returncode == 0
     header, row = (folder / "a.csv").read_text().splitlines()[:2]
     assert dict(zip(header.split(","), row.split(","), strict=True))["motion"] == "m0"
     assert "motion_pga (m s-2)" in header
@@ -227,7 +211,7 @@ def test_one_motion_over_time_at_a_target(folder: Path) -> None:
     block = ("--theta", 5, "--mu-s", 0.1, "--record", "motions/m0.csv", "--units", "g", "--time-scale", 2)
     motion = read_suite(folder / "motions", units="g")["m0"]
     for target, value in (("pgv", "40 cm/s"), ("arias-intensity", "0.4")):
-        done = command("simulate", *block, f"--{target}", value, folder=folder)
+        done = command(folder, "simulate", *block, f"--{target}", value)
         assert done.returncode == 0, done.stderr
         given: dict[str, Any] = {target.replace("-", "_"): 0.4}
         found = sweep(5, 0.1, excitation=motion, time_scale=2, **given)
@@ -236,11 +220,11 @@ def test_one_motion_over_time_at_a_target(folder: Path) -> None:
 
 def test_a_chart_of_limits_and_charts_that_there_are_not(folder: Path) -> None:
     (folder / "a.toml").write_text(SWEEP.replace("[0, 5, 25]", "[5]").replace("[0.1, 0.3]", "[0.1]"))
-    done = command("limit", "a.toml", "-d", "50mm", "-o", "l.png", folder=folder)
+    done = command(folder, "limit", "a.toml", "-d", "50mm", "-o", "l.png")
     assert done.returncode == 0, done.stderr
     assert (folder / "l.png").stat().st_size > 10_000
-    command("run", "a.toml", folder=folder)
-    done = command("chart", "a.nc", "--kind", "contours", "-o", "c.png", folder=folder)
+    command(folder, "run", "a.toml")
+    done = command(folder, "chart", "a.nc", "--kind", "contours", "-o", "c.png")
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
 
@@ -248,7 +232,7 @@ def test_a_chart_of_limits_and_charts_that_there_are_not(folder: Path) -> None:
 def test_damaged_files_are_told_line_by_line(folder: Path) -> None:
     (folder / "motions" / "m1.csv").write_text("0,1\n0,2\n")
     (folder / "motions" / "readme.csv").write_text("no numbers\n")
-    done = command("run", "a.toml", folder=folder)
+    done = command(folder, "run", "a.toml")
     assert done.returncode == 2
     first, *more = done.stderr.splitlines()
     assert first == ("slipsweep: error: a.toml: excitation.records: 2 of 4 files cannot be read: m1.csv, readme.csv")
