@@ -92,6 +92,11 @@ class Asked:
         return f"{self.folder}/data{Path(self.output).suffix}"
 
 
+def sweep_of(output: str) -> Asked:
+    """A sweep that is killed: a chunk of a store takes ten times as long as one of a file, and 200 will do."""
+    return Asked(output, work=3 * SMALL if output == OUTPUTS["Zarr"] else None)
+
+
 def samples(output: str) -> Asked:
     """Statistics under uncertain inputs."""
     return Asked(output, DRAWN, work=2000)
@@ -302,12 +307,12 @@ def signalled(folder: Path, rng: random.Random, number: signal.Signals, asked: A
 
 def killed(folder: Path, rng: random.Random, output: str) -> int:
     """Kill −9 at random moments."""
-    return signalled(folder, rng, signal.SIGKILL, Asked(output))
+    return signalled(folder, rng, signal.SIGKILL, sweep_of(output))
 
 
 def interrupted(folder: Path, rng: random.Random, output: str) -> int:
     """Ctrl-C or SIGTERM at random moments."""
-    return signalled(folder, rng, rng.choice([signal.SIGINT, signal.SIGTERM]), Asked(output))
+    return signalled(folder, rng, rng.choice([signal.SIGINT, signal.SIGTERM]), sweep_of(output))
 
 
 def samples_killed(folder: Path, rng: random.Random, output: str) -> int:
@@ -335,9 +340,9 @@ def children(pid: int) -> list[int]:
 
 def worker_killed(folder: Path, rng: random.Random, output: str) -> int:
     """Kill −9 of a worker of --workers 2, which writes a store's chunks itself: the run goes on."""
-    asked = Asked(output, work=3 * SMALL)  # 200 chunks: each costs the cluster some milliseconds of its own
+    asked = Asked(output, work=6 * SMALL)  # 100 chunks: each costs the cluster some milliseconds of its own
     process = start(folder, asked, "--workers", "2")
-    wait_for_chunk(process, folder, asked, rng.randrange(1, 100))
+    wait_for_chunk(process, folder, asked, rng.randrange(1, 50))
     workers = children(process.pid)
     if process.poll() is None and workers:
         os.kill(rng.choice(workers), signal.SIGKILL)
