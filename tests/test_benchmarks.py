@@ -1,5 +1,6 @@
 """Every measurement still runs, and writes what it says, on a few cells."""
 
+import gc
 import runpy
 import sys
 from pathlib import Path
@@ -48,6 +49,8 @@ def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     # the outside solvers that compile take most of a minute
     monkeypatch.setitem(sys.modules, "diffrax", None)
     monkeypatch.setitem(sys.modules, "CyRK", None)
+    # before each time that is taken, which means nothing here: a quarter of a second for all that tests have made
+    monkeypatch.setattr(gc, "collect", lambda: 0)
     monkeypatch.setattr(sys, "argv", [name, "--tiny", "--folder", str(tmp_path)])
     runpy.run_module(f"benchmarks.{name}", run_name="__main__")
     for file in WRITES[name]:
