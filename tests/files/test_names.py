@@ -60,13 +60,9 @@ def test_a_result_has_the_name_that_was_given(tmp_path: Path, stem: bytes, monke
     os.link(folder / name, tmp_path / "plain.nc")
     with netCDF4.Dataset(tmp_path / "plain.nc") as file:
         assert file["permanent_displacement"].shape == (2, 1, 2, 2)
-    for command in (
-        ["info"],
-        ["explore", "-o", "a.html"],
-        ["export", "-o", "a.csv"],
-        ["chart", "-o", "a.png", "-k", "contours"],
-        ["run", "-o", "b.nc"],
-    ):
+    commands = [["explore", "-o", "a.html"], ["export", "-o", "a.csv"], ["chart", "-o", "a.png", "-k", "contours"]]
+    # a page and a picture take half a second each
+    for command in (["info"], ["run", "-o", "b.nc"], commands[STEMS.index(stem) % 3]):
         assert main([*command, "--", name]) == 0
 
 
@@ -120,7 +116,7 @@ posix = pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="not ever
 
 
 @posix
-@settings(reproducible, max_examples=25)
+@settings(reproducible, max_examples=15)
 @given(name=odd_names.names())
 def test_any_name_is_written(sources: list[Path], name: bytes) -> None:
     odd_names.written(sources[0].parents[1], sources, name)
