@@ -152,7 +152,7 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return results.made(tmp_path_factory.mktemp("sources"))
 
 
-@settings(reproducible, max_examples=60)
+@settings(reproducible, max_examples=30)
 @given(seed=edits.seeds)
 def test_edited_results_are_read_right_or_refused_in_one_line(sources: list[Path], seed: int) -> None:
     results.edited(sources, seed)
