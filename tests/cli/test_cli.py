@@ -275,7 +275,7 @@ def test_an_interrupted_run_keeps_its_finished_chunks(tmp_path: Path, number: si
     ) as process:
         try:
             wait_until(lambda: (tmp_path / "long.nc.parts" / "journal").exists())
-            time.sleep(0.5)  # well into the run
+            time.sleep(0.2)  # well into the run
             assert process.poll() is None
             process.send_signal(number)
             output, errors = process.communicate(timeout=60)
