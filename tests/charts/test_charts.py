@@ -337,6 +337,7 @@ def test_only_what_is_shown_is_read(grid: Path, monkeypatch: pytest.MonkeyPatch,
         return values
 
     monkeypatch.setattr(Result, "read", counted)
+    monkeypatch.setattr("slipsweep.cli.chart.write_figure", lambda *arguments: None)  # all is read before
     thetas, amplitudes, frequencies = 11, 53, 25
     expected = {
         "contours": {"permanent_displacement": amplitudes * frequencies, "validity": amplitudes * frequencies},
