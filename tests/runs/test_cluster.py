@@ -24,6 +24,8 @@ from slipsweep.runs import cluster, store
 from slipsweep.runs.jobs import sweep_job
 from slipsweep.runs.parts import installation
 from tests.support import fault_rounds, namespaces
+from tests.support.commands import command
+from tests.support.processes import slipsweep as slipsweep_process
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -146,10 +148,9 @@ def test_case_tables_and_results_without_frequency(address: str, tmp_path: Path)
 def test_the_command_uses_a_scheduler_or_starts_workers(address: str, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(SWEEP)
     for name, options in {"here": (), "scheduler": ("--scheduler", address), "workers": ("--workers", "2")}.items():
-        done = subprocess.run(
-            [sys.executable, "-m", "slipsweep", "run", "a.toml", "-o", f"{name}.nc", *options],
-            cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
-        )  # fmt: skip
+        # workers of its own are processes that import what the command's process ran
+        start = slipsweep_process if name == "workers" else command
+        done = start(tmp_path, "run", "a.toml", "-o", f"{name}.nc", *options)
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.startswith("9600 cells (24 theta x 20 mu_s x 10 amplitude x 2 frequency)")
     assert_same_bits(tmp_path / "here.nc", tmp_path / "scheduler.nc")
