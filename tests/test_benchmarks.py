@@ -49,7 +49,7 @@ def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     # the outside solvers that compile take most of a minute
     monkeypatch.setitem(sys.modules, "diffrax", None)
     monkeypatch.setitem(sys.modules, "CyRK", None)
-    # before each time that is taken, which means nothing here: a quarter of a second for all that tests have made
+    # before each time that is taken, which means nothing here: 0.2 s for all that tests have made
     monkeypatch.setattr(gc, "collect", lambda: 0)
     monkeypatch.setattr(sys, "argv", [name, "--tiny", "--folder", str(tmp_path)])
     runpy.run_module(f"benchmarks.{name}", run_name="__main__")

@@ -200,7 +200,7 @@ def group_of(seed: int, size: int = 32) -> Group:
     )
 
 
-#: Groups of cells, of all options; those of twice the cells take little more time.
+#: Groups of cells, of all options; those of twice the cells take half as much time again.
 groups = st.integers(0, 2**63 - 1).map(group_of)
 large_groups = st.integers(0, 2**63 - 1).map(lambda seed: group_of(seed, 64))
 

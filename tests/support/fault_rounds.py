@@ -93,7 +93,7 @@ class Asked:
 
 
 def sweep_of(output: str) -> Asked:
-    """A sweep that is killed: a chunk of a store takes ten times as long as one of a file, and 200 will do."""
+    """A sweep that is killed: a chunk of a store takes longer than one of a file, and 200 will do."""
     return Asked(output, work=3 * SMALL if output == OUTPUTS["Zarr"] else None)
 
 
