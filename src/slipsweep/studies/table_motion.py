@@ -72,9 +72,11 @@ class TableMotion:
 
         The last one is kept, and with it its pieces: parameters are tried on one motion many times.
         """
-        if not self._last or not np.array_equal(self._last[0][0], wrong):
-            self._last[:] = [(wrong.copy(), Record(self.times, self.acceleration + self.shapes @ wrong))]
-        return self._last[0][1]
+        last = self._last[0] if self._last else None
+        if last is None or not np.array_equal(last[0], wrong):
+            last = wrong.copy(), Record(self.times, self.acceleration + self.shapes @ wrong)
+            self._last[:] = [last]
+        return last[1]
 
     def with_line(self, line: Floats, deviation: float) -> "TableMotion":
         """One more way to be wrong: a line (given at `times`), whose standard deviation is known so far."""
