@@ -81,9 +81,7 @@ class OneFile(Renamed):
         assert self.file is not None
         for name, sizes in self.results.items():
             self.file.write(name, runs_of(chunk, sizes), arrays[name])
-        digest = checksum(arrays)  # while the disk takes the last of them
-        self.file.wait()
-        return digest
+        return checksum(arrays)
 
     def finish(self, finished: Mapping[int, str]) -> None:
         """Write the checksums of the chunks (RunError: another file has been put in place of the one written)."""
@@ -92,7 +90,6 @@ class OneFile(Renamed):
             raise removed(self.data)
         rows = parts.checksum_rows(finished).ravel()
         self.file.write(CHECKSUMS, ([0], rows.size), rows)
-        self.file.wait()
         self.sync()
 
     def sync(self) -> None:

@@ -79,7 +79,6 @@ class FileWriter:
         try:
             for name, values in arrays.items():
                 file.write(name, ([0], values.size), values)
-            file.wait()
         finally:
             file.close()
         return file_checksum(path, layout, arrays)
