@@ -23,6 +23,7 @@ from slipsweep.kernels import newmark as newmark_kernels
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import (
     NEWMARK_RECORD_KERNEL,
+    NEWMARK_SINE_KERNEL,
     PARAMETER_KERNEL,
     RECORD_KERNEL,
     REMAINING_KERNEL,
@@ -394,7 +395,14 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
 
         return call, cost
     assert isinstance(motion, Waveform)
-    if _is_plain_sine(motion) and not isinstance(solver, Step):
+    plain = _is_plain_sine(motion) and not isinstance(solver, Step)
+    if plain and isinstance(problem.model, Newmark):
+
+        def call_newmark_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+            NEWMARK_SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile_of(grid))
+
+        return call_newmark_sine, 1
+    if plain:
 
         def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
             tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
@@ -530,12 +538,15 @@ def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
     """Say which kernels one of the functions above will call, whatever the grid, and which perhaps."""
     if solver is friction_parameters:
         PARAMETER_KERNEL.expect()
-    elif solver not in (solve, newmark):
+    if solver not in (solve, newmark):
         return
-    elif isinstance(problem.excitation, (Record, Suite)):
-        (NEWMARK_RECORD_KERNEL if isinstance(problem.model, Newmark) or solver is newmark else RECORD_KERNEL).expect()
+    newmarks = isinstance(problem.model, Newmark) or solver is newmark
+    if isinstance(problem.excitation, (Record, Suite)):
+        (NEWMARK_RECORD_KERNEL if newmarks else RECORD_KERNEL).expect()
     elif isinstance(problem.solver, Step):
         STEP_KERNEL.expect()
+    elif _is_plain_sine(problem.excitation) and newmarks:
+        NEWMARK_SINE_KERNEL.expect()
     elif _is_plain_sine(problem.excitation):
         SINE_KERNEL.expect()
         REMAINING_KERNEL.expect(perhaps=True)

@@ -338,6 +338,14 @@ def whole_lanes(count: int) -> int:
     return -(-count // STRIP) * STRIP
 
 
+@scalar
+def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
+    """Repeat the first lane up to the next whole number of strips."""
+    for row in range(0, rows * TILE, TILE):
+        for lane in range(used, whole_lanes(used)):
+            lanes[row + lane] = lanes[row]
+
+
 @in_lanes
 def lane_friction(lanes: np.ndarray, j: int, x: float) -> float:
     """μ(x) of a lane: Eq. 6 for λ/g, so that no g is divided by."""

@@ -17,6 +17,7 @@ from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options,
 from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
 from slipsweep.kernels.sine import cells as sine
+from slipsweep.kernels.sine import newmark as sine_newmark
 from slipsweep.kernels.step import cells as step
 from slipsweep.kernels.step import lanes as step_lanes
 from slipsweep.kernels.step.table import Steps
@@ -200,6 +201,19 @@ def _sine_grid(
     return stretches
 
 
+def _newmark_sine_grid(
+    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    results: Results, tile: Tile,
+) -> None:  # fmt: skip
+    for begin in range(first, last, TILE):
+        count = min(TILE, last - begin)
+        runs = gather(grid, begin, count, inputs, tile)
+        sine_newmark.solve_cells(tile.cells, count, options, tile.motion, tile.codes)
+        scatter(grid, tile, runs, periods, results)
+        spread_codes(grid, tile, runs, 0, results.codes[0])
+        spread_codes(grid, tile, runs, 1, results.codes[1])
+
+
 @scalar
 def place(grid: Grid, begin: int, count: int, runs: int, periods: np.ndarray, results: Results, tile: Tile) -> None:
     """Place the results of a tile of cells from `begin` on, which lie in `runs`: W, V, mode and validity."""
@@ -285,12 +299,13 @@ def _step_grid(
 
 #: Kernels of the stepping solver; of the cycle solver for any waveform; its short ways for the sine,
 #: which leave some cells: the number of their stretches is returned, and `remaining` holds them (rows: the first
-#: cell, and the first after it); and what solves those.  Most sweeps of a sine leave none, and half the first
-#: compilation is spared.
+#: cell, and the first after it); what solves those (most sweeps of a sine leave none, and half the first
+#: compilation is spared); and what solves Newmark's block under a sine, which leaves none.
 STEP_KERNEL = Kernel(_step_grid)
 WAVE_KERNEL = Kernel(_wave_grid)
 SINE_KERNEL = Kernel(_sine_grid)
 REMAINING_KERNEL = Kernel(_remaining_grid)
+NEWMARK_SINE_KERNEL = Kernel(_newmark_sine_grid)
 
 #: Of records: each pulse with its own peak, and counts of slips and pulses in place of the sliding mode; and of
 #: Newmark's block, whose first use takes 5 s of processor to compile, the other 19.

@@ -12,10 +12,10 @@ from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
     INTEGRATE,
     LANE_ROWS,
-    NEWMARK,
     STRIP,
     TILE,
     Options,
+    fill_up,
     settled_in_cycles,
     whole_lanes,
 )
@@ -36,7 +36,6 @@ from slipsweep.kernels.sine.lanes import (
     YIELD_GOVERNS,
     W,
 )
-from slipsweep.kernels.sine.newmark import solve_newmark
 from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
 from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_cells
 from slipsweep.model.equations import STUCK
@@ -109,14 +108,6 @@ def fill_lanes(blocks: np.ndarray, first: int, last: int, used: int, lanes: np.n
     return used + last - first
 
 
-@scalar
-def fill_up(used: int, rows: int, lanes: np.ndarray) -> None:
-    """Repeat the first lane up to the next whole number of strips."""
-    for row in range(0, rows * TILE, TILE):
-        for lane in range(used, whole_lanes(used)):
-            lanes[row + lane] = lanes[row]
-
-
 @in_lanes
 def store_lane(
     lanes: np.ndarray, lane: int, kind: int, options: Options, blocks: np.ndarray, moved: np.ndarray,
@@ -176,9 +167,6 @@ def solve_cells(
     """
     blocks = room.blocks
     fill_up(count, 7, cells)
-    if options.rise == NEWMARK:
-        solve_newmark(cells, count, options, motion, codes)
-        return 0
     sort_cells(cells, whole_lanes(count), options, blocks)
     for j in range(count):
         codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])

@@ -9,7 +9,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import elementary, scalar
 from slipsweep.jit.elementary import rising_phase
-from slipsweep.kernels.block import NEWMARK, Options, cell_of, interface_of, whole_lanes
+from slipsweep.kernels.block import NEWMARK, Options, cell_of, fill_up, interface_of, whole_lanes
 from slipsweep.kernels.sine.roots import held_motion
 from slipsweep.model.equations import STUCK
 
@@ -52,8 +52,9 @@ def newmark_slide(yield_acceleration: float, amplitude: float) -> float:
 
 
 @scalar
-def solve_newmark(cells: np.ndarray, count: int, options: Options, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Solve `count` cells of a tile, filled up to whole strips, into W, V and mode, validity."""
+def solve_cells(cells: np.ndarray, count: int, options: Options, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
+    fill_up(count, 7, cells)
     moved, peak, modes, validity = motion[0], motion[1], codes[0], codes[1]
     for j in range(whole_lanes(count)):
         cell = cell_of(cells, j)
