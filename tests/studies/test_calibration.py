@@ -1,5 +1,6 @@
 """Calibration of tests made by `simulate`: the parameters that went in, and what befalls real sensors."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ PARAMETERS = {name: {key: CALIBRATED[name][key] for key in ("theta", "mu_s")} fo
 @pytest.fixture(scope="module")
 def clean() -> dict[str, xr.Dataset]:
     return {name: exact(case, tail=0.5 if name == "stick_slip" else 0.0) for name, case in CALIBRATED.items()}
+
+
+def every_second(test: xr.Dataset) -> xr.Dataset:
+    """A test at 100 samples a second: a calibration that looks for sensors at fault takes half of the time."""
+    return test.isel(time=slice(None, None, 2))
 
 
 def calibrated(test: Any, mode: str = "stick_slip", **options: Any) -> xr.Dataset:
@@ -72,7 +78,7 @@ def test_displacement_alone_does_not_tell_decay_from_excess(clean: dict[str, xr.
 
 
 def test_a_drifting_sensor(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"], seed=4)
+    test = measured(every_second(clean["stick_slip"]), seed=4)
     test.relative_displacement.values[:] += 0.01 + 0.03 * test.time.values
     test.block_acceleration.values[:] += 0.3
     # of two sensors at fault the larger fault is told first
@@ -83,8 +89,13 @@ def test_a_drifting_sensor(clean: dict[str, xr.Dataset]) -> None:
     assert "drift = 'relative_displacement'" in without_offset.attrs["findings"]
     asked = calibrated(test, drift="relative_displacement", offset="block_acceleration")
     check_intervals(asked, "stick_slip")
-    assert "drift of relative_displacement: 0.1" in asked.attrs["removed"]
-    assert "offset of block_acceleration: 0.3" in asked.attrs["removed"]
+    for name, true in (
+        ("drift of relative_displacement", 0.03 * float(np.ptp(test.time.values))),
+        ("offset of block_acceleration", 0.3),
+    ):
+        (told,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
+        value, error = map(float, told)
+        assert abs(value - true) < min(3.5 * error, 0.1 * true), name
 
 
 def test_an_offset_of_the_table(clean: dict[str, xr.Dataset]) -> None:
@@ -222,7 +233,7 @@ def test_the_search_does_not_go_where_a_sample_beside_a_jump_says(clean: dict[st
 
 def test_a_drift_that_explains_the_misfit_is_named(clean: dict[str, xr.Dataset]) -> None:
     """A drift of a quarter of the displacement, not asked for, moves all parameters: the fit must not look sound."""
-    test = measured(clean["stick_slip"], seed=13)
+    test = measured(every_second(clean["stick_slip"]), seed=13)
     displacement = test.relative_displacement.values
     displacement += 0.25 * np.abs(displacement).max() * np.linspace(0.0, 1.0, displacement.size)
     found = calibrated(test)
@@ -238,7 +249,7 @@ def test_a_drift_that_explains_the_misfit_is_named(clean: dict[str, xr.Dataset])
 
 
 def test_a_record_that_begins_in_motion_is_named(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"], seed=15)
+    test = measured(every_second(clean["stick_slip"]), seed=15)
     middle = int(np.argmax(test.time.values > 1.12))
     late = calibrated(test.isel(time=slice(middle, None)))
     assert late.attrs["findings"].startswith("The table moves as the record begins, at ")
