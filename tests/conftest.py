@@ -44,3 +44,13 @@ def tried_here() -> Iterator[None]:
         patch.setattr(guard, "_next_step", lambda: None)
         patch.setattr(guard, "_forked", tried)
         yield
+
+
+@pytest.fixture
+def without_layout() -> Iterator[None]:
+    """Draw charts once, not first to find room for their labels: half of the time; tests/charts has those with room."""
+    from matplotlib.figure import Figure  # here: the settings above come first
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "get_layout_engine", lambda figure: None)
+        yield

@@ -135,6 +135,7 @@ def printed_by(text: str, where: str, folder: Path) -> str:
     return output.getvalue()
 
 
+@pytest.mark.usefixtures("without_layout")
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
     """The blocks of a document, in order, in one folder that holds what a clone holds."""

@@ -396,6 +396,7 @@ def test_long_axes_are_thinned(result: Result, monkeypatch: pytest.MonkeyPatch) 
 # ----------------------------------------------------------------------- the command line
 
 
+@pytest.mark.usefixtures("without_layout")
 def test_default_set_of_charts(grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["chart", str(grid)]) == 0
@@ -409,6 +410,7 @@ def test_default_set_of_charts(grid: Path, tmp_path: Path, monkeypatch: pytest.M
     assert main(["chart", str(grid), "--kind", "modes", "--overwrite"]) == 0
 
 
+@pytest.mark.usefixtures("without_layout")
 def test_formats(grid: Path, tmp_path: Path) -> None:
     cuts = ("--at", "theta=12", "--at", "mu_s=0.5")
     outputs = [f"-oa.{suffix}" for suffix in ("png", "svg", "pdf")]
@@ -915,6 +917,7 @@ def test_the_dataset_draws_what_the_file_does(lined: Path) -> None:
         solved.slipsweep.chart("mode")
 
 
+@pytest.mark.usefixtures("without_layout")
 def test_all_of_a_file_is_a_pdf_with_a_title_page(
     lined: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from slipsweep.charts import kinds
 from slipsweep.charts.slices import Result
 from tests.support.commands import command
@@ -21,6 +23,7 @@ values = [1, 2]
 """
 
 
+@pytest.mark.usefixtures("without_layout")
 def test_a_report_has_a_title_page_and_a_chart_a_page(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(SWEEP)
     assert command(tmp_path, "run", "a.toml").returncode == 0
