@@ -28,7 +28,7 @@ from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import Job, limit_job, sweep_job
 from slipsweep.runs.stored import stored_table
 from tests.support.commands import command as run
-from tests.support.processes import TIMEOUT, two_workers
+from tests.support.processes import TIMEOUT, workers
 
 AXES = """
 [axes.amplitude]
@@ -433,8 +433,8 @@ sys.exit(main(sys.argv[2:]))
 
 @pytest.fixture(scope="module")
 def others() -> Iterator[str]:
-    """Two workers that all commands share."""
-    with two_workers() as address:
+    """A worker that all commands share; tests/runs/test_cluster.py has several at a time."""
+    with workers(1) as address:
         yield address
 
 

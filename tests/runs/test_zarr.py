@@ -21,7 +21,7 @@ from slipsweep.runs.jobs import sweep_job
 from slipsweep.runs.verify import verify
 from tests.support import fault_rounds
 from tests.support.fault_rounds import SWEEP, Stop, counting, run, stopping
-from tests.support.processes import two_workers
+from tests.support.processes import workers
 
 zarr = pytest.importorskip("zarr")
 pytestmark = [
@@ -238,6 +238,7 @@ def test_compressed_results_are_smaller_and_the_same(results: Path, tmp_path: Pa
         run(tmp_path / "a.nc", text)
 
 
+@pytest.mark.usefixtures("without_layout")
 def test_commands_read_a_store_as_a_file(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What they print and write is the same, but for names, sizes and when it was made."""
     for name in ("grid", "cases"):
@@ -283,7 +284,7 @@ def test_workers_write_their_chunks_themselves(results: Path, tmp_path: Path, mo
 
     monkeypatch.setattr(cluster._Run, "_result", counted)
     nbytes = (results / "grid.nc").stat().st_size
-    with two_workers() as address:
+    with workers(2) as address:
         for name, split in (("a.zarr", False), ("a", True)):
             came.clear()
             with cluster.cluster(scheduler=address) as solved:

@@ -57,10 +57,10 @@ def on_a_terminal(folder: Path, *arguments: str, environment: Mapping[str, str] 
 
 
 @contextmanager
-def two_workers() -> Iterator[str]:
-    """Two workers as processes, which take seconds to start: the address of their scheduler."""
+def workers(count: int) -> Iterator[str]:
+    """Workers as processes, each of which takes 3 s to start: the address of their scheduler."""
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0
+        n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0
     ) as cluster:
         yield cluster.scheduler_address
