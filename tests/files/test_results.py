@@ -186,7 +186,7 @@ def contents(sources: list[Path]) -> list[bytes]:
     return results.contents(sources)
 
 
-@settings(reproducible, max_examples=100)
+@settings(reproducible, max_examples=50)
 @given(seed=edits.seeds)
 def test_damaged_results_are_read_or_refused_in_one_line(sources: list[Path], contents: list[bytes], seed: int) -> None:
     results.damaged(sources[0].parent, contents, seed)

@@ -6,7 +6,7 @@ from tests.support import odd_arguments
 
 
 @settings(
-    max_examples=1500, deadline=None, derandomize=True, database=None, phases=[Phase.generate],
+    max_examples=750, deadline=None, derandomize=True, database=None, phases=[Phase.generate],
     suppress_health_check=list(HealthCheck),
 )  # fmt: skip
 @given(odd_arguments.calls())
