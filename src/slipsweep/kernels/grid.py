@@ -173,6 +173,14 @@ def spread_codes(grid: Grid, tile: Tile, count: int, row: int, target: np.ndarra
 
 
 @scalar
+def spread(grid: Grid, tile: Tile, count: int, periods: np.ndarray, results: Results) -> None:
+    """Spread W, V, mode and validity of `count` runs."""
+    scatter(grid, tile, count, periods, results)
+    spread_codes(grid, tile, count, 0, results.codes[0])
+    spread_codes(grid, tile, count, 1, results.codes[1])
+
+
+@scalar
 def note_unsolved(begin: int, count: int, validity: np.ndarray, results: Results) -> None:
     """Note a cell in which an event was not found (`events`), if there is one."""
     for j in range(count):
@@ -189,9 +197,7 @@ def _sine_grid(
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
         count_remaining = sine.solve_cells(tile.cells, count, options, room, tile.motion, tile.codes)
-        scatter(grid, tile, runs, periods, results)
-        spread_codes(grid, tile, runs, 0, results.codes[0])
-        spread_codes(grid, tile, runs, 1, results.codes[1])
+        spread(grid, tile, runs, periods, results)
         for j in range(count if count_remaining > 0 else 0):
             if room.remaining[j] and stretches > 0 and remaining[stretches - 1, 1] == begin + j:
                 remaining[stretches - 1, 1] += 1
@@ -209,18 +215,14 @@ def _newmark_sine_grid(
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
         sine_newmark.solve_cells(tile.cells, count, options, tile.motion, tile.codes)
-        scatter(grid, tile, runs, periods, results)
-        spread_codes(grid, tile, runs, 0, results.codes[0])
-        spread_codes(grid, tile, runs, 1, results.codes[1])
+        spread(grid, tile, runs, periods, results)
 
 
 @scalar
 def place(grid: Grid, begin: int, count: int, runs: int, periods: np.ndarray, results: Results, tile: Tile) -> None:
     """Place the results of a tile of cells from `begin` on, which lie in `runs`: W, V, mode and validity."""
     note_unsolved(begin, count, tile.codes[1], results)
-    scatter(grid, tile, runs, periods, results)
-    spread_codes(grid, tile, runs, 0, results.codes[0])
-    spread_codes(grid, tile, runs, 1, results.codes[1])
+    spread(grid, tile, runs, periods, results)
 
 
 def _remaining_grid(
