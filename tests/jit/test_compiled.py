@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from slipsweep.jit import cache as compiled
-from slipsweep.jit import compiling, folders
+from slipsweep.jit import compiling, elsewhere, folders
+from slipsweep.jit.handed import call
 
 #: A small kernel, so that compiling it takes a second; says what it gives and whether it was compiled here.
 PROGRAM = """
@@ -102,7 +103,7 @@ def test_sweeps_at_once_on_an_empty_cache(tmp_path: Path) -> None:
     outputs = {finish(process) for process in [start(SWEEP, tmp_path / "cache") for _ in range(2)]}
     assert len(outputs) == 1
     kernels = files(tmp_path / "cache")
-    assert len(kernels) == 1
+    assert len(kernels) == 2
     written = [path.stat().st_mtime_ns for path in kernels]
     assert {finish(start(SWEEP, tmp_path / "cache"))} == outputs
     assert [path.stat().st_mtime_ns for path in files(tmp_path / "cache")] == written
@@ -117,6 +118,61 @@ def test_a_process_that_dies_while_it_compiles_holds_up_nobody(tmp_path: Path) -
     first.kill()
     first.communicate()
     assert finish(start(PROGRAM, tmp_path / "cache"))
+
+
+# ------------------------------------------------------- functions that kernels are handed
+
+
+def half_of(value: int) -> int:
+    return value // 2
+
+
+def third_of(value: int) -> int:
+    return value // 3
+
+
+def added_up(values: np.ndarray, part: int) -> int:
+    total = 0
+    for i in range(values.size):
+        total += call(part, values[i])
+    return total
+
+
+def of_values(values: np.ndarray) -> tuple[int]:
+    return (int(values[0]),)
+
+
+@pytest.fixture
+def compiled_here(cache: Path) -> Iterator[Callable[[], set[str]]]:
+    """Gives the functions that this process has compiled so far."""
+    with events.install_recorder("numba:compile") as recorder:
+        yield lambda: {event.data["dispatcher"].__name__ for _, event in recorder.buffer if event.is_start}
+
+
+@pytest.mark.parametrize("cores", [1, 2])
+def test_a_kernel_is_compiled_elsewhere_beside_what_it_is_handed(
+    cores: int, cache: Path, compiled_here: Callable[[], set[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(elsewhere, "cores", lambda: cores)
+    kernel = compiled.Kernel(added_up)
+    assert compiled.Handed(kernel, half_of, of_values)(np.array([7, 4, 2])) == 6
+    assert ("added_up" in compiled_here()) == (cores == 1)
+    assert [path.name.partition("-")[0] for path in files(cache)] == ["added_up", "half_of"]
+    assert compiled.Handed(kernel, third_of, of_values)(np.array([7, 4, 2])) == 3
+    assert [path.name.partition("-")[0] for path in files(cache)] == ["added_up", "half_of", "third_of"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a script for a program")
+def test_where_the_other_process_fails_the_kernel_is_compiled_here(
+    cache: Path, compiled_here: Callable[[], set[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    other = tmp_path / "python"
+    other.write_text("#!/bin/sh\nexit 1\n")
+    other.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(other))
+    monkeypatch.setattr(elsewhere, "cores", lambda: 2)
+    assert compiled.Handed(compiled.Kernel(added_up), half_of, of_values)(np.array([7, 4, 2])) == 6
+    assert "added_up" in compiled_here()
 
 
 # ----------------------------------------------------------------- caches that are no good

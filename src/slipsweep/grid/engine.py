@@ -395,18 +395,12 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
 
         return call, cost
     assert isinstance(motion, Waveform)
-    plain = _is_plain_sine(motion) and not isinstance(solver, Step)
-    if plain and isinstance(problem.model, Newmark):
-
-        def call_newmark_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            NEWMARK_SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile_of(grid))
-
-        return call_newmark_sine, 1
-    if plain:
+    if _is_plain_sine(motion) and not isinstance(solver, Step):
+        kernel = NEWMARK_SINE_KERNEL if isinstance(problem.model, Newmark) else SINE_KERNEL
 
         def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
             tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
-            count = SINE_KERNEL(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
+            count = kernel(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
             if count:
                 # only here: to cut a sine into pieces takes 0.1 s, a seventh of a small run
                 stretches, wave = remaining[:count], wave_of(motion)

@@ -13,12 +13,11 @@ One policy, here and nowhere else:
   exit.  Ctrl-C is heard between two calls of a kernel, a fraction of a second apart.
 """
 
-import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-import numba
+from slipsweep.jit import elsewhere
 
 #: Cells of the cycle solver that one call of a kernel takes: long enough to hide the call
 #: (some 20 µs), short enough that Ctrl-C is heard.
@@ -30,19 +29,7 @@ def thread_count() -> int:
     """Number of threads a call from here may use."""
     if threading.current_thread() is not threading.main_thread():
         return 1
-    # the setting, not numba.get_num_threads(): that call starts a threading layer
-    limits = [numba.config.NUMBA_NUM_THREADS, _affinity()]
-    # a list has a number for each level of nesting; ours is the first
-    asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
-    if asked.isdigit() and int(asked) > 0:
-        limits.append(int(asked))
-    return int(min(limits))
-
-
-def _affinity() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return elsewhere.cores()
 
 
 def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1) -> None:

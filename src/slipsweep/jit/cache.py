@@ -6,6 +6,8 @@
 * The first process to need a kernel compiles it under a lock, the others wait and load.
   Where there is no lock to be had (some network folders) each compiles for itself.
 * Where no folder can be written, kernels are compiled in memory.
+* What solves the cells of a tile may be compiled apart from the kernel that brings them (`Handed`): the two at the
+  same time in two processes, where there are two processors.
 
 `slipsweep.jit.form` says how they are compiled.  `NUMBA_CACHE_DIR` moves the folder, as it does for numba;
 `NUMBA_DISABLE_JIT` is honoured.
@@ -16,13 +18,13 @@ import functools
 import os
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numba
 
-from slipsweep.jit import compiling, folders, form, plain, sources
+from slipsweep.jit import compiling, elsewhere, folders, form, plain, sources
 from slipsweep.jit.garbage import no_collections
 
 #: Versions whose kernels are kept.
@@ -78,26 +80,98 @@ class Kernel:
         """Say that the kernel will be called, or `perhaps`: if it is not kept, it counts among those to be compiled."""
         if self._dispatcher is None and not self._expected and not numba.config.DISABLE_JIT:
             self._expected = True  # a small sweep takes no longer than to look for it on disk
-            folder = cache_folder()
-            if folder is None or not folders.has(folder, self._function):
+            if not _is_kept(self._function):
                 compiling.expect(self, perhaps)
 
     def _ready(self, args: tuple[Any, ...]) -> Callable[..., Any]:
         if numba.config.DISABLE_JIT:
             return self._function
-        signature = tuple(numba.typeof(arg) for arg in args)
         folder = cache_folder()
-        with warnings.catch_warnings(), no_collections():
-            # numba's advice is for us, not for those who run a sweep
-            warnings.simplefilter("ignore", numba.NumbaWarning)
-            try:
-                jitted: Any = form.compiled(self._function, signature, folder, compiling.compiling(self))
-            except Exception as error:
-                if form.compiled is not plain.compiled:
-                    error.add_note("SLIPSWEEP_PLAIN_NUMBA=1 in the environment compiles by what numba documents alone")
-                raise
+        jitted = make(form.compiled, self._function, _types(args), folder, compiling.compiling(self))
         # a call with other types is a bug here, and would compile unseen
         jitted.disable_compile()
         if folder is not None:
             folders.keep_latest(_KEPT_FOLDERS, f"slipsweep-{'[0-9a-f]' * 16}", folder)
         return jitted
+
+    @contextlib.contextmanager
+    def compiled_elsewhere(self, *args: Any) -> Iterator[None]:
+        """Have another process compile it for such arguments while the block runs, unless it is there or kept."""
+        if self._dispatcher is not None or cache_folder() is None or _is_kept(self._function):
+            yield
+            return
+        with elsewhere.begun(make, form.compiled, self._function, _types(args), cache_folder()) as wait:
+            yield
+            with compiling.compiling(self):
+                wait()
+
+
+class Handed:
+    """A kernel that is handed the address of a function, which `slipsweep.jit.handed` calls.
+
+    Neither waits for the other: where there are two processors, another process compiles the kernel meanwhile.  And
+    several functions share a kernel.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        What the function is handed to, as its last argument.
+    function : callable
+        Python function to compile, of a name that no other has; returns an integer.
+    arguments : callable
+        Gives, of the kernel's arguments, some of the types of the function's.
+    """
+
+    def __init__(self, kernel: Kernel, function: Callable[..., int], arguments: Callable[..., tuple[Any, ...]]) -> None:
+        self._kernel, self._function, self._arguments = kernel, function, arguments
+        self._compiled: Any = None
+        self._expected = False
+
+    def __call__(self, *args: Any) -> Any:
+        """As `Kernel`."""
+        if self._compiled is None:
+            with _first_use:
+                if self._compiled is None:
+                    self._compiled = self._ready(args)
+        return self._kernel(*args, self._compiled.address)
+
+    def expect(self, perhaps: bool = False) -> None:
+        """As `Kernel.expect`."""
+        if self._compiled is None and not self._expected:
+            self._expected = True
+            self._kernel.expect(perhaps)
+            if not _is_kept(self._function):
+                compiling.expect(self, perhaps)
+
+    def _ready(self, args: tuple[Any, ...]) -> Any:
+        signature = numba.types.int64(*_types(self._arguments(*args)))
+        with self._kernel.compiled_elsewhere(*args, 0):
+            return make(form.compiled_apart, self._function, signature, cache_folder(), compiling.compiling(self))
+
+
+def _types(args: tuple[Any, ...]) -> tuple[Any, ...]:
+    return tuple(numba.typeof(arg) for arg in args)
+
+
+def _is_kept(function: Callable[..., Any]) -> bool:
+    folder = cache_folder()
+    return folder is not None and folders.has(folder, function)
+
+
+def make(
+    how: Callable[..., Any],
+    function: Callable[..., Any],
+    signature: Any,
+    folder: Path | None,
+    compiling: contextlib.AbstractContextManager[None] | None = None,
+) -> Any:
+    """Compile a function for these types, or load it, in one of the ways of `slipsweep.jit.form`."""
+    with warnings.catch_warnings(), no_collections():
+        # numba's advice is for us, not for those who run a sweep
+        warnings.simplefilter("ignore", numba.NumbaWarning)
+        try:
+            return how(function, signature, folder, compiling or contextlib.nullcontext())
+        except Exception as error:
+            if form.compiled is not plain.compiled:
+                error.add_note("SLIPSWEEP_PLAIN_NUMBA=1 in the environment compiles by what numba documents alone")
+            raise

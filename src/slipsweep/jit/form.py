@@ -14,7 +14,7 @@ import numba
 from slipsweep.jit import plain
 
 
-def _chosen() -> tuple[Any, Any]:
+def _chosen() -> tuple[Any, Any, Any]:
     if os.environ.get("SLIPSWEEP_PLAIN_NUMBA", "0") in ("", "0"):
         try:
             from slipsweep.jit.inner import kernels, parts
@@ -24,8 +24,8 @@ def _chosen() -> tuple[Any, Any]:
                 stacklevel=1,
             )
         else:
-            return parts.part, kernels.compiled
-    return plain.part, plain.compiled
+            return parts.part, kernels.compiled, kernels.compiled_apart
+    return plain.part, plain.compiled, plain.compiled_apart
 
 
 #: Decorates a function that kernels are made of, with options of `numba.njit`.
@@ -33,4 +33,6 @@ part: Any
 #: Compiles a kernel, or loads it: from its function, the types of its arguments, the folder it is kept in, and what
 #: to be within while it compiles.
 compiled: Any
-part, compiled = _chosen()
+#: The same for a function that is handed to a kernel: from its signature, void.
+compiled_apart: Any
+part, compiled, compiled_apart = _chosen()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import njit
+from numba import cfunc, njit
 
 from slipsweep.jit import folders
 
@@ -27,19 +27,36 @@ def compiled(
     compiling: AbstractContextManager[None],
 ) -> Any:
     """A kernel compiled for a signature, or loaded from numba's own cache in a folder."""
-    options = {"nogil": True, "error_model": "numpy"}
-    jitted = None
+
+    def make(**kept: bool) -> Any:
+        jitted = njit(nogil=True, error_model="numpy", **kept)(function)
+        jitted.compile(signature)
+        return jitted
+
+    return _made(make, function, folder, compiling)
+
+
+def compiled_apart(
+    function: Callable[..., Any], signature: Any, folder: Path | None, compiling: AbstractContextManager[None]
+) -> Any:
+    """The same for a function that is handed to a kernel."""
+
+    def make(**kept: bool) -> Any:
+        return cfunc(signature, error_model="numpy", **kept)(function)
+
+    return _made(make, function, folder, compiling)
+
+
+def _made(
+    make: Callable[..., Any], function: Callable[..., Any], folder: Path | None, compiling: AbstractContextManager[None]
+) -> Any:
     with compiling if folder is None or not folders.has(folder, function) else nullcontext():
         if folder is not None:
             # no source file, a damaged cache, a full disk: whatever is wrong with the cache, a kernel can do without.
             # Only one process at a time, for numba's own cache stands no more
             with suppress(Exception), folders.alone(folder / function.__name__), _cache_in(folder):
-                jitted = njit(cache=True, **options)(function)
-                jitted.compile(signature)
-        if jitted is None or not jitted.signatures:
-            jitted = njit(**options)(function)
-            jitted.compile(signature)
-    return jitted
+                return make(cache=True)
+        return make()
 
 
 @contextmanager

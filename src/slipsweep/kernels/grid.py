@@ -6,12 +6,13 @@ are flat arrays with a stride for each dimension of the cells (0 where an input 
 vary), so that an axis is never copied out over the grid.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.cache import Kernel
+from slipsweep.jit.cache import Handed, Kernel
 from slipsweep.jit.decorators import scalar
+from slipsweep.jit.handed import call
 from slipsweep.kernels import newmark, record
 from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options, cell_of, decay_rate_of, interface_of
 from slipsweep.kernels.cycle import cells as cycle
@@ -190,13 +191,14 @@ def note_unsolved(begin: int, count: int, validity: np.ndarray, results: Results
 
 def _sine_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    results: Results, tile: Tile, room: sine.Room, remaining: np.ndarray,
+    results: Results, tile: Tile, room: sine.Room, remaining: np.ndarray, solve: int,
 ) -> int:  # fmt: skip
+    # `solve` is the address of a `sine.Solver`
     stretches = 0
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)
-        count_remaining = sine.solve_cells(tile.cells, count, options, room, tile.motion, tile.codes)
+        count_remaining = call(solve, tile.cells, count, options, room, tile.motion, tile.codes)
         spread(grid, tile, runs, periods, results)
         for j in range(count if count_remaining > 0 else 0):
             if room.remaining[j] and stretches > 0 and remaining[stretches - 1, 1] == begin + j:
@@ -205,17 +207,6 @@ def _sine_grid(
                 remaining[stretches, 0], remaining[stretches, 1] = begin + j, begin + j + 1
                 stretches += 1
     return stretches
-
-
-def _newmark_sine_grid(
-    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
-    results: Results, tile: Tile,
-) -> None:  # fmt: skip
-    for begin in range(first, last, TILE):
-        count = min(TILE, last - begin)
-        runs = gather(grid, begin, count, inputs, tile)
-        sine_newmark.solve_cells(tile.cells, count, options, tile.motion, tile.codes)
-        spread(grid, tile, runs, periods, results)
 
 
 @scalar
@@ -299,15 +290,22 @@ def _step_grid(
         place(grid, begin, count, runs, periods, results, tile)
 
 
+def _given_to_tiles(grid: Grid, first: int, *others: Any) -> tuple[Any, ...]:
+    """Of the arguments of `_sine_grid`, those of a `sine.Solver`; a number stands for another."""
+    _, _, _, options, _, tile, room, _ = others
+    return tile.cells, first, options, room, tile.motion, tile.codes
+
+
 #: Kernels of the stepping solver; of the cycle solver for any waveform; its short ways for the sine,
 #: which leave some cells: the number of their stretches is returned, and `remaining` holds them (rows: the first
 #: cell, and the first after it); what solves those (most sweeps of a sine leave none, and half the first
 #: compilation is spared); and what solves Newmark's block under a sine, which leaves none.
 STEP_KERNEL = Kernel(_step_grid)
 WAVE_KERNEL = Kernel(_wave_grid)
-SINE_KERNEL = Kernel(_sine_grid)
+_OVER_TILES = Kernel(_sine_grid)
+SINE_KERNEL = Handed(_OVER_TILES, sine.solve_under_sine, _given_to_tiles)
 REMAINING_KERNEL = Kernel(_remaining_grid)
-NEWMARK_SINE_KERNEL = Kernel(_newmark_sine_grid)
+NEWMARK_SINE_KERNEL = Handed(_OVER_TILES, sine_newmark.solve_newmark_under_sine, _given_to_tiles)
 
 #: Of records: each pulse with its own peak, and counts of slips and pulses in place of the sliding mode; and of
 #: Newmark's block, whose first use takes 5 s of processor to compile, the other 19.

@@ -18,8 +18,9 @@ from typing import Any
 import llvmlite
 import numba
 from numba.core.caching import NullCache
+from numba.core.ccallback import CFunc
 from numba.core.compiler import CompileResult
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
@@ -33,7 +34,9 @@ need(
     CompileResult,
     _rebuild="target_context libdata fndesc env signature objectmode lifted typeann reload_init referenced_envs",
 )
-need(CPUDispatcher, _cache=None, targetctx=None)
+need(CPUDispatcher, _cache=None)
+need(CFunc, __init__="self pyfunc sig locals options pipeline_class", compile="self", address=None, _cache=None)
+need(type(cpu_target), target_context=None)
 need(type(rtsys), initialize="self ctx")
 
 
@@ -67,7 +70,7 @@ class Disk(NullCache):
                 folders.write(self.path, hashlib.sha256(data).digest() + data)
 
 
-def digest_of(function: Callable[..., Any], jitted: Any, signature: tuple[Any, ...]) -> str:
+def digest_of(function: Callable[..., Any], signature: Any) -> str:
     """Digest of all that the machine code of a kernel depends on, but for the sources (the folder's name)."""
     cells = function.__closure__ or ()
     parts = (
@@ -75,7 +78,7 @@ def digest_of(function: Callable[..., Any], jitted: Any, signature: tuple[Any, .
         function.__qualname__,
         dumps(tuple(cell.cell_contents for cell in cells)),  # the kernels of a factory differ in nothing else
         str(signature),
-        jitted.targetctx.codegen().magic_tuple(),  # processor
+        cpu_target.target_context.codegen().magic_tuple(),  # processor
         (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__),
         (int(numba.config.OPT), bool(numba.config.BOUNDSCHECK), bool(numba.config.DEBUGINFO_DEFAULT)),
     )

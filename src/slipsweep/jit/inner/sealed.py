@@ -11,8 +11,10 @@ from typing import Any
 
 import llvmlite.binding
 from numba import njit
+from numba.core.ccallback import CFunc
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, JitEngine
 from numba.core.compiler import Compiler
+from numba.core.registry import cpu_target
 
 from slipsweep.jit.inner.asked_once import asked_once
 from slipsweep.jit.inner.need import need
@@ -76,6 +78,12 @@ def _hear_signals_later(engine: Any) -> None:
 
 def sealed(function: Callable[..., Any]) -> Any:
     """A function as a kernel, to be compiled; runs without the GIL."""
-    jitted = njit(nogil=True, error_model="numpy", pipeline_class=_Compiler)(function)
-    _hear_signals_later(jitted.targetctx.codegen()._engine)
-    return jitted
+    _hear_signals_later(cpu_target.target_context.codegen()._engine)
+    return njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, pipeline_class=_Compiler)(function)
+
+
+def sealed_apart(function: Callable[..., Any], signature: Any) -> Any:
+    """A function that is handed to a kernel, to be compiled."""
+    _hear_signals_later(cpu_target.target_context.codegen()._engine)
+    types = (signature.args, signature.return_type)
+    return CFunc(function, types, {}, {"error_model": "numpy"}, pipeline_class=_Compiler)

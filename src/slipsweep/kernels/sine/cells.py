@@ -4,6 +4,7 @@
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,9 @@ from slipsweep.kernels.sine.lanes import (
 from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
 from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_cells
 from slipsweep.model.equations import STUCK
+
+#: What is to be done for a tile.
+Solver = Callable[[np.ndarray, int, Options, "Room", np.ndarray, np.ndarray], int]
 
 
 class Room(NamedTuple):
@@ -157,8 +161,7 @@ def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.n
             store_lane(lanes, lane, kind, options, blocks, moved, peak, validity, where[lane])
 
 
-@scalar
-def solve_cells(
+def solve_under_sine(
     cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
 ) -> int:
     """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.

@@ -7,9 +7,10 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import elementary, scalar
+from slipsweep.jit.decorators import elementary
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import NEWMARK, Options, cell_of, fill_up, interface_of, whole_lanes
+from slipsweep.kernels.sine.cells import Room
 from slipsweep.kernels.sine.roots import held_motion
 from slipsweep.model.equations import STUCK
 
@@ -51,9 +52,10 @@ def newmark_slide(yield_acceleration: float, amplitude: float) -> float:
     return p * (excess / amplitude) * excess
 
 
-@scalar
-def solve_cells(cells: np.ndarray, count: int, options: Options, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity."""
+def solve_newmark_under_sine(
+    cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
+) -> int:
+    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity; none remains."""
     fill_up(count, 7, cells)
     moved, peak, modes, validity = motion[0], motion[1], codes[0], codes[1]
     for j in range(whole_lanes(count)):
@@ -69,3 +71,4 @@ def solve_cells(cells: np.ndarray, count: int, options: Options, motion: np.ndar
         half = held_motion(cell.amplitude, onset, rising_phase(onset, cell.amplitude), 0.0)[0]
         at_rest = 0.0 if mode == STUCK else math.nan
         peak[j] = 2.0 * half if mode > STUCK else at_rest
+    return 0

@@ -111,16 +111,11 @@ def runs_of(blocks: np.ndarray, count: int, runs: np.ndarray) -> int:
     Along an axis of a sweep neighbours are mostly of one kind: cells are laid out and collected
     run by run.
     """
-    runs[0], found = 0, 1
-    for first in range(1, count, STRIP):
-        size = min(STRIP, count - first)
-        before, after = blocks[KIND + first - 1 :], blocks[KIND + first :]
-        changes = 0
-        for j in range(size):
-            changes += 1 if after[j] != before[j] else 0
-        for j in range(size if changes > 0 else 0):
-            if after[j] != before[j]:
-                runs[found] = first + j
-                found += 1
+    runs[0], found, kind = 0, 1, blocks[KIND]
+    for j in range(1, count):
+        if blocks[KIND + j] != kind:
+            kind = blocks[KIND + j]
+            runs[found] = j
+            found += 1
     runs[found] = count
     return found
