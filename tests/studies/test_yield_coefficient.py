@@ -80,6 +80,17 @@ def test_what_makes_no_sense_beside_it_is_refused(given: dict[str, Any], message
         sweep(**block | given)
 
 
+def test_a_yield_acceleration_drawn_beside_it_is_refused() -> None:
+    """A factor on an estimate that nobody uses: all samples came out the same."""
+    block: dict[str, Any] = {"amplitude": 3.0, "frequency": 1.0, "model": "newmark", "samples": 64}
+    factor = {"yield_acceleration": {"distribution": "lognorm", "s": 0.1, "kind": "factor"}}
+    message = "yield_acceleration: not allowed beside yield_coefficient"
+    with pytest.raises(InputError, match=message):
+        sample(**block, yield_coefficient=KY, uncertain=factor)
+    with pytest.raises(InputError, match=message):
+        sample(**block, uncertain={**factor, "yield_coefficient": stats.uniform(0.1, 0.1)})
+
+
 def test_sweep_files_and_the_command_line_take_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, out = tmp_path / "ky.toml", tmp_path / "ky.nc"
     file.write_text(

@@ -143,7 +143,7 @@ class Sampling:
         return matrix
 
     def check_given(self, given: Sequence[str]) -> None:
-        """Refuse parameters both given and drawn, and factors on nothing.
+        """Refuse parameters both given and drawn, those that others replace, and factors on nothing.
 
         Raises
         ------
@@ -158,6 +158,10 @@ class Sampling:
             estimated = name in ESTIMATED and (one.kind == "factor" or name == "yield_acceleration")
             if one.kind != "absolute" and name not in given and not estimated:
                 raise InputError(f'{self.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
+        if "yield_acceleration" in self.distributions and "yield_coefficient" in {*given, *self.distributions}:
+            raise InputError(
+                f"{self.key('yield_acceleration')}: not allowed beside yield_coefficient, which replaces it"
+            )
 
     @property
     def attributes(self) -> dict[str, Any]:
