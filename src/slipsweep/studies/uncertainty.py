@@ -397,6 +397,9 @@ class SamplePlan:
         """A parameter drawn about its estimate; NaN, which leaves it to the estimate and its flag, where that fails."""
         name = one.parameter
         assert name in FRICTION_PARAMETERS
+        if name == "yield_acceleration":
+            # Coulomb's does not depend on the shaking, whose axes would add a fifth to the time of a fragility curve
+            arrays = {given: arrays[given] for given in ("theta", "mu_s")}
         dims = np.broadcast_shapes(*(values.shape for values in arrays.values()))
         full = tuple(max(a, b) for a, b in zip(dims, (1,) * len(shape), strict=True))
         estimate = engine.estimates(Request(self.problem, full, arrays, (name,)))[name]
