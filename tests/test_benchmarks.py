@@ -21,6 +21,7 @@ WRITES = {
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
     "waveforms": ["waveforms.md"],
     "variables": ["variables.md"],
+    "uncertainty": ["uncertainty.md"],
     "stores": ["stores.md"],
     "writers": ["writers.md"],
     "calibration": ["calibration.md"],
