@@ -566,3 +566,67 @@ def test_the_design_chart_takes_one_kernel(monkeypatch: pytest.MonkeyPatch) -> N
     problem = engine.Problem(slipsweep.Mendez(), slipsweep.Sine(10), slipsweep.Cycle())
     found = engine.solve(engine.Request(problem, inputs[0].shape, arrays, engine.MOTION_RESULTS))
     assert np.isfinite(found["permanent_displacement"]).mean() > 0.9
+
+
+class Noted:
+    """A kernel that notes what is said of it, and does nothing."""
+
+    def __init__(self, name: str, said: dict[str, set[str]]) -> None:
+        self.name, self.said = name, said
+
+    def expect(self, perhaps: bool = False) -> None:
+        self.said["perhaps" if perhaps else "expected"].add(self.name)
+
+    def __call__(self, *arguments: Any) -> int:
+        self.said["called"].add(self.name)
+        return 1  # some cells remain, where a kernel may leave some
+
+
+@pytest.mark.parametrize("solver", [slipsweep.Cycle(), slipsweep.Step()], ids=["cycle", "step"])
+@pytest.mark.parametrize("model", [slipsweep.Mendez(), slipsweep.Newmark()], ids=["mendez", "newmark"])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        slipsweep.Sine(),
+        slipsweep.Cosine(),
+        slipsweep.Cosine(ramp_in=1),
+        slipsweep.Triangle(),
+        slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1),
+    ],
+    ids=["sine", "cosine", "ramped cosine", "triangle", "record"],
+)
+def test_the_kernels_that_are_expected_are_called(
+    motion: Any, model: Any, solver: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of which it is certain, and with them those of which it is not, where cells remain."""
+    said: dict[str, set[str]] = {"expected": set(), "perhaps": set(), "called": set()}
+    for name in [name for name in vars(engine) if name.endswith("_KERNEL")]:
+        monkeypatch.setattr(engine, name, Noted(name, said))
+    arrays = {"theta": np.zeros(1), "mu_s": np.ones(1)}
+    recorded = {"scale": np.ones(1), "time_scale": np.ones(1), "polarity": np.ones(1)}
+    arrays |= recorded if isinstance(motion, slipsweep.Record) else {"amplitude": np.ones(1), "frequency": np.ones(1)}
+    problem = engine.Problem(model, motion, solver)
+    engine.expect_kernels(engine.solve, problem)
+    engine.solve(engine.Request(problem, (1,), arrays, ("permanent_displacement",)))
+    assert said["called"] == said["expected"] | said["perhaps"]
+    assert len(said["expected"]) == 1
+
+
+def test_a_cosine_leaves_few_cells_to_the_kernel_of_all_waves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks that stick at Üy when at rest and come there in motion, 1 % of a design chart."""
+    left: list[int] = []
+
+    def counting(grid: Any, stretches: Any, *rest: Any) -> None:
+        left.append(int((stretches[:, 1] - stretches[:, 0]).sum()))
+        wave_kernel(grid, stretches, *rest)
+
+    wave_kernel = engine.WAVE_KERNEL
+    monkeypatch.setattr(engine, "WAVE_KERNEL", counting)
+    axes: dict[str, Any] = {
+        "theta": np.linspace(0, 20, 21),
+        "mu_s": np.linspace(0.2, 0.9, 15),
+        "amplitude": 9.81 * np.linspace(0.05, 1.4, 136),
+    }
+    monkeypatch.setattr(engine.WAVE_KERNEL, "expect", wave_kernel.expect, raising=False)
+    found = slipsweep.sweep(**axes, frequency=1.0, excitation="cosine")
+    assert sum(left) < 0.01 * found.permanent_displacement.size

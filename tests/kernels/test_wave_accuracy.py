@@ -1,18 +1,21 @@
 """Every waveform against the multiple-precision reference, closed forms and what must hold between them."""
 
-from math import pi, sqrt
+from math import acos, pi, radians, sin, sqrt, tan
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import nstr
+from scipy.optimize import brentq
+from scipy.special import iv, modstruve
 
 import slipsweep
 from slipsweep import Validity
 from tests.support.cases import choices
-from tests.support.strategies import reproducible
+from tests.support.strategies import anything, model_options, reproducible, sliding_cells
 from tests.support.wave_cases import REGIMES, WaveCase, read_wave_cases
 from tests.support.wave_cases import solve as reference
 
@@ -34,11 +37,26 @@ CELLS: dict[str, dict[str, Any]] = {
     "measured": {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "yield_acceleration": 0.59, "decay_rate": 2.7},
     "newmark": {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "model": "newmark"},
 }
+#: A cosine that is solved as any sum of harmonics.
+SHIFTED = {"amplitudes": [1.0], "multiples": [1], "phases": [90.0]}
 every_wave = pytest.mark.parametrize("wave", WAVES)
 
 
 def displacement(**given: Any) -> float:
     return float(slipsweep.sweep(**choices(**{"frequency": 1.0, **given})).permanent_displacement)
+
+
+def assert_alike(one: xr.Dataset, other: xr.Dataset, cycles: int) -> None:
+    """The same to rounding; in continuous sliding of what the plane does, as the displacement is a rest of it."""
+    plane = one.amplitude.max().item() / (2 * pi * one.frequency.min().item()) * cycles
+    scales = {"peak_relative_velocity": plane, "permanent_displacement": plane / one.frequency.min().item() * cycles}
+    for name, scale in scales.items():
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-11, atol=1e-15 * scale, err_msg=name)
+    np.testing.assert_array_equal(one.sliding_mode, other.sliding_mode)
+    # on a level plane the displacement is 0, and its sign one of rounding
+    level = (one.theta == 0) & (one.sliding_mode == 2)
+    wrong = ((one.validity ^ other.validity) & ~(level * Validity.UPSLOPE)) != 0
+    assert not wrong.any(), f"flags differ: {int(wrong.sum())}"
 
 
 def miss(case: WaveCase) -> str | None:
@@ -122,7 +140,89 @@ def test_newmark_under_a_square_wave(share: float, theta: float, cycles: int) ->
     assert found == pytest.approx(cycles * pulse / (2 * pi) ** 2, rel=1e-12 + 1e-15 / (1 - share))
 
 
+@reproducible
+@given(share=st.floats(0.01, 0.999), theta=st.floats(0, 15), cycles=st.integers(1, 10**6))
+def test_newmark_under_a_cosine(share: float, theta: float, cycles: int) -> None:
+    """From the first peak to the stop, pulses of the sine, and from Üy to the last peak, where Eq. 12 begins."""
+    amplitude, onset = 4.0, share * 4.0
+    stop = brentq(lambda psi: amplitude * sin(psi) - onset * psi, 1e-3, pi, xtol=1e-15)
+    half = 2 * amplitude * sin(stop / 2) ** 2 - onset * stop**2 / 2
+    rise = acos(share)
+    velocity = amplitude * (sin(rise) - share * rise)
+    last = amplitude * (rise * sin(rise) + share - 1 - share * rise**2 / 2) + velocity**2 / (2 * onset)
+    cell: dict[str, Any] = {"theta": theta, "mu_s": 0.8, "amplitude": amplitude, "yield_acceleration": onset}
+    pulse = displacement(**cell, model="newmark", cycles=1) * (2 * pi) ** 2
+    found = displacement(**cell, model="newmark", waveform="cosine", cycles=cycles)
+    # near yield the terms of the closed form cancel
+    expected = pytest.approx((half + (cycles - 1) * pulse + last) / (2 * pi) ** 2, rel=1e-11, abs=1e-16 * amplitude)
+    assert found == expected
+
+
+@reproducible
+@given(
+    theta=st.floats(0, 20), mu_s=st.floats(0.4, 0.9), delta_mu=st.floats(0, 0.4), decay_rate=st.floats(0.8, 5),
+    cycles=st.integers(1, 10**6),
+)  # fmt: skip
+def test_continuous_sliding_under_a_cosine(
+    theta: float, mu_s: float, delta_mu: float, decay_rate: float, cycles: int
+) -> None:
+    """From a peak on N cycles give W = π N² γ, and γ, what V gains over a cycle, is 4 A tan θ (μs − tan θ − μ₀ q₁)."""
+    k = decay_rate * 12.0 / 9.81
+    q1 = 1 + pi / 2 * (modstruve(1, k) - iv(1, k))
+    gain = 4 * 12.0 * tan(radians(theta)) * (mu_s - tan(radians(theta)) - (mu_s + delta_mu) * q1)
+    found = displacement(
+        theta=theta, mu_s=mu_s, amplitude=12.0, yield_acceleration=0.1, delta_mu=delta_mu, decay_rate=decay_rate,
+        waveform="cosine", cycles=cycles,
+    )  # fmt: skip
+    assert found == pytest.approx(pi * cycles**2 * gain / (2 * pi) ** 2, rel=1e-12, abs=1e-14 * cycles**2)
+
+
 # What must hold between waveforms
+
+
+@reproducible
+@given(cell=sliding_cells | anything(), options=model_options)
+def test_a_cosine_is_the_harmonic_with_its_phase(cell: dict[str, Any], options: dict[str, str]) -> None:
+    """Lanes against the walk over pieces."""
+    if cell.get("model") != "newmark":
+        cell = cell | options
+    lanes = slipsweep.sweep(**choices(**cell, waveform="cosine"))
+    walk = slipsweep.sweep(**choices(**cell, waveform="harmonics", harmonics=SHIFTED))
+    assert_alike(lanes, walk, cell["cycles"])
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 3, 20])
+@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+@pytest.mark.parametrize("onset", [None, 0.3, 2.0])
+def test_lanes_of_a_cosine_side_by_side(onset: float | None, recoupling: str, cycles: int) -> None:
+    """Cells of all kinds in one tile, those that lanes leave among them."""
+    axes: dict[str, Any] = {
+        "theta": [0.0, 3.0, 12.0, 25.0],
+        "mu_s": np.linspace(0.15, 0.9, 6),
+        "amplitude": np.linspace(0.5, 18.0, 40),
+        "frequency": 1.0,
+        "recoupling": recoupling,
+        "cycles": cycles,
+    }
+    given = axes if onset is None else axes | {"yield_acceleration": onset}
+    lanes = slipsweep.sweep(**choices(**given, waveform="cosine"))
+    assert set(np.unique(lanes.sliding_mode)) >= {1, 2}
+    assert_alike(lanes, slipsweep.sweep(**choices(**given, waveform="harmonics", harmonics=SHIFTED)), cycles)
+
+
+@pytest.mark.parametrize("cell", ["coulomb", "measured", "newmark"])
+@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+def test_parts_of_a_cosine_are_those_of_its_history(cell: str, recoupling: str) -> None:
+    """Half a pulse from the first peak, whole ones, and the rise to the last peak with what follows the shaking."""
+    options = {**CELLS[cell], "waveform": "cosine", "frequency": 1.0, "recoupling": recoupling}
+    # at Üg = 0 on the rise the block is at rest
+    history = slipsweep.simulate(**choices(**options, cycles=3, times=[0.0, 0.75, 1.75, 2.75, 100.0]))
+    assert not history.relative_velocity.values.any()
+    half, first, second, last = np.diff(history.relative_displacement.values)
+    assert first == pytest.approx(second, rel=1e-13)
+    for cycles in (1, 2, 3, 10):
+        expected = half + (cycles - 1) * first + last
+        assert displacement(**options, cycles=cycles) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("cell", CELLS)

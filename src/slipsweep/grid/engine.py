@@ -18,10 +18,12 @@ from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
+from slipsweep.jit.cache import Handed, Kernel
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import newmark as newmark_kernels
 from slipsweep.kernels.block import Cell, Options
 from slipsweep.kernels.grid import (
+    COSINE_KERNEL,
     NEWMARK_RECORD_KERNEL,
     NEWMARK_SINE_KERNEL,
     PARAMETER_KERNEL,
@@ -44,7 +46,7 @@ from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Sine, Waveform
+from slipsweep.motion.waveforms import Cosine, Sine, Waveform
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -298,9 +300,16 @@ def _amplitudes(arrays: Mapping[str, Array]) -> int:
     return math.prod(np.broadcast_shapes(arrays["displacement_amplitude"].shape, arrays["frequency"].shape))
 
 
-def _is_plain_sine(motion: Waveform | Record | Suite) -> bool:
-    """Whether a motion is a sine without ramps, for which there are shorter ways."""
-    return isinstance(motion, Sine) and motion == Sine(motion.cycles)
+def _is_plain(motion: Waveform | Record | Suite) -> bool:
+    """Whether a motion is a sine or a cosine without ramps, for which there are shorter ways."""
+    return isinstance(motion, (Sine, Cosine)) and motion.ramp_in == motion.ramp_out == 0.0
+
+
+def _lanes(motion: Waveform | Record | Suite, newmark: bool) -> tuple[Handed, Kernel]:
+    """What solves a plain motion in lanes, and what solves the cells that it leaves; of Newmark's it leaves none."""
+    if isinstance(motion, Cosine):
+        return COSINE_KERNEL, WAVE_KERNEL
+    return NEWMARK_SINE_KERNEL if newmark else SINE_KERNEL, REMAINING_KERNEL
 
 
 def _solve_into(results: Arrays, asked: Request) -> None:
@@ -395,18 +404,17 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
 
         return call, cost
     assert isinstance(motion, Waveform)
-    if _is_plain_sine(motion) and not isinstance(solver, Step):
-        kernel = NEWMARK_SINE_KERNEL if isinstance(problem.model, Newmark) else SINE_KERNEL
+    if _is_plain(motion) and not isinstance(solver, Step):
+        kernel, left = _lanes(motion, isinstance(problem.model, Newmark))
 
-        def call_sine(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
+        def call_lanes(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
             tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
             count = kernel(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
             if count:
-                # only here: to cut a sine into pieces takes 0.1 s, a seventh of a small run
-                stretches, wave = remaining[:count], wave_of(motion)
-                REMAINING_KERNEL(grid, stretches, rows, periods, options, wave, targets, tile)
+                # only here: to cut a wave into pieces takes 0.1 s, a seventh of a small run
+                left(grid, remaining[:count], rows, periods, options, wave_of(motion), targets, tile)
 
-        return call_sine, 1
+        return call_lanes, 1
     wave = wave_of(motion)
     if isinstance(solver, Step):
         steps = steps_of(wave, options.steps_per_cycle, options.rule)
@@ -418,7 +426,8 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         return call_step, 1 + options.steps_per_cycle // 16
 
     def call_wave(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-        WAVE_KERNEL(grid, first, last, rows, periods, options, wave, targets, tile_of(grid))
+        whole = np.array([[first, last]])
+        WAVE_KERNEL(grid, whole, rows, periods, options, wave, targets, tile_of(grid))
 
     return call_wave, 1
 
@@ -539,11 +548,11 @@ def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
         (NEWMARK_RECORD_KERNEL if newmarks else RECORD_KERNEL).expect()
     elif isinstance(problem.solver, Step):
         STEP_KERNEL.expect()
-    elif _is_plain_sine(problem.excitation) and newmarks:
-        NEWMARK_SINE_KERNEL.expect()
-    elif _is_plain_sine(problem.excitation):
-        SINE_KERNEL.expect()
-        REMAINING_KERNEL.expect(perhaps=True)
+    elif _is_plain(problem.excitation):
+        kernel, left = _lanes(problem.excitation, newmarks)
+        kernel.expect()
+        if not newmarks:
+            left.expect(perhaps=True)
     else:
         WAVE_KERNEL.expect()
 

@@ -18,6 +18,7 @@ from slipsweep.kernels.block import FRICTION_ESTIMATED, TILE, UNSOLVED, Options,
 from slipsweep.kernels.cycle import cells as cycle
 from slipsweep.kernels.cycle.legs import room_of
 from slipsweep.kernels.sine import cells as sine
+from slipsweep.kernels.sine import cosine
 from slipsweep.kernels.sine import newmark as sine_newmark
 from slipsweep.kernels.step import cells as step
 from slipsweep.kernels.step import lanes as step_lanes
@@ -231,15 +232,17 @@ def _remaining_grid(
 
 
 def _wave_grid(
-    grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
+    grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
     room = room_of(0)
-    for begin in range(first, last, TILE):
-        count = min(TILE, last - begin)
-        runs = gather(grid, begin, count, inputs, tile)
-        cycle.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
-        place(grid, begin, count, runs, periods, results, tile)
+    for stretch in range(stretches.shape[0]):
+        last = stretches[stretch, 1]
+        for begin in range(stretches[stretch, 0], last, TILE):
+            count = min(TILE, last - begin)
+            runs = gather(grid, begin, count, inputs, tile)
+            cycle.solve_cells(tile.cells, count, options, wave, room, tile.motion, tile.codes)
+            place(grid, begin, count, runs, periods, results, tile)
 
 
 @scalar
@@ -296,14 +299,16 @@ def _given_to_tiles(grid: Grid, first: int, *others: Any) -> tuple[Any, ...]:
     return tile.cells, first, options, room, tile.motion, tile.codes
 
 
-#: Kernels of the stepping solver; of the cycle solver for any waveform; its short ways for the sine,
-#: which leave some cells: the number of their stretches is returned, and `remaining` holds them (rows: the first
-#: cell, and the first after it); what solves those (most sweeps of a sine leave none, and half the first
-#: compilation is spared); and what solves Newmark's block under a sine, which leaves none.
+#: Kernels of the stepping solver; of the cycle solver for any waveform, from one cell up to another of each stretch;
+#: its short ways for the sine and for the cosine, which leave some cells: the number of their stretches is returned,
+#: and `remaining` holds them (rows: the first cell, and the first after it); what solves those of the sine (most
+#: sweeps leave none, and half the first compilation is spared; those of the cosine are as of any wave); and
+#: what solves Newmark's block under a sine, which leaves none.
 STEP_KERNEL = Kernel(_step_grid)
 WAVE_KERNEL = Kernel(_wave_grid)
 _OVER_TILES = Kernel(_sine_grid)
 SINE_KERNEL = Handed(_OVER_TILES, sine.solve_under_sine, _given_to_tiles)
+COSINE_KERNEL = Handed(_OVER_TILES, cosine.solve_under_cosine, _given_to_tiles)
 REMAINING_KERNEL = Kernel(_remaining_grid)
 NEWMARK_SINE_KERNEL = Handed(_OVER_TILES, sine_newmark.solve_newmark_under_sine, _given_to_tiles)
 

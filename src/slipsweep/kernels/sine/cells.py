@@ -13,6 +13,7 @@ from slipsweep.jit.decorators import in_lanes, scalar
 from slipsweep.kernels.block import (
     INTEGRATE,
     LANE_ROWS,
+    NEWMARK,
     STRIP,
     TILE,
     Options,
@@ -41,7 +42,7 @@ from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
 from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_cells
 from slipsweep.model.equations import STUCK
 
-#: What is to be done for a tile.
+#: What solves the cells of a tile; how many remain.
 Solver = Callable[[np.ndarray, int, Options, "Room", np.ndarray, np.ndarray], int]
 
 
@@ -66,20 +67,6 @@ def room_of() -> Room:
         np.empty(BLOCKS_SIZE), np.empty(LANES_SIZE), np.empty(TILE + 1, np.int64), np.empty(TILE, np.int64),
         np.empty(TILE, np.bool_),
     )  # fmt: skip
-
-
-@scalar
-def fill_carried(count: int, lanes: np.ndarray, where: np.ndarray) -> int:
-    """Bring the lanes that stick at Üg = Üy and do not recouple to the front; the number of them."""
-    used = 0
-    for lane in range(count):
-        if lanes[CONVERGED + lane] < 0.0:
-            where[used] = where[lane]
-            for row in range(0, LANES_SIZE, TILE):
-                lanes[row + used] = lanes[row + lane]
-            used += 1
-    fill_up(used, LANES_SIZE // TILE, lanes)
-    return used
 
 
 @scalar
@@ -119,7 +106,8 @@ def store_lane(
 ) -> None:  # fmt: skip
     """Store the result of a lane that has converged as that of cell j; else the cell remains to be solved."""
     solved = lanes[CONVERGED + lane] > 0.0
-    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if kind == YIELD_GOVERNS else 0)
+    governs = (kind == YIELD_GOVERNS) & (options.rise != NEWMARK)
+    flags = int(lanes[CODE + lane]) | (YIELD_GOVERNS_FLAG if governs else 0)
     moved[j] = lanes[W + lane]
     if options.wants_peak:
         peak[j] = lanes[PEAK + lane]
@@ -128,60 +116,92 @@ def store_lane(
 
 
 @scalar
-def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Solve the cells of a tile, which has `count` runs, that are of one kind."""
-    blocks, lanes, runs, where = room.blocks, room.lanes, room.runs, room.where
-    moved, peak, validity = motion[0], motion[1], codes[1]
+def carry(count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Bring those of `count` lanes that stick at Üg = Üy and do not recouple to the front, and go on with them."""
+    lanes, where = room.lanes, room.where
     used = 0
-    for run in range(count):
-        if blocks[KIND + runs[run]] == kind:
-            used = fill_lanes(blocks, runs[run], runs[run + 1], used, lanes)
-    if used == 0:
-        return
-    fill_up(used, LANE_ROWS, lanes)
+    for lane in range(count):
+        if lanes[CONVERGED + lane] < 0.0:
+            where[used] = where[lane]
+            for row in range(0, LANES_SIZE, TILE):
+                lanes[row + used] = lanes[row + lane]
+            used += 1
+    fill_up(used, LANES_SIZE // TILE, lanes)
     for first in range(0, used, STRIP):
-        solve_strip(kind, options, lanes[first:])
-    lane = 0
-    for run in range(count):
-        first, last = runs[run], runs[run + 1]
-        if blocks[KIND + first] == kind:
-            # by slices, which numba knows to begin at 0: then this is a loop in SIMD
-            found, cells, w, v, flags = lanes[lane:], blocks[first:], moved[first:], peak[first:], validity[first:]
-            for j in range(last - first):
-                store_lane(found, j, kind, options, cells, w, v, flags, j)
-            if kind == STICKS:
-                for j in range(last - first):
-                    where[lane + j] = first + j
-            lane += last - first
-    if kind == STICKS:
-        used = fill_carried(used, lanes, where)
+        lane_carried(min(used - first, STRIP), options, lanes[first:])
+    for lane in range(used):
+        store_lane(lanes, lane, STICKS, options, room.blocks, motion[0], motion[1], codes[1], where[lane])
+
+
+def lanes_of(
+    solve_strip: Callable[[int, Options, np.ndarray], None],
+    carry: Callable[[int, Options, Room, np.ndarray, np.ndarray], None],
+) -> Solver:
+    """The jitted solver of a tile's cells in lanes, given that of a strip, and what goes on with lanes in motion."""
+
+    @scalar
+    def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+        """Solve the cells of a tile, which has `count` runs, that are of one kind."""
+        blocks, lanes, runs, where = room.blocks, room.lanes, room.runs, room.where
+        moved, peak, validity = motion[0], motion[1], codes[1]
+        used = 0
+        for run in range(count):
+            if blocks[KIND + runs[run]] == kind:
+                used = fill_lanes(blocks, runs[run], runs[run + 1], used, lanes)
+        if used == 0:
+            return
+        fill_up(used, LANE_ROWS, lanes)
         for first in range(0, used, STRIP):
-            lane_carried(min(used - first, STRIP), options, lanes[first:])
-        for lane in range(used):
-            store_lane(lanes, lane, kind, options, blocks, moved, peak, validity, where[lane])
+            solve_strip(kind, options, lanes[first:])
+        lane = 0
+        for run in range(count):
+            first, last = runs[run], runs[run + 1]
+            if blocks[KIND + first] == kind:
+                # by slices, which numba knows to begin at 0: then this is a loop in SIMD
+                found, cells, w, v, flags = lanes[lane:], blocks[first:], moved[first:], peak[first:], validity[first:]
+                for j in range(last - first):
+                    store_lane(found, j, kind, options, cells, w, v, flags, j)
+                if kind == STICKS:
+                    for j in range(last - first):
+                        where[lane + j] = first + j
+                lane += last - first
+        if kind == STICKS:
+            carry(used, options, room, motion, codes)
+
+    @scalar
+    def solve_cells(
+        cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
+    ) -> int:
+        """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
+
+        Those that are to go from event to event, as any waveform does, are marked in `room.remaining`; their number.
+        """
+        blocks = room.blocks
+        fill_up(count, 7, cells)
+        sort_cells(cells, whole_lanes(count), options, blocks)
+        for j in range(count):
+            codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])
+            motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK else math.nan
+        number = runs_of(blocks, count, room.runs)
+        for kind in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
+            solve_kind(kind, number, options, room, motion, codes)
+        remaining = 0
+        for j in range(count):
+            room.remaining[j] = blocks[KIND + j] == OTHER
+            remaining += 1 if room.remaining[j] else 0
+        return remaining
+
+    return solve_cells
+
+
+_solve_cells = lanes_of(solve_strip, carry)
 
 
 def solve_under_sine(
     cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
 ) -> int:
-    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity.
-
-    Those that are to go from event to event, as any waveform does, are marked in `room.remaining`; their number.
-    """
-    blocks = room.blocks
-    fill_up(count, 7, cells)
-    sort_cells(cells, whole_lanes(count), options, blocks)
-    for j in range(count):
-        codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])
-        motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK else math.nan
-    number = runs_of(blocks, count, room.runs)
-    for kind in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
-        solve_kind(kind, number, options, room, motion, codes)
-    remaining = 0
-    for j in range(count):
-        room.remaining[j] = blocks[KIND + j] == OTHER
-        remaining += 1 if room.remaining[j] else 0
-    return remaining
+    """As any that `lanes_of` gives; to be handed to the kernel that brings cells."""
+    return _solve_cells(cells, count, options, room, motion, codes)
 
 
 #: Solves the cells that are left: in continuous sliding by quarters of the sine's cycle, else as of any wave.

@@ -70,7 +70,7 @@ _QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) fo
 
 #: Rows of lanes that pulses have for something else: what V misses before Üg = Üy, and what it gains from
 #: Üg = 0 up to where its rate changes sign on the rise of the positive half cycle.
-_MISSED, _DIP = CARRIED, MOVED
+_MISSED, DIP = CARRIED, MOVED
 
 
 @summed
@@ -218,47 +218,61 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 
 @scalar
-def lane_turn(side: float, g: float, lanes: np.ndarray) -> None:
-    """∫ D dψ on the rise of a half cycle, from Üg = 0 up to where D changes sign, in RATE; 0 where it does not.
+def lane_turns(g: float, lanes: np.ndarray) -> None:
+    """What the peak velocity needs of both half cycles: rows DIP and X.
 
-    D is -side g Δμ at Üg = 0.  On the positive half it is concave (by `kind_of`), on the negative one convex
-    (as long as the block does not lift off): it changes sign once at most, and Newton comes there from Üg = 0
-    without passing it.
+    DIP is ∫ D dψ on the rise of the positive one, from Üg = 0 up to where D changes sign, 0 where it does not; X the
+    largest V of a negative one entered with V = 0.  D is -side g Δμ at Üg = 0.  On the positive half it is concave (by
+    `kind_of`), on the negative one convex (as long as the block does not lift off): it changes sign once at most, and
+    Newton comes there from Üg = 0 without passing it.
     """
-    for j in range(STRIP):
-        at_peak, slope = lane_rate_and_slope(lanes, j, side * lanes[AMPLITUDE + j], g)
-        turns = side * at_peak > 0.0
-        # one that has its first sign at the peak may have changed twice, unless it still goes away from it
-        monotone = slope >= 0.0
-        lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
-        lanes[PSI + j] = 0.0 if turns else 1.0
-        lanes[X + j] = 0.0
-    settle(TURN, X, PSI, side, g, lanes)
-    for j in range(STRIP):
-        lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
-        lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], lanes[AMPLITUDE + j])
-        lanes[RATE + j] = 0.0
-    for node in range(LANE_NODES.size):
-        at, weight = LANE_NODES[node], LANE_WEIGHTS[node]
+    for side in (1.0, -1.0):
         for j in range(STRIP):
-            phi = lanes[PSI + j] * at
-            x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-            lanes[RATE + j] += weight * lane_relative_acceleration(lanes, j, side * x, g)
+            lanes[DIP + j] = lanes[RATE + j]  # of the side before
+            at_peak, slope = lane_rate_and_slope(lanes, j, side * lanes[AMPLITUDE + j], g)
+            turns = side * at_peak > 0.0
+            # one that has its first sign at the peak may have changed twice, unless it still goes away from it
+            monotone = slope >= 0.0
+            lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
+            lanes[PSI + j] = 0.0 if turns else 1.0
+            lanes[X + j] = 0.0
+        settle(TURN, X, PSI, side, g, lanes)
+        for j in range(STRIP):
+            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
+            lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], lanes[AMPLITUDE + j])
+            lanes[RATE + j] = 0.0
+        for node in range(LANE_NODES.size):
+            at, weight = LANE_NODES[node], LANE_WEIGHTS[node]
+            for j in range(STRIP):
+                phi = lanes[PSI + j] * at
+                x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
+                lanes[RATE + j] += weight * lane_relative_acceleration(lanes, j, side * x, g)
+        for j in range(STRIP):
+            lanes[RATE + j] *= lanes[PSI + j]
     for j in range(STRIP):
-        lanes[RATE + j] *= lanes[PSI + j]
+        # as in `continuous_peaks`: the fall mirrors the rise
+        bump, half_gain = lanes[RATE + j], lanes[GAIN + j] - 2.0 * lanes[V + j]
+        lanes[X + j] = max(max(0.0, half_gain), max(bump, half_gain - bump))
+
+
+@scalar
+def lane_quarters(g: float, lanes: np.ndarray) -> None:
+    """∫ D dψ over the rise of the positive half cycle in V, over the whole cycle in GAIN."""
+    for j in range(STRIP):
+        amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
+        most = mu_s + lanes[DELTA_MU + j]
+        plain, with_sine = quarter_integrals(lanes[DECAY + j] * amplitude)
+        quarter = amplitude * tan_theta * (mu_s - tan_theta - most * with_sine)
+        lanes[V + j], lanes[GAIN + j] = g * (HALF_PI * mu_s - most * plain) + quarter, 4.0 * quarter
+        lanes[PEAK + j], lanes[CODE + j], lanes[CONVERGED + j] = math.nan, 0.0, 1.0
 
 
 @scalar
 def lane_continuous(options: Options, lanes: np.ndarray) -> None:
     """Continuous sliding, all cycles: W in row W, the largest V in PEAK."""
     g = options.g
+    lane_quarters(g, lanes)
     for j in range(STRIP):
-        # the whole quarter: ∫ D in V, a quarter of the drift in X; up to Üg = Üy: RATE, MOMENT
-        amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
-        most = mu_s + lanes[DELTA_MU + j]
-        plain, with_sine = quarter_integrals(lanes[DECAY + j] * amplitude)
-        lanes[X + j] = amplitude * tan_theta * (mu_s - tan_theta - most * with_sine)
-        lanes[V + j] = g * (HALF_PI * mu_s - most * plain) + lanes[X + j]
         lanes[RATE + j] = lanes[MOMENT + j] = 0.0
     for node in range(SHORT_NODES.size):
         at, left, weight = SHORT_NODES[node], 1.0 - SHORT_NODES[node], SHORT_WEIGHTS[node]
@@ -270,23 +284,16 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
-        began = lanes[BEGAN + j]
+        began, drift = lanes[BEGAN + j], lanes[GAIN + j]
         width = HALF_PI + began
         missed, missed_moment = lanes[RATE + j] * width, lanes[MOMENT + j] * width * width
-        drift = 4.0 * lanes[X + j]
         lanes[W + j] = continuous_displacement(lanes[V + j], missed, missed_moment, drift, began, options.cycles)
-        lanes[_MISSED + j], lanes[GAIN + j] = missed, drift
-        lanes[PEAK + j], lanes[CODE + j], lanes[CONVERGED + j] = math.nan, 0.0, 1.0
+        lanes[_MISSED + j] = missed
     if options.wants_peak:
-        lane_turn(1.0, g, lanes)
+        lane_turns(g, lanes)
         for j in range(STRIP):
-            lanes[_DIP + j] = lanes[RATE + j]
-        lane_turn(-1.0, g, lanes)
-        for j in range(STRIP):
-            # as in `continuous_peaks`: the fall mirrors the rise
-            drift, half, dip, bump = lanes[GAIN + j], 2.0 * lanes[V + j], lanes[_DIP + j], lanes[RATE + j]
+            half, dip = 2.0 * lanes[V + j], lanes[DIP + j]
             first = max(half, half - dip)
-            other = drift - half
-            negative = half + max(max(0.0, other), max(bump, other - bump))
-            positive = max(max(0.0, dip), first)
-            lanes[PEAK + j] = continuous_peak(lanes[_MISSED + j], drift, first, positive, negative, options.cycles)
+            negative, positive = half + lanes[X + j], max(max(0.0, dip), first)
+            missed, drift = lanes[_MISSED + j], lanes[GAIN + j]
+            lanes[PEAK + j] = continuous_peak(missed, drift, first, positive, negative, options.cycles)

@@ -15,6 +15,7 @@ from slipsweep.kernels.block import (
     LANE_ROWS,
     MONOTONE,
     MU_S,
+    NEWMARK,
     STRIP,
     TAN_THETA,
     TILE,
@@ -57,8 +58,9 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
     kind = sticks_or_follows if gentle else OTHER
     kind = YIELD_GOVERNS if (at_start < start) & (at_end <= start) else kind
     kind = kind if smooth else OTHER
+    kind = YIELD_GOVERNS if options.rise == NEWMARK else kind
     kind = kind if mode == STICK_SLIP else OTHER
-    # where the peak velocity is wanted, D has to be concave (`lane_turn`)
+    # where the peak velocity is wanted, D has to be concave (`lane_turns`)
     early = gentle & (start <= SHORT_SINE * end) & (convex | (not options.wants_peak))
     kind = SLIDES_ON if (mode == CONTINUOUS) & early else kind
     return kind if mode > STUCK else STAYS

@@ -1,0 +1,132 @@
+"""A cosine in the lanes of the sine: its shaking begins at a peak, to which Üg jumps, and ends at one.
+
+docs/numerics.md#lanes-of-the-cosine
+"""
+
+import math
+
+import numpy as np
+
+from slipsweep.jit.decorators import scalar
+from slipsweep.kernels.block import AMPLITUDE, BEGAN, INTEGRATE, NOT_RECOUPLED, YIELD, Options, lane_response
+from slipsweep.kernels.events import STRIP
+from slipsweep.kernels.sine.cells import Room, lanes_of
+from slipsweep.kernels.sine.continuous import DIP, lane_quarters, lane_turns
+from slipsweep.kernels.sine.cycles import lane_attenuation, lane_recoupling
+from slipsweep.kernels.sine.lanes import (
+    AT_PEAK,
+    CARRIED,
+    CODE,
+    CONVERGED,
+    GAIN,
+    HELD,
+    MOST,
+    MOVED,
+    PEAK,
+    SLIDES_ON,
+    SLOWEST,
+    STICKS,
+    THROUGH,
+    TO_PEAK,
+    V,
+    W,
+    X,
+)
+from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
+from slipsweep.model import equations as eq
+
+#: Rows of lanes that pulses of the sine entered in motion have for something else: of a whole pulse from rest W up to
+#: the next Üg = Üy, the largest V, and b from the peak on.
+_WHOLE, _WHOLE_PEAK, _WHOLE_HELD = THROUGH, SLOWEST, MOST
+
+
+@scalar
+def lane_to_next(kind: int, options: Options, lanes: np.ndarray) -> None:
+    """From the peak to the next Üg = Üy: W in MOVED, V left there in CARRIED, the largest V in PEAK."""
+    lane_fall(options.wants_peak, lanes)
+    if options.recoupling == INTEGRATE:
+        lane_recoupling(1, lanes)
+        for j in range(STRIP):
+            lanes[MOVED + j], lanes[CARRIED + j] = lanes[W + j], 0.0
+    else:
+        lane_attenuation(kind, 1, lanes)
+
+
+@scalar
+def lane_pulses(kind: int, options: Options, lanes: np.ndarray) -> None:
+    """Half a pulse from the first peak on, whole ones, and a rise to the last peak: W in W, the largest V in PEAK.
+
+    docs/numerics.md#lanes-of-the-cosine
+    """
+    lane_onset(kind, options.g, lanes)
+    lane_rise(kind, options.g, lanes)
+    for j in range(STRIP):
+        lanes[AT_PEAK + j], lanes[TO_PEAK + j], lanes[_WHOLE_HELD + j] = lanes[V + j], lanes[W + j], lanes[HELD + j]
+    lane_to_next(kind, options, lanes)
+    for j in range(STRIP):
+        lanes[_WHOLE + j], lanes[_WHOLE_PEAK + j], lanes[GAIN + j] = (
+            lanes[MOVED + j],
+            lanes[PEAK + j],
+            lanes[CARRIED + j],
+        )
+        lanes[V + j] = lanes[W + j] = 0.0
+        if kind == STICKS:  # a whole pulse may hold more, which it has taken up on the way to the peak
+            lanes[HELD + j] = max(lanes[YIELD + j], lane_response(lanes, j, lanes[AMPLITUDE + j], options.g))
+    lane_to_next(kind, options, lanes)
+    whole = options.cycles - 1.0
+    for j in range(STRIP):
+        first, gain = lanes[CARRIED + j], lanes[GAIN + j]
+        entered = first + whole * gain
+        at_end = lanes[AT_PEAK + j] + entered
+        last = lanes[TO_PEAK + j] - entered * lanes[BEGAN + j]
+        last += eq.attenuated_displacement(at_end, lanes[_WHOLE_HELD + j], math.inf)
+        pulses = whole * (lanes[_WHOLE + j] + math.pi * (2.0 * first + gain * (whole - 1.0)))
+        lanes[W + j] = lanes[MOVED + j] + pulses + last
+        highest = lanes[_WHOLE_PEAK + j] + (entered - gain) if whole > 0.0 else 0.0
+        lanes[PEAK + j] = max(max(lanes[PEAK + j], highest), at_end)
+        moves = (first > 0.0) | ((gain > 0.0) & (whole > 0.0))
+        lanes[CODE + j] = NOT_RECOUPLED if moves else 0.0
+        # a later pulse of a block that sticks at Üg = Üy when at rest is another one when it moves there
+        lanes[CONVERGED + j] = 0.0 if moves & (kind == STICKS) else lanes[CONVERGED + j]
+
+
+@scalar
+def lane_continuous(options: Options, lanes: np.ndarray) -> None:
+    """Continuous sliding from the first peak on: W in W, the largest V in PEAK.
+
+    docs/numerics.md#lanes-of-the-cosine
+    """
+    lane_quarters(options.g, lanes)
+    for j in range(STRIP):
+        lanes[W + j] = math.pi * lanes[GAIN + j] * options.cycles * options.cycles
+    if options.wants_peak:
+        lane_turns(options.g, lanes)
+        for j in range(STRIP):
+            up, dip, drift = lanes[V + j], lanes[DIP + j], lanes[GAIN + j]
+            fall, rise = max(up, up - dip), max(max(0.0, dip), up)
+            highest = max(max(0.0, fall), max(up + lanes[X + j], drift - up + rise))
+            lanes[PEAK + j] = highest + (options.cycles - 1.0) * max(0.0, drift)
+
+
+@scalar
+def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
+    """Lanes of one kind, from the first peak to the end of all cycles."""
+    if kind == SLIDES_ON:
+        lane_continuous(options, lanes)
+    else:
+        lane_pulses(kind, options, lanes)
+
+
+@scalar
+def leave(used: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Leave lanes in motion to go from event to event."""
+
+
+_solve_cells = lanes_of(solve_strip, leave)
+
+
+def solve_under_cosine(
+    cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
+) -> int:
+    """As `solve_under_sine`."""
+    return _solve_cells(cells, count, options, room, motion, codes)
