@@ -54,15 +54,12 @@ def zeros_of_relative_acceleration(block: Block, end: float, zeros: np.ndarray) 
 
 @scalar
 def follow_through(
-    block: Block, wave: Wave, p: int, tau: float, until: int, tau_until: float, wants_peak: bool, zeros: np.ndarray
+    block: Block, wave: Wave, p: int, tau: float, until: int, tau_until: float, up: int, down: int, zeros: np.ndarray
 ) -> tuple[float, float, float]:
-    """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`: gains of V and W, the largest V."""
-    up, down = 0, 0
-    if wants_peak:
-        up = zeros_of_relative_acceleration(block, block.amplitude * wave.highest, zeros[0])
-        down = zeros_of_relative_acceleration(block, block.amplitude * wave.lowest, zeros[1])
-        if min(up, down) < 0:
-            return math.nan, math.nan, math.nan
+    """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`: gains of V and W, the largest V.
+
+    D changes its sign at `up` zeros on the way up from Üg = 0 and at `down` on the way down.
+    """
     velocity, displacement, peak = 0.0, 0.0, 0.0
     above, below, both = 0.0, 0.0, 0.0
     for q in range(p, min(until + 1, wave.pieces.shape[0])):
@@ -71,14 +68,13 @@ def follow_through(
         if end <= start:
             continue
         side = 1 if wave.pieces[q, TOP] > 0.0 else 0
-        if wants_peak:
-            least, most = sorted_pair(block.amplitude * wave.pieces[q, FIRST], block.amplitude * wave.pieces[q, LAST])
-            for i in range(up if side == 1 else down):
-                zero = zeros[1 - side, i]
-                if least < zero < most:
-                    at = offset_at(wave.pieces, q, block.amplitude, zero)
-                    if start < at < end:
-                        peak = max(peak, velocity + eq4_integrals(block, wave.pieces, q, start, at)[0])
+        least, most = sorted_pair(block.amplitude * wave.pieces[q, FIRST], block.amplitude * wave.pieces[q, LAST])
+        for i in range(up if side == 1 else down):
+            zero = zeros[1 - side, i]
+            if least < zero < most:
+                at = offset_at(wave.pieces, q, block.amplitude, zero)
+                if start < at < end:
+                    peak = max(peak, velocity + eq4_integrals(block, wave.pieces, q, start, at)[0])
         first, second, first_x, second_x = lag_integrals(block, wave.pieces, q, start, end)
         side_g = block.g if side == 1 else -block.g
         displacement += velocity * (end - start) + side_g * second + block.tan_theta * second_x
@@ -94,12 +90,12 @@ def follow_through(
 
 @scalar
 def continuous_cycle(
-    block: Block, wave: Wave, c: int, p: int, tau: float, wants_peak: bool, zeros: np.ndarray
+    block: Block, wave: Wave, c: int, p: int, tau: float, up: int, down: int, zeros: np.ndarray
 ) -> tuple[float, float, float]:
     """`follow_through` from τ on piece p to the end of cycle c of the table."""
     until = wave.cycle[c + 1]
     tau_until = wave.pieces[until, BEGIN] if until < wave.pieces.shape[0] else 0.0
-    return follow_through(block, wave, p, tau, until, tau_until, wants_peak, zeros)
+    return follow_through(block, wave, p, tau, until, tau_until, up, down, zeros)
 
 
 @scalar
@@ -118,6 +114,12 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
     if k >= wave.height.size:
         return Motion(0.0, 0.0, 0)
     p, tau = beginning(block, wave, k)
+    up, down = 0, 0
+    if options.wants_peak:
+        up = zeros_of_relative_acceleration(block, block.amplitude * wave.highest, zeros[0])
+        down = zeros_of_relative_acceleration(block, block.amplitude * wave.lowest, zeros[1])
+        if min(up, down) < 0:
+            return Motion(math.nan, math.nan, 0)
     velocity, displacement, peak = 0.0, 0.0, 0.0
     gain, moved, highest, known = 0.0, 0.0, 0.0, -1
     for c in range(wave.shape.size):
@@ -125,13 +127,13 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
             continue
         repeats = wave.repeats if wave.repeats > 0 and c == wave.lead else 1
         if wave.cycle[c] <= p:
-            velocity, displacement, peak = continuous_cycle(block, wave, c, p, tau, options.wants_peak, zeros)
+            velocity, displacement, peak = continuous_cycle(block, wave, c, p, tau, up, down, zeros)
             repeats -= 1
         if repeats == 0:
             continue
         if wave.shape[c] != known:
             gain, moved, highest = continuous_cycle(
-                block, wave, c, wave.cycle[c], wave.pieces[wave.cycle[c], BEGIN], options.wants_peak, zeros
+                block, wave, c, wave.cycle[c], wave.pieces[wave.cycle[c], BEGIN], up, down, zeros
             )
             known = wave.shape[c]
         later = repeats - 1.0
