@@ -117,7 +117,8 @@ class Handed:
     kernel : Kernel
         What the function is handed to, as its last argument.
     function : callable
-        Python function to compile, of a name that no other has; returns an integer.
+        Python function to compile; returns an integer.  Its name, under which machine code from another process is
+        found, is that of no other.
     arguments : callable
         Gives, of the kernel's arguments, some of the types of the function's.
     """
