@@ -8,7 +8,7 @@ by the scaling law and costs no kernel call.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
-from slipsweep.jit.cache import Handed, Kernel
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import newmark as newmark_kernels
 from slipsweep.kernels.block import Cell, Options
@@ -47,6 +46,9 @@ from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Cosine, Sine, Waveform
+
+if TYPE_CHECKING:
+    from slipsweep.jit.cache import Handed, Kernel
 
 #: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
 _FRICTION_CELLS = 65536
@@ -305,11 +307,11 @@ def _is_plain(motion: Waveform | Record | Suite) -> bool:
     return isinstance(motion, (Sine, Cosine)) and motion.ramp_in == motion.ramp_out == 0.0
 
 
-def _lanes(motion: Waveform | Record | Suite, newmark: bool) -> tuple[Handed, Kernel]:
-    """What solves a plain motion in lanes, and what solves the cells that it leaves; of Newmark's it leaves none."""
+def _lanes(motion: Waveform | Record | Suite, newmark: bool) -> "tuple[Handed, Kernel | None]":
+    """What solves a plain motion in lanes, and what solves the cells that it leaves, if it leaves any."""
     if isinstance(motion, Cosine):
         return COSINE_KERNEL, WAVE_KERNEL
-    return NEWMARK_SINE_KERNEL if newmark else SINE_KERNEL, REMAINING_KERNEL
+    return (NEWMARK_SINE_KERNEL, None) if newmark else (SINE_KERNEL, REMAINING_KERNEL)
 
 
 def _solve_into(results: Arrays, asked: Request) -> None:
@@ -410,7 +412,7 @@ def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
         def call_lanes(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
             tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
             count = kernel(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
-            if count:
+            if left and count:
                 # only here: to cut a wave into pieces takes 0.1 s, a seventh of a small run
                 left(grid, remaining[:count], rows, periods, options, wave_of(motion), targets, tile)
 
@@ -551,7 +553,7 @@ def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
     elif _is_plain(problem.excitation):
         kernel, left = _lanes(problem.excitation, newmarks)
         kernel.expect()
-        if not newmarks:
+        if left:
             left.expect(perhaps=True)
     else:
         WAVE_KERNEL.expect()
