@@ -39,7 +39,7 @@ from slipsweep.kernels.sine.lanes import (
     W,
 )
 from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
-from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_cells
+from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_strip
 from slipsweep.model.equations import STUCK
 
 #: What solves the cells of a tile; how many remain.
@@ -178,7 +178,8 @@ def lanes_of(
         """
         blocks = room.blocks
         fill_up(count, 7, cells)
-        sort_cells(cells, whole_lanes(count), options, blocks)
+        for first in range(0, whole_lanes(count), STRIP):
+            sort_strip(cells[first:], options, blocks[first:])
         for j in range(count):
             codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])
             motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK else math.nan

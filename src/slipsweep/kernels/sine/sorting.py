@@ -100,13 +100,6 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
 
 
 @scalar
-def sort_cells(cells: np.ndarray, count: int, options: Options, blocks: np.ndarray) -> None:
-    """`sort_strip` for a tile."""
-    for first in range(0, count, STRIP):
-        sort_strip(cells[first:], options, blocks[first:])
-
-
-@scalar
 def runs_of(blocks: np.ndarray, count: int, runs: np.ndarray) -> int:
     """Where runs of cells of one kind start (and the last ends); the number of them.
 
