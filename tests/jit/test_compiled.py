@@ -19,6 +19,8 @@ import pytest
 
 from slipsweep.jit import cache as compiled
 from slipsweep.jit import compiling, elsewhere, folders
+from slipsweep.jit.decorators import scalar
+from slipsweep.jit.elementary import exp, log
 from slipsweep.jit.handed import call
 
 #: A small kernel, so that compiling it takes a second; says what it gives and whether it was compiled here.
@@ -301,6 +303,25 @@ def test_numba_is_left_as_it_was(cache: Path) -> None:
     with pytest.raises(numba.TypingError):
         compiled.Kernel(sum_of_unlike)(2.0)
     assert methods() == before
+
+
+@scalar
+def unlike(x: float, unread: float, y: float) -> float:
+    """Too long to be inlined, and one argument is not read: a kernel's copy of it takes two."""
+    x = exp(x) + exp(0.1 * x) + exp(0.01 * x) + log(2.0 + x * x) + exp(-x) + log(3.0 + x)
+    x = log(1.0 + x) + exp(0.2 * y) + log(4.0 + x) + exp(-0.3 * y)
+    return log(1.0 + x) + exp(-0.2 * x) + log(4.0 + y) + exp(-0.3 * x)
+
+
+def with_others(x: float, y: float) -> float:
+    return unlike(x, 7.0, y) + unlike(y, 8.0, x) + unlike(x + y, 9.0, x)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_nobody_else_is_given_the_functions_of_a_kernel(cache: Path) -> None:
+    """A function that numba compiles later has a copy of the same part, with all arguments."""
+    found = compiled.Kernel(with_others)(0.5, 0.25)
+    assert numba.njit(with_others)(0.5, 0.25) == pytest.approx(found, rel=1e-14)
 
 
 def test_other_types_are_refused(cache: Path) -> None:

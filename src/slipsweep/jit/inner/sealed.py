@@ -44,6 +44,8 @@ class _Library(WideLibrary):
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
                 function.linkage = "internal"
+                # the linker still knows its name, and would give it, without those arguments, to others for theirs
+                function.name += ".sealed"
         super()._optimize_final_module()
 
 
