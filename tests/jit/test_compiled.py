@@ -164,6 +164,19 @@ def test_a_kernel_is_compiled_elsewhere_beside_what_it_is_handed(
     assert [path.name.partition("-")[0] for path in files(cache)] == ["added_up", "half_of", "third_of"]
 
 
+def test_what_else_the_kernel_is_expected_to_be_handed_is_compiled_with_it(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(elsewhere, "cores", lambda: 2)
+    kernel = compiled.Kernel(added_up)
+    halves, thirds = (compiled.Handed(kernel, one, of_values) for one in (half_of, third_of))
+    for one in (halves, thirds):
+        one.expect()
+    assert halves(np.array([7, 4, 2])) == 6
+    assert [path.name.partition("-")[0] for path in files(cache)] == ["added_up", "half_of", "third_of"]
+    assert thirds(np.array([7, 4, 2])) == 3
+
+
 @pytest.mark.skipif(os.name != "posix", reason="a script for a program")
 def test_where_the_other_process_fails_the_kernel_is_compiled_here(
     cache: Path, compiled_here: Callable[[], set[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path

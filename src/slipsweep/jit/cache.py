@@ -20,7 +20,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 
@@ -53,6 +53,14 @@ def cache_folder() -> Path | None:
     return None
 
 
+class ToMake(NamedTuple):
+    """A function and the types of its arguments, and in which way of `slipsweep.jit.form` it is compiled."""
+
+    how: Callable[..., Any]
+    function: Callable[..., Any]
+    signature: Any
+
+
 class Kernel:
     """A jitted function that is compiled, or loaded from disk, when first called.
 
@@ -67,6 +75,8 @@ class Kernel:
         self._function = function
         self._dispatcher: Callable[..., Any] | None = None
         self._expected = False
+        #: What it is expected to be handed.
+        self.handed: list[Handed] = []
 
     def __call__(self, *args: Any) -> Any:
         """Run on `args`; their types must be those of the first call."""
@@ -87,20 +97,24 @@ class Kernel:
         if numba.config.DISABLE_JIT:
             return self._function
         folder = cache_folder()
-        jitted = make(form.compiled, self._function, _types(args), folder, compiling.compiling(self))
+        jitted = make(self._what(args), folder, compiling.compiling(self))
         # a call with other types is a bug here, and would compile unseen
         jitted.disable_compile()
         if folder is not None:
             folders.keep_latest(_KEPT_FOLDERS, f"slipsweep-{'[0-9a-f]' * 16}", folder)
         return jitted
 
+    def _what(self, args: tuple[Any, ...]) -> ToMake:
+        return ToMake(form.compiled, self._function, _types(args))
+
     @contextlib.contextmanager
-    def compiled_elsewhere(self, *args: Any) -> Iterator[None]:
-        """Have another process compile it for such arguments while the block runs, unless it is there or kept."""
-        if self._dispatcher is not None or cache_folder() is None or _is_kept(self._function):
+    def compiled_elsewhere(self, args: tuple[Any, ...], others: list[ToMake]) -> Iterator[None]:
+        """Have another process compile it for such arguments, and others, while the block runs, unless it is kept."""
+        folder = cache_folder()
+        if self._dispatcher is not None or folder is None or _is_kept(self._function):
             yield
             return
-        with elsewhere.begun(make, form.compiled, self._function, _types(args), cache_folder()) as wait:
+        with elsewhere.begun(make_all, [self._what(args), *others], folder) as wait:
             yield
             with compiling.compiling(self):
                 wait()
@@ -109,8 +123,8 @@ class Kernel:
 class Handed:
     """A kernel that is handed the address of a function, which `slipsweep.jit.handed` calls.
 
-    Neither waits for the other: where there are two processors, another process compiles the kernel meanwhile.  And
-    several functions share a kernel.
+    Neither waits for the other: where there are two processors, another process compiles the kernel meanwhile, and the
+    other functions that it is expected to be handed, for several share a kernel.
 
     Parameters
     ----------
@@ -126,7 +140,6 @@ class Handed:
     def __init__(self, kernel: Kernel, function: Callable[..., int], arguments: Callable[..., tuple[Any, ...]]) -> None:
         self._kernel, self._function, self._arguments = kernel, function, arguments
         self._compiled: Any = None
-        self._expected = False
 
     def __call__(self, *args: Any) -> Any:
         """As `Kernel`."""
@@ -138,16 +151,20 @@ class Handed:
 
     def expect(self, perhaps: bool = False) -> None:
         """As `Kernel.expect`."""
-        if self._compiled is None and not self._expected:
-            self._expected = True
+        if self._compiled is None and self not in self._kernel.handed:
+            self._kernel.handed.append(self)
             self._kernel.expect(perhaps)
             if not _is_kept(self._function):
                 compiling.expect(self, perhaps)
 
     def _ready(self, args: tuple[Any, ...]) -> Any:
+        others = [one._what(args) for one in self._kernel.handed if one is not self and one._compiled is None]
+        with self._kernel.compiled_elsewhere((*args, 0), others):
+            return make(self._what(args), cache_folder(), compiling.compiling(self))
+
+    def _what(self, args: tuple[Any, ...]) -> ToMake:
         signature = numba.types.int64(*_types(self._arguments(*args)))
-        with self._kernel.compiled_elsewhere(*args, 0):
-            return make(form.compiled_apart, self._function, signature, cache_folder(), compiling.compiling(self))
+        return ToMake(form.compiled_apart, self._function, signature)
 
 
 def _types(args: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -159,20 +176,20 @@ def _is_kept(function: Callable[..., Any]) -> bool:
     return folder is not None and folders.has(folder, function)
 
 
-def make(
-    how: Callable[..., Any],
-    function: Callable[..., Any],
-    signature: Any,
-    folder: Path | None,
-    compiling: contextlib.AbstractContextManager[None] | None = None,
-) -> Any:
-    """Compile a function for these types, or load it, in one of the ways of `slipsweep.jit.form`."""
+def make(what: ToMake, folder: Path | None, compiling: contextlib.AbstractContextManager[None] | None = None) -> Any:
+    """Compile a function for some types, or load it."""
     with warnings.catch_warnings(), no_collections():
         # numba's advice is for us, not for those who run a sweep
         warnings.simplefilter("ignore", numba.NumbaWarning)
         try:
-            return how(function, signature, folder, compiling or contextlib.nullcontext())
+            return what.how(what.function, what.signature, folder, compiling or contextlib.nullcontext())
         except Exception as error:
             if form.compiled is not plain.compiled:
                 error.add_note("SLIPSWEEP_PLAIN_NUMBA=1 in the environment compiles by what numba documents alone")
             raise
+
+
+def make_all(what: list[ToMake], folder: Path) -> None:
+    """Compile functions, to be kept in a folder."""
+    for one in what:
+        make(one, folder)
