@@ -1,6 +1,6 @@
 """How threads are shared between slipsweep, dask and numba.
 
-One policy, here and nowhere else:
+One policy, here (and, how many processors there are to use, in `slipsweep.jit.elsewhere`) and nowhere else:
 
 * Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, so
   no numba threading layer is ever started and none can abort.

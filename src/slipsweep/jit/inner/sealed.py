@@ -62,11 +62,12 @@ class _Compiler(Compiler):
             return super().compile_extra(func)
 
 
-def _hear_signals_later(engine: Any) -> None:
+def _hear_signals_later() -> None:
     """Have Ctrl-C and SIGTERM wait while this process's one engine makes machine code, whatever for.
 
     Beside a kernel numba makes a score of small functions for it, each with machine code of its own.
     """
+    engine = cpu_target.target_context.codegen()._engine
     if "finalize_object" in vars(engine):
         return
     make = engine.finalize_object
@@ -80,12 +81,12 @@ def _hear_signals_later(engine: Any) -> None:
 
 def sealed(function: Callable[..., Any]) -> Any:
     """A function as a kernel, to be compiled; runs without the GIL."""
-    _hear_signals_later(cpu_target.target_context.codegen()._engine)
+    _hear_signals_later()
     return njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, pipeline_class=_Compiler)(function)
 
 
 def sealed_apart(function: Callable[..., Any], signature: Any) -> Any:
     """A function that is handed to a kernel, to be compiled."""
-    _hear_signals_later(cpu_target.target_context.codegen()._engine)
+    _hear_signals_later()
     types = (signature.args, signature.return_type)
     return CFunc(function, types, {}, {"error_model": "numpy"}, pipeline_class=_Compiler)
