@@ -1,11 +1,12 @@
 """What uncertain inputs cost: ``python -m benchmarks.uncertainty`` prints it and writes results/uncertainty.md.
 
-Seconds of processor, in turns.  Fragility: the statistics of many grid points, over the range of
+Seconds of processor, and by the clock, in turns.  Fragility: the statistics of many grid points, over the range of
 sweeps/fragility.toml, against a sweep that solves the very same cells.  One grid point: a million samples of three
 inputs, against drawing them with SciPy.  ``.ci/include-report`` puts the table into docs/uncertainty.md.
 """
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy import stats
 
 import slipsweep
 from benchmarks.grids import G
-from benchmarks.machine import alternate, arguments, measured_on, number, table
+from benchmarks.machine import alternate, arguments, cores, measured_on, number, table
 
 #: As in sweeps/fragility.toml.
 UNCERTAIN: dict[str, dict[str, Any]] = {
@@ -36,7 +37,9 @@ def drawn(samples: int) -> dict[str, np.ndarray]:
     }
 
 
-def fragility(thetas: int, amplitudes: int, samples: int, turns: int) -> tuple[float, float]:
+def fragility(
+    thetas: int, amplitudes: int, samples: int, turns: int, clock: Callable[[], float]
+) -> tuple[float, float]:
     """Seconds of the statistics of thetas × amplitudes grid points, and of a sweep over all their samples."""
     theta, amplitude = np.linspace(0.0, 10.0, thetas), np.linspace(0.02, 1.2, amplitudes) * G
     draws = {name: xr.DataArray(values, dims="sample") for name, values in drawn(samples).items()}
@@ -60,11 +63,11 @@ def fragility(thetas: int, amplitudes: int, samples: int, turns: int) -> tuple[f
 
     wanted = sweep().permanent_displacement.transpose("theta", "median", "sample").mean("sample").values
     np.testing.assert_allclose(sample().mean_displacement.values, wanted, rtol=1e-9)  # they are the same cells
-    found = alternate({"sample": sample, "sweep": sweep}, turns, clock=time.process_time)
+    found = alternate({"sample": sample, "sweep": sweep}, turns, clock=clock)
     return found["sample"], found["sweep"]
 
 
-def one_point(samples: int, turns: int) -> tuple[float, float]:
+def one_point(samples: int, turns: int, clock: Callable[[], float]) -> tuple[float, float]:
     """Seconds of the statistics of one grid point, and of drawing its samples."""
 
     def sample() -> xr.Dataset:
@@ -72,7 +75,7 @@ def one_point(samples: int, turns: int) -> tuple[float, float]:
             theta=5.0, amplitude=4.0, frequency=1.0, uncertain=UNCERTAIN, samples=samples, **STATISTICS
         )
 
-    found = alternate({"sample": sample, "draw": lambda: drawn(samples)}, turns, clock=time.process_time)
+    found = alternate({"sample": sample, "draw": lambda: drawn(samples)}, turns, clock=clock)
     return found["sample"], found["draw"]
 
 
@@ -81,19 +84,23 @@ def main() -> None:
     given = arguments(__doc__)
     thetas, amplitudes, samples, million, turns = (2, 3, 64, 128, 1) if given.tiny else (10, 100, 2**13, 2**20, 15)
     points = thetas * amplitudes
-    measured = {
-        (f"{points:,} × {samples:,}", points * samples, "solving the same cells"): fragility(
-            thetas, amplitudes, samples, turns
+    rows = []
+    for name, cells, other, measure in (
+        (
+            f"{points:,} × {samples:,}",
+            points * samples,
+            "solving the same cells",
+            lambda clock: fragility(thetas, amplitudes, samples, turns, clock),
         ),
-        (f"1 × {million:,}", million, "drawing them with SciPy"): one_point(million, turns),
-    }
-    rows = [
-        [name, number(1e9 * own / cells), f"{other} ({number(1e9 * others / cells)} ns)", f"{own / others:.2f}"]
-        for (name, cells, other), (own, others) in measured.items()
-    ]
+        (f"1 × {million:,}", million, "drawing them with SciPy", lambda clock: one_point(million, turns, clock)),
+    ):
+        (own, others), (seconds, other_seconds) = measure(time.process_time), measure(time.perf_counter)
+        ratios = [f"{own / others:.2f}", f"{seconds / other_seconds:.2f}"]
+        rows.append([name, number(1e9 * own / cells), f"{other} ({number(1e9 * others / cells)} ns)", *ratios])
     text = (
-        f"{table(['grid points × samples', 'ns a sample', 'in comparison with', 'ratio'], rows)}\n"
-        "Time of processor, all cores together: `slipsweep.sample` with three uncertain inputs, five quantiles and "
+        f"{table(['grid points × samples', 'ns a sample', 'in comparison with', 'ratio', 'by the clock'], rows)}\n"
+        "Time of processor, all cores together, its ratio, and that of the time by the clock, for which `slipsweep` "
+        f"has {cores()} cores and SciPy uses one: `slipsweep.sample` with three uncertain inputs, five quantiles and "
         "three thresholds, as in `sweeps/fragility.toml`; `slipsweep.sweep` with the displacement, the mode and the "
         f"flags of all samples, in the order in which they are drawn. Ten cycles of a sine; medians over {turns} "
         f"rounds. {measured_on(('numpy', 'numba', 'scipy'))} Written by `python -m benchmarks.uncertainty`.\n"

@@ -123,6 +123,15 @@ def test_one_thread_is_the_callers(monkeypatch: pytest.MonkeyPatch) -> None:
     assert seen == {threading.get_ident()}
 
 
+def test_a_first_call_compiles_on_the_callers_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which hears Ctrl-C: compiled on another one, a kernel had to be waited for, 1 to 4 s."""
+    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+    first: list[int] = []
+    threads.spread(10**6, lambda *_: first.append(threading.get_ident()))
+    assert first[0] == threading.get_ident()
+    assert len(set(first)) > 1
+
+
 # ------------------------------------------------------------------------------- who calls
 
 

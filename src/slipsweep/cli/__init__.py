@@ -122,7 +122,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _spare_time() -> None:
-    """Leave out a half of the 1.2 s of processor that a run of one cell takes: looking for garbage, and BLAS."""
+    """Leave out a half of the 1.2 s of processor that a run of one cell takes: garbage, BLAS, plugins."""
     # imports make objects by the hundred thousand, none of them garbage, and it is looked for after every 700; with
     # 100,000 in its place a run takes 8 % longer
     gc.set_threshold(1_000_000, 20, 100)
@@ -130,6 +130,8 @@ def _spare_time() -> None:
     atexit.register(gc.freeze)
     # numpy and scipy each start a thread a core for linear algebra, of which there is none: they spin, then wait
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # pydantic looks for plugins of its own in all that is installed: 2 % of the time of a small run
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 def _words(error: Any) -> str:

@@ -18,6 +18,7 @@ from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.tables import Empty
+from slipsweep.jit.decorators import of_arrays
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import newmark as newmark_kernels
 from slipsweep.kernels.block import Cell, Options
@@ -38,6 +39,7 @@ from slipsweep.kernels.grid import (
 from slipsweep.kernels.sine.cells import room_of
 from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
 from slipsweep.kernels.step.table import steps_of
+from slipsweep.model import equations as eq
 from slipsweep.model.options import Mendez, Model, Newmark, Solver, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, STRENGTHS, Validity
 from slipsweep.motion.amplitude import peak_acceleration
@@ -441,6 +443,12 @@ def amplitudes(asked: Request) -> Arrays:
         np.copyto(values, peak_acceleration(asked.arrays["displacement_amplitude"], asked.arrays["frequency"]))
     asked.tell(math.prod(asked.shape))
     return results
+
+
+def coulomb_yield_acceleration(theta: Array, mu_s: Array, g: float) -> Array:
+    """Üy of Coulomb interfaces, m/s²; shapes as they broadcast."""
+    with np.errstate(all="ignore"):  # infinite where a surface is overhanging
+        return np.asarray(of_arrays(eq.coulomb_yield_acceleration)(mu_s, np.tan(np.radians(theta)), g))
 
 
 def _fill(

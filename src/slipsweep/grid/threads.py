@@ -40,7 +40,7 @@ def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1)
     cells : int
         Number of cells.
     work : callable
-        Does a part; the first exception of any part ends the whole.
+        Does a part, or none of it, ``work(0, 0)``; the first exception of any part ends the whole.
     work_per_cell : int
         What a cell takes, in cells of the cycle solver.
     """
@@ -65,6 +65,8 @@ def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1)
             raise
 
     others = min(threads - 1, (cells - 1) // least)
+    if others:
+        work(0, 0)  # what a first call compiles, seconds long, is compiled on the thread that hears Ctrl-C
     with ThreadPoolExecutor(max(others, 1)) as pool:  # starts as many threads as are submitted to
         try:
             futures = [pool.submit(take_parts) for _ in range(others)]

@@ -32,3 +32,8 @@ in_lanes = _part(fastmath={"contract", "arcp"}, forceinline=True)
 
 #: The same for elementary functions, which have no division to share.
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
+
+
+def of_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
+    """What was decorated, in Python: where all it does is arithmetic, it takes arrays."""
+    return getattr(function, "py_func", function)
