@@ -12,6 +12,7 @@ from mpmath import mp, mpf, workdps
 
 import slipsweep
 from slipsweep.errors import InputError
+from slipsweep.model import equations as eq
 from slipsweep.model.variables import DEFAULT_RESULTS, VALUELESS, Validity
 from tests.support import reference, strategies
 from tests.support.cases import choices
@@ -20,6 +21,8 @@ SOLVERS = pytest.mark.parametrize("solver", ["cycle", "step"])
 
 #: Steps for which a mendez cell of the step solver is compared (a few for what does not depend on them).
 FINE, COARSE = 8192, 256
+
+G = 9.81
 
 
 def respond(cell: strategies.Cell, **changes: Any) -> xr.Dataset:
@@ -501,3 +504,35 @@ def test_grazing_displacement_has_its_leading_term() -> None:
             exact = reference.solve(10.0, 0.6, amplitude, 1.0, yield_acceleration=onset, cycles=1, model="newmark")
             error = abs(mpf(value(result)) - exact.permanent_displacement) / exact.permanent_displacement
             assert error < 8 * mp.mpf(2) ** -52 / excess, "no digits lost beyond those of A/Uy - 1"
+
+
+# Continuous sliding by steps
+
+
+@strategies.reproducible
+@given(
+    mu_s=st.floats(0.05, 1.5),
+    steep=st.floats(0.0, 0.99),
+    delta_mu=st.floats(1e-6, 1.0),
+    e_foldings=st.floats(1e-3, 300.0),
+    top=st.floats(1e-3, 50.0),
+)
+def test_relative_acceleration_turns_as_the_step_solver_relies_on(
+    mu_s: float, steep: float, delta_mu: float, e_foldings: float, top: float
+) -> None:
+    """Where Üg > 0 D goes from below 0 at most up and then down through it; where Üg < 0 at most down and then up."""
+    tan_theta = steep * mu_s
+    assume(top * tan_theta < G)
+    decay = e_foldings / top
+
+    def signs(side: float) -> list[float]:
+        rates = []
+        for x in np.linspace(0.0, top, 1001) * side:
+            friction = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
+            rates.append(eq.relative_acceleration(x, friction, mu_s, tan_theta, G))
+        # smaller ones may be rounding
+        clear = np.sign([rate for rate in rates if abs(rate) > 1e-13 * G])
+        return [int(sign) for sign in clear[np.flatnonzero(np.diff(clear, prepend=0.0))]]
+
+    assert signs(1.0) in ([-1], [-1, 1], [-1, 1, -1])
+    assert signs(-1.0) in ([1], [1, -1], [1, -1, 1])

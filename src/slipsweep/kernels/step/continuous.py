@@ -12,12 +12,15 @@ from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block, Motion, friction, relative_acceleration
 from slipsweep.kernels.excitation import offset_at, plane
 from slipsweep.kernels.pulse import DISPLACEMENT, PEAK, VELOCITY
-from slipsweep.kernels.step.lanes import MIDDLE, RATE, Room, advance, eq4_rates, steps_to_turn
+from slipsweep.kernels.step.lanes import MIDDLE, RATE, Room, advance, eq4_rates, node_rate, steps_to_turn, take_followed
 from slipsweep.kernels.step.rates import SIMPSON, coefficients, take, velocity_gain
 from slipsweep.kernels.step.slides import LAYER, LEAST_STEP, SHARE_OF_CYCLE, layer_of, reset_state
 from slipsweep.kernels.step.table import AHEAD, Steps, node
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import BEGIN, FINISH, FIRST, LAST, TOP
+
+#: From so many steps on a piece's are summed at once: to find the one in which V turns takes as long as 20 to 60.
+_AT_ONCE = 2 * AHEAD
 
 
 class Gain(NamedTuple):
@@ -85,9 +88,38 @@ def in_layer(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> b
 
 
 @scalar
+def turning_step(block: Block, steps: Steps, p: int, i: int, until: int) -> int:
+    """Of steps i to `until` of piece p the one in which the rate of V falls through 0; `until` if none; -1: not known.
+
+    As |Üg| grows D bends upwards; where Üg > 0 only up to the inflection, and from D = −g Δμ on.  It has one zero at
+    most between places where its signs differ, and none where Üg > 0 between those where it is positive.
+    """
+    at, upper = steps.offset[p], steps.wave.pieces[p, TOP] > 0.0
+    rate, rate_end = node_rate(block, steps.nodes, at + i), node_rate(block, steps.nodes, at + until)
+    known = block.delta_mu > 0.0 or not upper
+    if known and (rate < 0.0 < rate_end or (upper and min(rate, rate_end) > 0.0)):
+        return until
+    if not known or not rate > 0.0 > rate_end:
+        return -1
+    low, high = i + 1, until
+    while high > low:  # the first node at which D < 0
+        middle = (low + high) // 2
+        low, high = (low, middle) if node_rate(block, steps.nodes, at + middle) < 0.0 else (middle + 1, high)
+    return low - 1
+
+
+@scalar
 def steps_along(block: Block, p: int, i: int, until: int, room: Room) -> None:
     """Steps i to `until` of piece p."""
     steps, state, lanes = room.steps, room.state, room.lanes
+    turn = turning_step(block, steps, p, i, until) if state[LAYER] == 0.0 and until - i >= _AT_ONCE else -1
+    if turn >= 0:
+        take_followed(block, steps, p, i, turn, state)
+        if turn < until:
+            tau, tau_end = node(steps, p, turn), node(steps, p, turn + 1)
+            continuous_step(block, steps.rule, steps, steps.wave.pieces, p, tau, tau_end, state)
+            take_followed(block, steps, p, turn + 1, until, state)
+        return
     while i < until:
         at, most = steps.offset[p] + i, min(until - i, AHEAD - 1)
         eq4_rates(block, steps.nodes, at, most, RATE, lanes)

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.decorators import scalar, summed
-from slipsweep.kernels.block import Block
+from slipsweep.kernels.block import Block, relative_acceleration
 from slipsweep.kernels.pulse import DISPLACEMENT, LEAST, PEAK, VELOCITY
+from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON
 from slipsweep.kernels.step.slides import STATE_SIZE
 from slipsweep.kernels.step.table import AHEAD, Steps
 from slipsweep.model import equations as eq
@@ -49,6 +50,53 @@ def eq4_rates(block: Block, w: np.ndarray, at: int, most: int, row: int, lanes: 
         x = amplitude * source[k]
         mu = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
         target[k] = eq.relative_acceleration(x, mu, mu_s, tan_theta, g)
+
+
+@summed
+def _eq4_sums(block: Block, w: np.ndarray, at: int, count: int) -> tuple[float, float]:
+    """Σ D and Σ k D over the nodes w[at + k], k < `count`, in whole registers."""
+    amplitude, mu_s, tan_theta, g = block.amplitude, block.mu_s, block.tan_theta, block.g
+    delta_mu, decay = block.delta_mu, block.decay_rate / block.g
+    total, late, number = 0.0, 0.0, 0.0
+    most = (count | 7) + 1
+    source = w[at : at + most]
+    for k in range(most):
+        x = amplitude * source[k]
+        mu = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
+        rate = eq.relative_acceleration(x, mu, mu_s, tan_theta, g)
+        rate = rate if k < count else 0.0
+        total += rate
+        late += number * rate
+        number += 1.0
+    return total, late
+
+
+@scalar
+def node_rate(block: Block, w: np.ndarray, at: int) -> float:
+    """D at a node."""
+    return relative_acceleration(block, block.amplitude * w[at])
+
+
+@scalar
+def take_followed(block: Block, steps: Steps, p: int, i: int, until: int, state: np.ndarray) -> None:
+    """Take steps i to `until` of piece p by Eq. 4, in which V neither turns from growing nor is kept from falling."""
+    at, count, h = steps.offset[p] + i, until - i, steps.length[p]
+    weights, velocity = steps.weights, state[VELOCITY]
+    starts, starts_late = _eq4_sums(block, steps.nodes, at, count)
+    middles, middles_late = 0.0, 0.0
+    if steps.rule == SIMPSON:
+        middles, middles_late = _eq4_sums(block, steps.middles, at, count)
+    ends, ends_late = 0.0, 0.0
+    if steps.rule != RECTANGLE:
+        rate_end = node_rate(block, steps.nodes, at + count)
+        ends = starts - node_rate(block, steps.nodes, at) + rate_end
+        ends_late = starts_late + count * rate_end - ends
+    gain = weights[p, 0] * starts + weights[p, 1] * middles + weights[p, 2] * ends
+    late = weights[p, 0] * starts_late + weights[p, 1] * middles_late + weights[p, 2] * ends_late
+    moved = weights[p, 3] * starts + weights[p, 4] * middles + weights[p, 5] * ends
+    state[DISPLACEMENT] += velocity * h * count + moved + h * ((count - 1.0) * gain - late)
+    state[VELOCITY] = velocity + gain
+    state[PEAK] = max(state[PEAK], velocity + gain)
 
 
 @scalar

@@ -48,6 +48,7 @@ from slipsweep.kernels.step.lanes import (
     eq4_rates,
     first_event,
     held_rates,
+    take_followed,
 )
 from slipsweep.kernels.step.rates import SIMPSON, coefficients, take
 from slipsweep.kernels.step.slides import (
@@ -308,17 +309,24 @@ def rise_ahead(block: Block, p: int, i: int, state: np.ndarray, room: Room) -> i
 
 @scalar
 def quiet_steps(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> int:
-    """Steps from i on, on the rise, in which nothing happens to a block at rest or under the hold; -1 if not known.
+    """Steps from i on, on the rise, in which nothing happens; -1 if not known.
 
-    Beyond the inflection E is convex, so that E − b and D each change their sign once at most.
+    Beyond the inflection E is convex, so that it grows on where it grows, and E − b and D each change their sign once
+    at most, D not at all between two places where it is positive.
     """
     at, end, slides, held = steps.offset[p], steps.counts[p], state[SLIDES] > 0.0, state[HELD]
+    follows = slides and state[FOLLOWS] > 0.0
     x, top = block.amplitude * steps.nodes[at + i], block.amplitude * steps.nodes[at + end]
-    if slides and (state[FOLLOWS] > 0.0 or x < held):
+    if slides and not follows and x < held:
         return -1
     if block.rise == NEWMARK:
         return end - i if slides else -1
-    if x < max(inflection(block), block.yield_acceleration) or state[TOUCH] < math.inf:
+    if x < inflection(block):
+        return -1
+    if follows:
+        grows = relative_acceleration(block, x) > 0.0 and relative_acceleration(block, top) > 0.0
+        return end - i if grows and (block.rise == LITERAL or response_and_slope(block, x)[1] > 0.0) else -1
+    if x < block.yield_acceleration or state[TOUCH] < math.inf:
         return -1
     if slides:
         if response(block, top) <= held:
@@ -340,6 +348,20 @@ def quiet_steps(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -
 
 
 @scalar
+def take_quiet(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> int:
+    """Take the steps from i on, on the rise, in which nothing happens; how many, -1 if not known."""
+    quiet = quiet_steps(block, steps, p, i, state)
+    if quiet <= 0 or state[SLIDES] == 0.0:
+        return quiet
+    if state[FOLLOWS] == 0.0:
+        take_held(block, steps, p, i, i + quiet, state)
+    else:
+        take_followed(block, steps, p, i, i + quiet, state)
+        state[HELD] = response(block, block.amplitude * steps.nodes[steps.offset[p] + i + quiet])
+    return quiet
+
+
+@scalar
 def rise_steps(block: Block, pieces: np.ndarray, room: Room, p: int, tau: float, x: float, state: np.ndarray) -> None:
     """Along piece p, on which Üg > 0 does not fall, from τ on, where Üg = x."""
     steps = room.steps
@@ -349,9 +371,7 @@ def rise_steps(block: Block, pieces: np.ndarray, room: Room, p: int, tau: float,
     i += 1
     while i < steps.counts[p]:
         if state[SLIDES] == 0.0 or (state[REACH] == -math.inf and state[LAYER] == 0.0):
-            quiet = quiet_steps(block, steps, p, i, state)
-            if quiet > 0 and state[SLIDES] > 0.0:
-                take_held(block, steps, p, i, i + quiet, state)
+            quiet = take_quiet(block, steps, p, i, state)
             taken = quiet if quiet >= 0 else rise_ahead(block, p, i, state, room)
             i += taken
             if quiet < 0 and taken == AHEAD - 1:
