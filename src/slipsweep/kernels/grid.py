@@ -124,60 +124,59 @@ def gather(grid: Grid, begin: int, count: int, inputs: tuple[np.ndarray, ...], t
 
 
 @scalar
-def scatter(grid: Grid, tile: Tile, count: int, periods: np.ndarray, results: Results) -> None:
-    """Spread the solved cells of `count` runs over their frequencies: u = W/ω², v = V/ω (the scaling law).
-
-    Rows of codes are spread one by one (`spread_codes`), as the arrays they go to have types of their own.
-    """
+def scatter(grid: Grid, tile: Tile, count: int, row: int, periods: np.ndarray, target: np.ndarray) -> None:
+    """Spread a row of motion of `count` runs over their frequencies: u = W/ω², row 0, or v = V/ω (the scaling law)."""
     frequencies, step, stride = grid.frequencies, grid.frequency_stride, grid.result_stride
     period_stride, cell_stride = grid.strides[7, -1], grid.strides[8, -1]
-    for run in range(count):
+    for run in range(count if target.size else 0):
         begin, end = tile.first[run], tile.first[run + 1]
         period, result = tile.period[run], tile.result[run]
-        if results.displacement.size and frequencies == 1 and period_stride == 0 and cell_stride == 1:
+        if frequencies == 1 and period_stride == 0 and cell_stride == 1:
             # slices, which numba knows to begin at 0: a loop in SIMD
-            moved, target = tile.motion[0, begin:end], results.displacement[result : result + end - begin]
-            scale = periods[period] * periods[period]
+            moved, found = tile.motion[row, begin:end], target[result : result + end - begin]
+            scale = periods[period] if row else periods[period] * periods[period]
             for j in range(end - begin):
-                target[j] = moved[j] * scale
-        elif results.displacement.size:
+                found[j] = moved[j] * scale
+        else:
             for j in range(end - begin):
-                w, from_, to = tile.motion[0, begin + j], period + j * period_stride, result + j * cell_stride
+                moved_j, from_, to = tile.motion[row, begin + j], period + j * period_stride, result + j * cell_stride
                 if step == 1 and stride == 1:
-                    seconds, target = periods[from_ : from_ + frequencies], results.displacement[to : to + frequencies]
+                    seconds, found = periods[from_ : from_ + frequencies], target[to : to + frequencies]
                     for k in range(frequencies):
-                        target[k] = w * (seconds[k] * seconds[k])
+                        found[k] = moved_j * (seconds[k] if row else seconds[k] * seconds[k])
                 else:
                     for k in range(frequencies):
                         second = periods[from_ + k * step]
-                        results.displacement[to + k * stride] = w * (second * second)
-        if results.velocity.size:
-            for j in range(end - begin):
-                v, from_, to = tile.motion[1, begin + j], period + j * period_stride, result + j * cell_stride
-                if step == 1 and stride == 1:
-                    seconds, target = periods[from_ : from_ + frequencies], results.velocity[to : to + frequencies]
-                    for k in range(frequencies):
-                        target[k] = v * seconds[k]
-                else:
-                    for k in range(frequencies):
-                        results.velocity[to + k * stride] = v * periods[from_ + k * step]
+                        target[to + k * stride] = moved_j * (second if row else second * second)
 
 
 @scalar
 def spread_codes(grid: Grid, tile: Tile, count: int, row: int, target: np.ndarray) -> None:
     """Spread a row of codes of `count` runs over their frequencies."""
-    cell_stride = grid.strides[8, -1]
+    frequencies, stride, cell_stride = grid.frequencies, grid.result_stride, grid.strides[8, -1]
     for run in range(count if target.size else 0):
         begin, end, result = tile.first[run], tile.first[run + 1], tile.result[run]
-        for j in range(end - begin):
-            for k in range(grid.frequencies):
-                target[result + j * cell_stride + k * grid.result_stride] = tile.codes[row, begin + j]
+        if frequencies == 1 and cell_stride == 1:
+            codes, found = tile.codes[row, begin:end], target[result : result + end - begin]
+            for j in range(end - begin):
+                found[j] = codes[j]
+        else:
+            for j in range(end - begin):
+                code, to = tile.codes[row, begin + j], result + j * cell_stride
+                if stride == 1:
+                    found = target[to : to + frequencies]
+                    for k in range(frequencies):
+                        found[k] = code
+                else:
+                    for k in range(frequencies):
+                        target[to + k * stride] = code
 
 
 @scalar
 def spread(grid: Grid, tile: Tile, count: int, periods: np.ndarray, results: Results) -> None:
     """Spread W, V, mode and validity of `count` runs."""
-    scatter(grid, tile, count, periods, results)
+    scatter(grid, tile, count, 0, periods, results.displacement)
+    scatter(grid, tile, count, 1, periods, results.velocity)
     spread_codes(grid, tile, count, 0, results.codes[0])
     spread_codes(grid, tile, count, 1, results.codes[1])
 
@@ -251,7 +250,8 @@ def place_recorded(
 ) -> None:
     """Place the results of a tile of cells under a record: W, V, three counts and validity."""
     note_unsolved(begin, count, tile.codes[3], results)
-    scatter(grid, tile, runs, periods, results)
+    scatter(grid, tile, runs, 0, periods, results.displacement)
+    scatter(grid, tile, runs, 1, periods, results.velocity)
     spread_codes(grid, tile, runs, 0, results.codes[0])
     spread_codes(grid, tile, runs, 1, results.codes[1])
     spread_codes(grid, tile, runs, 2, results.codes[2])
