@@ -40,8 +40,6 @@ from slipsweep.kernels.sine.lanes import (
     CONVERGED,
     GAIN,
     HALF_PI,
-    LANE_NODES,
-    LANE_WEIGHTS,
     MOMENT,
     MOVED,
     PEAK,
@@ -55,9 +53,10 @@ from slipsweep.kernels.sine.roots import TURN, settle
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import Wave
 
-#: Before Üg = Üy, on the first 0.6 radians of the cycle at most, 8 nodes are wrong by 4e-14 of that part at most.
+#: On the first 0.6 radians of the cycle 8 nodes are wrong by 4e-14 of that part at most; on the whole quarter by 1e-13,
+#: where friction falls by no more than e.
 SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
-SHORT_SINE = math.sin(0.6)
+SHORT_SINE, SHORT_E_FOLDINGS = math.sin(0.6), 1.0
 
 #: Coefficients, highest first, of ∫ e^(−k sin φ) dφ over [0, π/2] in powers of 4 − k: integrals of
 #: sinⁿ e^(−4 sin) / n!, all positive, on 8 panels of 8 nodes (more on fewer panels have weights that
@@ -217,14 +216,22 @@ def quarter_integrals(k: float) -> tuple[float, float]:
     return first, second
 
 
+@in_lanes
+def lane_turn_start(lanes: np.ndarray, j: int) -> float:
+    """From where Newton goes to D = 0: nearly where μ = μs, after ln(1 + r) e-foldings, r = Δμ/μs, by 2r/(2 + r)."""
+    delta_mu = lanes[DELTA_MU + j]
+    return 2.0 * delta_mu / ((2.0 * lanes[MU_S + j] + delta_mu) * lanes[DECAY + j])
+
+
 @scalar
 def lane_turns(g: float, lanes: np.ndarray) -> None:
     """What the peak velocity needs of both half cycles: rows DIP and X.
 
     DIP is ∫ D dψ on the rise of the positive one, from Üg = 0 up to where D changes sign, 0 where it does not; X the
     largest V of a negative one entered with V = 0.  D is -side g Δμ at Üg = 0.  On the positive half it is concave (by
-    `kind_of`), on the negative one convex (as long as the block does not lift off): it changes sign once at most, and
-    Newton comes there from Üg = 0 without passing it.
+    `kind_of`), on the negative one convex (as long as the block does not lift off): it changes sign once at most.
+    Where μ = μs it is −tan² θ |Üg|: before the zero on the positive half, behind it on the negative one, from where
+    Newton passes it once, and not again.
     """
     for side in (1.0, -1.0):
         for j in range(STRIP):
@@ -235,14 +242,16 @@ def lane_turns(g: float, lanes: np.ndarray) -> None:
             monotone = slope >= 0.0
             lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
             lanes[PSI + j] = 0.0 if turns else 1.0
-            lanes[X + j] = 0.0
+            lanes[X + j] = lane_turn_start(lanes, j) if turns else 0.0
         settle(TURN, X, PSI, side, g, lanes)
         for j in range(STRIP):
-            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
-            lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], lanes[AMPLITUDE + j])
+            amplitude = lanes[AMPLITUDE + j]
+            short = (lanes[X + j] <= SHORT_SINE * amplitude) | (lanes[DECAY + j] * amplitude <= SHORT_E_FOLDINGS)
+            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j]) if short else 0.0
+            lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], amplitude)
             lanes[RATE + j] = 0.0
-        for node in range(LANE_NODES.size):
-            at, weight = LANE_NODES[node], LANE_WEIGHTS[node]
+        for node in range(SHORT_NODES.size):
+            at, weight = SHORT_NODES[node], SHORT_WEIGHTS[node]
             for j in range(STRIP):
                 phi = lanes[PSI + j] * at
                 x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
