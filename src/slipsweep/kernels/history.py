@@ -12,7 +12,7 @@ from slipsweep.jit.cache import Kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block, Options, block_at, cell_of, response
 from slipsweep.kernels.cycle.eq4 import eq4_integrals
-from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, MOST_LEGS, Room, room_of
+from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, MOST_LEGS, STATE_SIZE, Room, room_of
 from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
 from slipsweep.kernels.pulse import beginning, first_pulse
@@ -54,9 +54,10 @@ def ground_history(block: Block, options: Options, wave: Wave, phases: np.ndarra
 
 @scalar
 def sample_leg(
-    block: Block, wave: Wave, legs: np.ndarray, row: int, phi: float, sample: np.ndarray, displacement: float
+    block: Block, wave: Wave, room: Room, row: int, phi: float, sample: np.ndarray, displacement: float
 ) -> None:
     """Fill Ü, V and W, `displacement` at the beginning of the pulse, at phase φ of the table on a leg."""
+    legs = room.legs
     kind, p, tau = int(legs[row, 0]), int(legs[row, 1]), legs[row, 2]
     since, b, velocity, moved = phi - legs[row, 3], legs[row, 5], legs[row, 6], legs[row, 7]
     if kind == ATTENUATE:
@@ -64,7 +65,7 @@ def sample_leg(
         gained, gained_displacement = -b * since, -0.5 * b * since * since
     elif kind == FOLLOW:
         sample[BLOCK] = response(block, sample[GROUND])
-        gained, gained_displacement = eq4_integrals(block, wave.pieces, p, tau, tau + since)
+        gained, gained_displacement = eq4_integrals(block, wave.pieces, p, tau, tau + since, room.state)
     else:
         sample[BLOCK] = b
         gained, gained_displacement = held_integrals(wave.pieces, p, block.amplitude, b, tau, tau + since)
@@ -78,7 +79,7 @@ def history_room(wave: Wave) -> Room:
     longest = 0
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
-    return room_of(longest * MOST_LEGS + wave.pieces.shape[0] + 2)
+    return room_of(longest * MOST_LEGS + wave.pieces.shape[0] + 2, 0)
 
 
 @scalar
@@ -92,14 +93,14 @@ def begins_at(block: Block, wave: Wave, k: int) -> float:
 
 @scalar
 def sample_pulse(
-    block: Block, wave: Wave, legs: np.ndarray, start: float, until: float, offset: float, displacement: float,
+    block: Block, wave: Wave, room: Room, start: float, until: float, offset: float, displacement: float,
     gained: float, phases: np.ndarray, at: int, history: np.ndarray,
 ) -> int:  # fmt: skip
     """Fill Ü, V and W up to phase `until`, from the legs of a pulse that begins at `start`; the first sample beyond.
 
     W is `displacement` before the pulse and `gained` more after it; phases of the table are less by `offset`.
     """
-    row = 1
+    row, legs = 1, room.legs
     while at < phases.size and phases[at] < until:
         phi = phases[at] - offset
         while row <= legs[0, 0] and phi >= legs[row, 4]:
@@ -109,7 +110,7 @@ def sample_pulse(
             moved = gained if row > legs[0, 0] else legs[row, 7]
         history[at, DISPLACEMENT] = displacement + moved
         if row <= legs[0, 0] and phi >= legs[row, 3]:
-            sample_leg(block, wave, legs, row, phi, history[at], displacement)
+            sample_leg(block, wave, room, row, phi, history[at], displacement)
         at += 1
     return at
 
@@ -128,9 +129,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         room.legs[0, 0] = 0.0
         start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, again) + offset
         now = pulse(block, options, wave, room, k, again, velocity)
-        at = sample_pulse(
-            block, wave, room.legs, start, until, offset, displacement, now.displacement, phases, at, history
-        )
+        at = sample_pulse(block, wave, room, start, until, offset, displacement, now.displacement, phases, at, history)
         velocity = now.velocity
         displacement += now.displacement
         if again < stretches and repeat < wave.repeats - 1 and wave.stretch[again, 0] >= wave.cycle[wave.lead + 1]:
@@ -144,7 +143,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
 @scalar
 def sample_following(
     block: Block, wave: Wave, p: int, tau: float, until: int, tau_until: float, offset: float, moving: np.ndarray,
-    phases: np.ndarray, at: int, history: np.ndarray,
+    state: np.ndarray, phases: np.ndarray, at: int, history: np.ndarray,
 ) -> int:  # fmt: skip
     """Fill Ü, V and W under Eq. 4 from τ on piece p to `tau_until` on piece `until`; the first sample beyond.
 
@@ -160,12 +159,12 @@ def sample_following(
         start_phase = phase_at(wave.pieces, q, start) + offset
         while at < phases.size and phases[at] < end_phase + offset:
             since = max(phases[at] - start_phase, 0.0)
-            gained, moved = eq4_integrals(block, wave.pieces, q, start, min(start + since, end))
+            gained, moved = eq4_integrals(block, wave.pieces, q, start, min(start + since, end), state)
             history[at, BLOCK] = response(block, history[at, GROUND])
             history[at, VELOCITY] = moving[0] + gained
             history[at, DISPLACEMENT] = moving[1] + moving[0] * since + moved
             at += 1
-        gained, moved = eq4_integrals(block, wave.pieces, q, start, end)
+        gained, moved = eq4_integrals(block, wave.pieces, q, start, end, state)
         moving[1] += moving[0] * (end - start) + moved
         moving[0] += gained
     return at
@@ -178,7 +177,7 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
     if k == wave.height.size:
         return
     first, began = beginning(block, wave, k)
-    at, moving = 0, np.zeros(2)
+    at, moving, state = 0, np.zeros(2), np.zeros(STATE_SIZE)
     while at < phases.size and phases[at] < phase_at(wave.pieces, first, began):
         at += 1
     for n in range(options.cycles):
@@ -188,7 +187,7 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
             tau = began if p == first and n == c else wave.pieces[p, BEGIN]
             tau_until = wave.pieces[until, BEGIN] if until < wave.pieces.shape[0] else 0.0
             offset = 2.0 * math.pi * (n - c)
-            at = sample_following(block, wave, p, tau, until, tau_until, offset, moving, phases, at, history)
+            at = sample_following(block, wave, p, tau, until, tau_until, offset, moving, state, phases, at, history)
         if c == wave.lead:
             first = 0 if wave.cycle[c] == 0 else min(first, wave.cycle[c])
     for after in range(at, phases.size):
@@ -197,8 +196,8 @@ def continuous_history(block: Block, options: Options, wave: Wave, phases: np.nd
 
 @scalar
 def sample_continuous_pulse(
-    block: Block, wave: Wave, k: int, following: int, peak: float, moving: np.ndarray, times: np.ndarray, at: int,
-    history: np.ndarray,
+    block: Block, wave: Wave, k: int, following: int, peak: float, moving: np.ndarray, state: np.ndarray,
+    times: np.ndarray, at: int, history: np.ndarray,
 ) -> int:  # fmt: skip
     """Fill Ü, v and u of a continuous pulse of a record (`record.continuous_pulse`); the first sample beyond.
 
@@ -208,7 +207,7 @@ def sample_continuous_pulse(
     until, tau_until, ends, begins = end_of_following(block, wave, k, following)
     while at < times.size and times[at] < phase_at(wave.pieces, p, tau):
         at += 1
-    at = sample_following(block, wave, p, tau, until, tau_until, 0.0, moving, times, at, history)
+    at = sample_following(block, wave, p, tau, until, tau_until, 0.0, moving, state, times, at, history)
     held, speed, side = response(block, peak), abs(moving[0]), math.copysign(1.0, moving[0])
     while at < times.size and times[at] < begins:
         since = max(times[at] - ends, 0.0)
@@ -247,12 +246,10 @@ def _record_history(cells: np.ndarray, options: Options, wave: Wave, times: np.n
         now = one_pulse(block, options, wave, k, following, peak, velocity, room)
         if slides_on(block, peak):
             moving[0], moving[1] = velocity, displacement
-            at = sample_continuous_pulse(block, wave, k, following, peak, moving, times, at, history)
+            at = sample_continuous_pulse(block, wave, k, following, peak, moving, room.state, times, at, history)
         else:
             start, until = begins_at(block, wave, k), begins_at(block, wave, following)
-            at = sample_pulse(
-                block, wave, room.legs, start, until, 0.0, displacement, now.displacement, times, at, history
-            )
+            at = sample_pulse(block, wave, room, start, until, 0.0, displacement, now.displacement, times, at, history)
         velocity, displacement = now.velocity, displacement + now.displacement
         k = following
     fill_friction(block, history)

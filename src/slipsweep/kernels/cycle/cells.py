@@ -24,7 +24,7 @@ from slipsweep.motion.pieces import Wave
 
 
 def solver_of(
-    continuous: Callable[[Block, Options, Wave, np.ndarray], Motion],
+    continuous: Callable[[Block, Options, Wave, Room], Motion],
 ) -> Callable[[np.ndarray, int, Options, Wave, Room, np.ndarray, np.ndarray], None]:
     """The jitted solver of a tile's cells, one by one, given how one slides continuously."""
 
@@ -38,7 +38,7 @@ def solver_of(
             codes[0, j], codes[1, j] = block.sliding_mode, validity_before(block, wave)
             motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
             if block.sliding_mode == CONTINUOUS:
-                store_motion(continuous(block, options, wave, room.zeros), j, motion, codes)
+                store_motion(continuous(block, options, wave, room), j, motion, codes)
             elif block.sliding_mode == STICK_SLIP:
                 store_motion(train(block, options, wave, room), j, motion, codes)
 

@@ -1,6 +1,7 @@
 """Continuous sliding under any wave: Eq. 4 over a cycle, and the cycles as a series.
 
-`zeros`, (2, MOST_LEGS), is room for the places at which D changes its sign, on either side of Üg = 0.
+In a `Room`, `crossings`, (2, MOST_LEGS), has the places at which D changes its sign, on either side of Üg = 0, and
+`gains`, (pieces, 5), what the whole pieces of a cycle add (`gains_along`).
 docs/numerics.md#continuous-sliding
 """
 
@@ -19,7 +20,7 @@ from slipsweep.kernels.block import (
     relative_acceleration_root,
 )
 from slipsweep.kernels.cycle.eq4 import eq4_integrals, lag_integrals
-from slipsweep.kernels.cycle.legs import inside, next_break
+from slipsweep.kernels.cycle.legs import Room, inside, next_break
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.kernels.pulse import (
     beginning,
@@ -53,32 +54,53 @@ def zeros_of_relative_acceleration(block: Block, end: float, zeros: np.ndarray) 
 
 
 @scalar
-def follow_through(
-    block: Block, wave: Wave, p: int, tau: float, until: int, tau_until: float, up: int, down: int, zeros: np.ndarray
-) -> tuple[float, float, float]:
-    """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`: gains of V and W, the largest V.
+def sorted_pair(a: float, b: float) -> tuple[float, float]:
+    """The smaller and the larger of two numbers."""
+    return (a, b) if a < b else (b, a)
+
+
+@scalar
+def gains_along(
+    block: Block, wave: Wave, q: int, start: float, end: float, up: int, down: int, room: Room
+) -> tuple[float, float, float, float, float]:
+    """`lag_integrals` over a part of piece q, and the most that V gains up to a zero of D there (−∞, if it has none).
 
     D changes its sign at `up` zeros on the way up from Üg = 0 and at `down` on the way down.
     """
+    side = 1 if wave.pieces[q, TOP] > 0.0 else 0
+    least, most = sorted_pair(block.amplitude * wave.pieces[q, FIRST], block.amplitude * wave.pieces[q, LAST])
+    highest = -math.inf
+    for i in range(up if side == 1 else down):
+        zero = room.crossings[1 - side, i]
+        if least < zero < most:
+            at = offset_at(wave.pieces, q, block.amplitude, zero)
+            if start < at < end:
+                highest = max(highest, eq4_integrals(block, wave.pieces, q, start, at, room.state)[0])
+    first, second, first_x, second_x = lag_integrals(block, wave.pieces, q, start, end, room.state)
+    return first, second, first_x, second_x, highest
+
+
+@scalar
+def follow_cycle(
+    block: Block, wave: Wave, c: int, p: int, tau: float, up: int, down: int, room: Room
+) -> tuple[float, float, float]:
+    """Eq. 4 from rest, τ on piece p, to the end of cycle c, whose `gains` are known: of V and W, the largest V."""
     velocity, displacement, peak = 0.0, 0.0, 0.0
     above, below, both = 0.0, 0.0, 0.0
-    for q in range(p, min(until + 1, wave.pieces.shape[0])):
-        start = tau if q == p else wave.pieces[q, BEGIN]
-        end = tau_until if q == until else wave.pieces[q, FINISH]
-        if end <= start:
-            continue
-        side = 1 if wave.pieces[q, TOP] > 0.0 else 0
-        least, most = sorted_pair(block.amplitude * wave.pieces[q, FIRST], block.amplitude * wave.pieces[q, LAST])
-        for i in range(up if side == 1 else down):
-            zero = zeros[1 - side, i]
-            if least < zero < most:
-                at = offset_at(wave.pieces, q, block.amplitude, zero)
-                if start < at < end:
-                    peak = max(peak, velocity + eq4_integrals(block, wave.pieces, q, start, at)[0])
-        first, second, first_x, second_x = lag_integrals(block, wave.pieces, q, start, end)
-        side_g = block.g if side == 1 else -block.g
+    for q in range(p, wave.cycle[c + 1]):
+        row, start, end = q - wave.cycle[c], wave.pieces[q, BEGIN], wave.pieces[q, FINISH]
+        first, second, first_x = room.gains[row, 0], room.gains[row, 1], room.gains[row, 2]
+        second_x, highest = room.gains[row, 3], room.gains[row, 4]
+        if q == p and tau > start:
+            start = tau
+            if start >= end:
+                continue
+            first, second, first_x, second_x, highest = gains_along(block, wave, q, tau, end, up, down, room)
+        upper = wave.pieces[q, TOP] > 0.0
+        peak = max(peak, velocity + highest)
+        side_g = block.g if upper else -block.g
         displacement += velocity * (end - start) + side_g * second + block.tan_theta * second_x
-        if side == 1:
+        if upper:
             above += first
         else:
             below += first
@@ -89,23 +111,7 @@ def follow_through(
 
 
 @scalar
-def continuous_cycle(
-    block: Block, wave: Wave, c: int, p: int, tau: float, up: int, down: int, zeros: np.ndarray
-) -> tuple[float, float, float]:
-    """`follow_through` from τ on piece p to the end of cycle c of the table."""
-    until = wave.cycle[c + 1]
-    tau_until = wave.pieces[until, BEGIN] if until < wave.pieces.shape[0] else 0.0
-    return follow_through(block, wave, p, tau, until, tau_until, up, down, zeros)
-
-
-@scalar
-def sorted_pair(a: float, b: float) -> tuple[float, float]:
-    """The smaller and the larger of two numbers."""
-    return (a, b) if a < b else (b, a)
-
-
-@scalar
-def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) -> Motion:
+def continuous(block: Block, options: Options, wave: Wave, room: Room) -> Motion:
     """Continuous sliding from the first Üg ≥ Üy on: Eq. 4 throughout.
 
     Cycles of one shape give the same gains from rest, so that the repeated ones are an arithmetic series.
@@ -116,8 +122,8 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
     p, tau = beginning(block, wave, k)
     up, down = 0, 0
     if options.wants_peak:
-        up = zeros_of_relative_acceleration(block, block.amplitude * wave.highest, zeros[0])
-        down = zeros_of_relative_acceleration(block, block.amplitude * wave.lowest, zeros[1])
+        up = zeros_of_relative_acceleration(block, block.amplitude * wave.highest, room.crossings[0])
+        down = zeros_of_relative_acceleration(block, block.amplitude * wave.lowest, room.crossings[1])
         if min(up, down) < 0:
             return Motion(math.nan, math.nan, 0)
     velocity, displacement, peak = 0.0, 0.0, 0.0
@@ -126,16 +132,22 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
         if wave.cycle[c + 1] <= p:
             continue
         repeats = wave.repeats if wave.repeats > 0 and c == wave.lead else 1
-        if wave.cycle[c] <= p:
-            velocity, displacement, peak = continuous_cycle(block, wave, c, p, tau, up, down, zeros)
+        begin = wave.cycle[c]
+        if wave.shape[c] != known:
+            for q in range(begin, wave.cycle[c + 1]):
+                first, second, first_x, second_x, most = gains_along(
+                    block, wave, q, wave.pieces[q, BEGIN], wave.pieces[q, FINISH], up, down, room
+                )
+                row = q - begin
+                room.gains[row, 0], room.gains[row, 1], room.gains[row, 2] = first, second, first_x
+                room.gains[row, 3], room.gains[row, 4] = second_x, most
+            gain, moved, highest = follow_cycle(block, wave, c, begin, wave.pieces[begin, BEGIN], up, down, room)
+            known = wave.shape[c]
+        if begin <= p:
+            velocity, displacement, peak = follow_cycle(block, wave, c, p, tau, up, down, room)
             repeats -= 1
         if repeats == 0:
             continue
-        if wave.shape[c] != known:
-            gain, moved, highest = continuous_cycle(
-                block, wave, c, wave.cycle[c], wave.pieces[wave.cycle[c], BEGIN], up, down, zeros
-            )
-            known = wave.shape[c]
         later = repeats - 1.0
         peak = max(peak, max(velocity, velocity + later * gain) + highest)
         displacement += repeats * (moved + math.pi * (2.0 * velocity + gain * later))

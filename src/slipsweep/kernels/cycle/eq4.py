@@ -15,13 +15,13 @@ from slipsweep.kernels.block import (
     Block,
     friction,
 )
-from slipsweep.kernels.cycle.legs import LAGS
+from slipsweep.kernels.cycle.legs import AT_NODES, LAGS, NODE_COUNT, STATE_SIZE
 from slipsweep.kernels.excitation import offset_at, plane
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import ARC, COEFFICIENTS, DEGREE, TERM, TOP
 
-#: 16 Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
-NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
+#: Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
+NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(NODE_COUNT), (1.0, 0.0), strict=True))
 
 #: Where panels of the quadrature end, in e-foldings of the friction from the end where it is larger;
 #: past the third it has decayed to 1e-18.
@@ -84,7 +84,7 @@ def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: 
 
 @summed
 def curved_lag(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float, state: np.ndarray
 ) -> tuple[float, float, float, float]:
     """`lag_integrals` where |Üg| goes along a curve: Gauss-Legendre quadrature, panel by panel."""
     amplitude, mu_s, kept = block.amplitude, block.mu_s, block.mu_s - block.tan_theta
@@ -94,7 +94,7 @@ def curved_lag(
     e_foldings = decay * abs(x_end - x_start)
     near, far = (start, end) if rising else (end, start)
     first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
-    values = np.empty(NODES.size)
+    values = state[AT_NODES:STATE_SIZE]
     for bound in PANEL_BOUNDS:
         until = far
         if e_foldings > bound:
@@ -119,7 +119,7 @@ def curved_lag(
 
 @scalar
 def lag_integrals(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: np.ndarray
 ) -> tuple[float, float, float, float]:
     """What Eq. 4 takes the block behind the plane over a part of piece p.
 
@@ -131,12 +131,14 @@ def lag_integrals(
     x_end = abs(plane(pieces, p, block.amplitude, end))
     if int(pieces[p, DEGREE]) <= 1:
         return straight_lag(block, x_start, x_end - x_start, end - start)
-    return curved_lag(block, pieces, p, start, end, x_start, x_end)
+    return curved_lag(block, pieces, p, start, end, x_start, x_end, state)
 
 
 @scalar
-def eq4_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float) -> tuple[float, float]:
+def eq4_integrals(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: np.ndarray
+) -> tuple[float, float]:
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest."""
-    first, second, first_x, second_x = lag_integrals(block, pieces, p, start, end)
+    first, second, first_x, second_x = lag_integrals(block, pieces, p, start, end, state)
     side_g = math.copysign(block.g, pieces[p, TOP])
     return side_g * first + block.tan_theta * first_x, side_g * second + block.tan_theta * second_x

@@ -49,8 +49,8 @@ def follow_straight(
     """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`: gains of V and W, the largest V."""
     up, down, rows = 0, 0, room.straight
     if wants_peak:
-        up = zeros_of_relative_acceleration(block, block.amplitude * wave.highest, room.zeros[0])
-        down = zeros_of_relative_acceleration(block, block.amplitude * wave.lowest, room.zeros[1])
+        up = zeros_of_relative_acceleration(block, block.amplitude * wave.highest, room.crossings[0])
+        down = zeros_of_relative_acceleration(block, block.amplitude * wave.lowest, room.crossings[1])
         if min(up, down) < 0:
             return math.nan, math.nan, math.nan
     velocity, displacement, peak = 0.0, 0.0, 0.0
@@ -65,7 +65,7 @@ def follow_straight(
                 continue
             above, n = (0, up) if rows[3 * LAGS + j] > 0.0 else (1, down)
             for i in range(n):
-                zero = abs(room.zeros[above, i])
+                zero = abs(room.crossings[above, i])
                 if min(x, x + change) < zero < max(x, x + change):
                     peak = max(peak, velocity + gain_up_to(block, zero, x, change, width, rows[3 * LAGS + j]))
             displacement += velocity * width + rows[5 * LAGS + j]

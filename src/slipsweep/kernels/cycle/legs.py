@@ -21,6 +21,7 @@ from slipsweep.kernels.pulse import (
     STATE_ROWS,
     VELOCITY,
 )
+from slipsweep.motion.pieces import Wave
 
 #: Signs at the start of a leg are read this fraction of the leg inside it, but no closer to the start than this
 #: fraction of that: where a leg ends at a turn of E, the sign just behind is known only beyond rounding.
@@ -30,7 +31,11 @@ _SLIVER, _ROUNDING = 1e-10, 4.5e-16
 #: onset is known (t1 of a block at rest), and that; the Üg that a rise has come to, at which the leg on hand ends,
 #: whether b follows Eq. 4 on it, and from there on.
 CREST, ONSET_FROM, ONSET, LEG_AT, LEG_END, LEG_FOLLOWS, NEXT_FOLLOWS = range(STATE_ROWS, STATE_ROWS + 7)
-STATE_SIZE = STATE_ROWS + 7
+
+#: From here on Üg at the nodes of a quadrature (`eq4.curved_lag`), and their number: with an array that is made for
+#: each, ramps take 1.1 times as long.
+AT_NODES, NODE_COUNT = STATE_ROWS + 7, 16
+STATE_SIZE = AT_NODES + NODE_COUNT
 
 #: More legs than any rise has: five breaks, and a stop and an onset between each.
 MOST_LEGS = 32
@@ -45,16 +50,28 @@ PULSE_ROWS = 13
 
 
 class Room(NamedTuple):
-    """Where a block is followed: its state, a log of its legs, zeros of D on either side of Üg = 0, and lanes.
+    """Where a block is followed: its state, a log of its legs, room for continuous sliding (`continuous`), and lanes.
+
+    No field is called `zeros` or `empty`: a function with such a name in it would count references (`jit.inner.parts`).
 
     One for all cells: a function that makes an array counts the references to every array it is handed.
     """
 
     state: np.ndarray
     legs: np.ndarray
-    zeros: np.ndarray
+    crossings: np.ndarray
+    gains: np.ndarray
     straight: np.ndarray
     pulses: np.ndarray
+
+
+@scalar
+def longest_cycle(wave: Wave) -> int:
+    """The most pieces that a cycle has."""
+    longest = 0
+    for c in range(wave.shape.size):
+        longest = max(longest, wave.cycle[c + 1] - wave.cycle[c])
+    return longest
 
 
 #: Kinds of legs, and the columns of a log of them, which `history` samples: kind, piece, phase on
@@ -65,12 +82,16 @@ LEG_COLUMNS = 8
 
 
 @scalar
-def room_of(legs: int) -> Room:
-    """Room, with a log of so many legs; made in kernels, where the compiler knows that nothing else lies there."""
+def room_of(legs: int, pieces: int) -> Room:
+    """Room, with a log of so many legs and for cycles of so many pieces.
+
+    It is made in kernels, where the compiler knows that nothing else lies there.
+    """
     return Room(
         np.zeros(STATE_SIZE),
         np.zeros((legs, LEG_COLUMNS)),
         np.empty((2, MOST_LEGS)),
+        np.empty((pieces, 5)),
         np.empty(6 * LAGS),
         np.empty(PULSE_ROWS * PULSES),
     )

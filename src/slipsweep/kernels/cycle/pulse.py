@@ -112,10 +112,10 @@ def _held_lost(where: tuple[Block, np.ndarray, int, float, float, float], tau: f
 
 
 @scalar
-def _followed_lost(where: tuple[Block, np.ndarray, int, float, float], tau: float) -> tuple[float, float]:
+def _followed_lost(where: tuple[Block, np.ndarray, int, float, float, np.ndarray], tau: float) -> tuple[float, float]:
     """−V at τ where b follows Eq. 4, and its rate."""
-    block, pieces, p, velocity, start = where
-    left = velocity + eq4_integrals(block, pieces, p, start, tau)[0]
+    block, pieces, p, velocity, start, state = where
+    left = velocity + eq4_integrals(block, pieces, p, start, tau, state)[0]
     return -left, -relative_acceleration(block, plane(pieces, p, block.amplitude, tau))
 
 
@@ -194,12 +194,12 @@ def follow(
     block: Block, pieces: np.ndarray, legs: np.ndarray, p: int, start: float, end: float, state: np.ndarray
 ) -> float:
     """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop: where that is."""
-    gained, moved = eq4_integrals(block, pieces, p, start, end)
+    gained, moved = eq4_integrals(block, pieces, p, start, end, state)
     stops = state[VELOCITY] + gained <= 0.0
     if stops:
         velocity = state[VELOCITY]
-        end = _followed_stop((block, pieces, p, velocity, start), start, end, 0.5 * (start + end), start)
-        gained, moved = eq4_integrals(block, pieces, p, start, end)
+        end = _followed_stop((block, pieces, p, velocity, start, state), start, end, 0.5 * (start + end), start)
+        gained, moved = eq4_integrals(block, pieces, p, start, end, state)
     log_leg(legs, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end), state)
     advance(pieces, p, end, stops, gained, moved, end - start, state)
     return end

@@ -32,7 +32,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.cycle.continuous import continuous as continuous_of_any_wave
 from slipsweep.kernels.cycle.eq4 import NODES, PANEL_BOUNDS, WEIGHTS
-from slipsweep.kernels.cycle.legs import MOST_LEGS, inside, next_break
+from slipsweep.kernels.cycle.legs import MOST_LEGS, Room, inside, next_break
 from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
     CARRIED,
@@ -154,7 +154,7 @@ def continuous_peak(missed: float, drift: float, first: float, positive: float, 
 
 
 @scalar
-def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) -> Motion:
+def continuous(block: Block, options: Options, wave: Wave, room: Room) -> Motion:
     """Continuous sliding from the first Üg = Üy on: Eq. 4 throughout.  Takes what `continuous_of_any_wave` does.
 
     |Üg| and the friction repeat every quarter cycle, mirrored, so that integrals over a
@@ -171,7 +171,7 @@ def continuous(block: Block, options: Options, wave: Wave, zeros: np.ndarray) ->
         negative = 2.0 * up + continuous_peaks(block, -1.0, drift - 2.0 * up, 0.0)[1]
         peak = continuous_peak(missed, drift, first, positive, negative, options.cycles)
     if options.wants_peak and math.isnan(peak):  # an event was not found
-        return continuous_of_any_wave(block, options, wave, zeros)
+        return continuous_of_any_wave(block, options, wave, room)
     # no event enters the displacement: it is no number only where sums overflow
     return Motion(math.inf if math.isnan(displacement) else displacement, peak, 0)
 
