@@ -29,6 +29,8 @@ from slipsweep.motion.pieces import (
     TERM,
     TOP,
     TWICE,
+    WHOLE,
+    WHOLE_MOMENT,
 )
 
 
@@ -71,6 +73,8 @@ def integral(pieces: np.ndarray, p: int, start: float, end: float) -> float:
 @scalar
 def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
+    if start == pieces[p, BEGIN] and end == pieces[p, FINISH]:
+        return pieces[p, WHOLE], pieces[p, WHOLE_MOMENT]
     if pieces[p, ARC] > 0.0:
         sine_part = angle_minus_sine(start)
         remaining = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)

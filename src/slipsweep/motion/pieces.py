@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 #: (0 on a plateau, 1 on a straight line), 1 where w jumps up at its beginning, and 1 where it is a quarter
 #: of a sine about its peak, whose closed forms are shorter than its series.
 START, END, BEGIN, FINISH, FIRST, LAST, TOP, DEGREE, JUMPS, ARC = range(10)
+#: ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over the whole piece.
+WHOLE, WHOLE_MOMENT = 10, 11
 #: c₁, and the first ones of the sum's first and second integral from the anchor, τ² and τ³; those of the
 #: next power follow `TERM` columns on, as many as the longest series in a table has terms.
-COEFFICIENTS, ONCE, TWICE = 10, 11, 12
+COEFFICIENTS, ONCE, TWICE = 12, 13, 14
 TERM = 3
 
 
@@ -88,12 +90,22 @@ def pieces_of(
         JUMPS: first > np.maximum(before, 0.0),
         ARC: arc,
     }
-    pieces = np.empty((first.size, len(named) + TERM * power.size))
+    pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size))
     for column, values in named.items():
         pieces[:, column] = values
     pieces[:, COEFFICIENTS::TERM] = coefficients
     pieces[:, ONCE::TERM] = coefficients / (power + 1)
     pieces[:, TWICE::TERM] = coefficients / ((power + 1) * (power + 2))
+    # one of the two ends is the anchor
+    tau = np.where(at_end, -length, length)
+    once, moment = np.zeros(first.size), np.zeros(first.size)
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows here, overflows where it is used
+        for k in range(power.size - 1, -1, -1):
+            once = (once + pieces[:, ONCE + TERM * k]) * tau
+            moment = (moment + pieces[:, TWICE + TERM * k]) * tau
+        once, moment = once * tau, moment * tau * tau
+        pieces[:, WHOLE] = np.where(at_end, -once, once)
+        pieces[:, WHOLE_MOMENT] = np.where(at_end, -moment - once * length, moment)
     return pieces
 
 
