@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite
+import llvmlite.binding
 import numba
 from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
 from numba.core.compiler import CompileResult
 from numba.core.registry import CPUDispatcher, cpu_target
-from numba.core.runtime.nrt import rtsys
+from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 
 from slipsweep.jit import folders
@@ -37,7 +38,7 @@ need(
 need(CPUDispatcher, _cache=None)
 need(CFunc, __init__="self pyfunc sig locals options pipeline_class", compile="self", address=None, _cache=None)
 need(type(cpu_target), target_context=None)
-need(type(rtsys), initialize="self ctx")
+need(_nrt_python, c_helpers=None)
 
 
 class Disk(NullCache):
@@ -48,9 +49,11 @@ class Disk(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kernel as numba wants it, or None."""
-        # all that machine code needs of numba is its memory functions; `refresh`, which compiling calls, would
-        # bring whatever may be compiled, scipy's BLAS among it: 0.2 of the 0.85 s that a small run takes
-        rtsys.initialize(target_context)
+        # all that machine code needs of numba is its memory functions by name.  `rtsys.initialize`, which gives them,
+        # compiles some more (17 ms), and `refresh`, which compiling calls, would bring whatever may be compiled,
+        # scipy's BLAS among it: 0.2 of the 0.85 s that a small run takes
+        for name, address in _nrt_python.c_helpers.items():
+            llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
         try:
             content = self.path.read_bytes()
             checksum, data = content[:32], content[32:]

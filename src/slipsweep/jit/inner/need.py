@@ -29,5 +29,6 @@ def need(owner: Any, **names: str | None) -> None:
 
 def _set_by(owner: Any) -> set[str]:
     """Names in the constructors of a class, and in what numba has in their place where an object is made anew."""
-    constructors = (vars(one).get(name) for one in inspect.getmro(owner) for name in ("__init__", "_init"))
+    classes = inspect.getmro(owner) if inspect.isclass(owner) else ()
+    constructors = (vars(one).get(name) for one in classes for name in ("__init__", "_init"))
     return {name for one in constructors if inspect.isfunction(one) for name in one.__code__.co_names}
