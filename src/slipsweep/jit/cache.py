@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numba
 
 from slipsweep.jit import compiling, elsewhere, folders, form, plain, sources
+from slipsweep.jit.frames import with_room
 from slipsweep.jit.garbage import no_collections
 
 #: Versions whose kernels are kept.
@@ -182,7 +183,8 @@ def make(what: ToMake, folder: Path | None, compiling: contextlib.AbstractContex
         # numba's advice is for us, not for those who run a sweep
         warnings.simplefilter("ignore", numba.NumbaWarning)
         try:
-            return what.how(what.function, what.signature, folder, compiling or contextlib.nullcontext())
+            within = compiling or contextlib.nullcontext()
+            return with_room(lambda: what.how(what.function, what.signature, folder, within))
         except Exception as error:
             if form.compiled is not plain.compiled:
                 error.add_note("SLIPSWEEP_PLAIN_NUMBA=1 in the environment compiles by what numba documents alone")
