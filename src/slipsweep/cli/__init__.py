@@ -122,7 +122,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _spare_time() -> None:
-    """Leave out a half of the 1.2 s of processor that a run of one cell takes: garbage, BLAS, plugins."""
+    """Leave out what a short run would spend on garbage, on threads for linear algebra and on plugins."""
     # imports make objects by the hundred thousand, none of them garbage, and it is looked for after every 700; with
     # 100,000 in its place a run takes 8 % longer
     gc.set_threshold(1_000_000, 20, 100)

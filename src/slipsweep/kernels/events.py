@@ -66,3 +66,20 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
         return x if abs(x - origin) <= _AT_ORIGIN * width else math.nan
 
     return root
+
+
+def first_of(holds: Callable[[Any, int], bool]) -> Callable[..., int]:
+    """The jitted search by halves for the first place at which ``holds(where, k)``, which holds from there on.
+
+    Bound here for the same reason.
+    """
+
+    @scalar
+    def first(where: Any, low: int, high: int) -> int:
+        """The first place from `low` on, before `high`; `high` if there is none."""
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if holds(where, middle) else (middle + 1, high)
+        return low
+
+    return first

@@ -10,6 +10,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block, Motion, friction, relative_acceleration
+from slipsweep.kernels.events import first_of
 from slipsweep.kernels.excitation import offset_at, plane
 from slipsweep.kernels.pulse import DISPLACEMENT, PEAK, VELOCITY
 from slipsweep.kernels.step.lanes import MIDDLE, RATE, Room, advance, eq4_rates, node_rate, steps_to_turn, take_followed
@@ -19,7 +20,7 @@ from slipsweep.kernels.step.table import AHEAD, Steps, node
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import BEGIN, FINISH, FIRST, LAST, TOP
 
-#: From so many steps on a piece's are summed at once: to find the one in which V turns takes as long as 20 to 60.
+#: From so many steps on a piece's are summed at once: to find the one in which V turns takes as long as 20 to 60 steps.
 _AT_ONCE = 2 * AHEAD
 
 
@@ -88,6 +89,15 @@ def in_layer(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -> b
 
 
 @scalar
+def _is_falling(where: tuple[Block, np.ndarray, int], k: int) -> bool:
+    block, nodes, at = where
+    return node_rate(block, nodes, at + k) < 0.0
+
+
+_first_falling = first_of(_is_falling)
+
+
+@scalar
 def turning_step(block: Block, steps: Steps, p: int, i: int, until: int) -> int:
     """Of steps i to `until` of piece p the one in which the rate of V falls through 0; `until` if none; -1: not known.
 
@@ -101,11 +111,7 @@ def turning_step(block: Block, steps: Steps, p: int, i: int, until: int) -> int:
         return until
     if not known or not rate > 0.0 > rate_end:
         return -1
-    low, high = i + 1, until
-    while high > low:  # the first node at which D < 0
-        middle = (low + high) // 2
-        low, high = (low, middle) if node_rate(block, steps.nodes, at + middle) < 0.0 else (middle + 1, high)
-    return low - 1
+    return _first_falling((block, steps.nodes, at), i + 1, until) - 1
 
 
 @scalar

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.decorators import in_lanes, scalar, summed
 from slipsweep.kernels.block import Block, relative_acceleration
 from slipsweep.kernels.pulse import DISPLACEMENT, LEAST, PEAK, VELOCITY
 from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON
@@ -39,31 +39,30 @@ def room_of(steps: Steps) -> Room:
     return Room(steps, np.zeros(STATE_SIZE), np.zeros(_LANES_SIZE))
 
 
+@in_lanes
+def _eq4_rate(block: Block, x: float) -> float:
+    """D at Üg = x, for λ/g, which a loop then divides once."""
+    mu = eq.friction_coefficient(x, block.mu_s, block.delta_mu, block.decay_rate / block.g, 1.0)
+    return eq.relative_acceleration(x, mu, block.mu_s, block.tan_theta, block.g)
+
+
 @scalar
 def eq4_rates(block: Block, w: np.ndarray, at: int, most: int, row: int, lanes: np.ndarray) -> None:
     """D at the nodes w[at:] of `most` steps into a row of the lanes, in whole registers."""
-    amplitude, mu_s, tan_theta, g = block.amplitude, block.mu_s, block.tan_theta, block.g
-    delta_mu, decay = block.delta_mu, block.decay_rate / block.g
     count = (most | 7) + 1
     source, target = w[at : at + count], lanes[row : row + count]
     for k in range(count):
-        x = amplitude * source[k]
-        mu = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
-        target[k] = eq.relative_acceleration(x, mu, mu_s, tan_theta, g)
+        target[k] = _eq4_rate(block, block.amplitude * source[k])
 
 
 @summed
 def _eq4_sums(block: Block, w: np.ndarray, at: int, count: int) -> tuple[float, float]:
     """Σ D and Σ k D over the nodes w[at + k], k < `count`, in whole registers."""
-    amplitude, mu_s, tan_theta, g = block.amplitude, block.mu_s, block.tan_theta, block.g
-    delta_mu, decay = block.delta_mu, block.decay_rate / block.g
     total, late, number = 0.0, 0.0, 0.0
     most = (count | 7) + 1
     source = w[at : at + most]
     for k in range(most):
-        x = amplitude * source[k]
-        mu = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
-        rate = eq.relative_acceleration(x, mu, mu_s, tan_theta, g)
+        rate = _eq4_rate(block, block.amplitude * source[k])
         rate = rate if k < count else 0.0
         total += rate
         late += number * rate
@@ -79,7 +78,7 @@ def node_rate(block: Block, w: np.ndarray, at: int) -> float:
 
 @scalar
 def take_followed(block: Block, steps: Steps, p: int, i: int, until: int, state: np.ndarray) -> None:
-    """Take steps i to `until` of piece p by Eq. 4, in which V neither turns from growing nor is kept from falling."""
+    """Take steps i to `until` of piece p by Eq. 4, in which V does not turn from growing to falling."""
     at, count, h = steps.offset[p] + i, until - i, steps.length[p]
     weights, velocity = steps.weights, state[VELOCITY]
     starts, starts_late = _eq4_sums(block, steps.nodes, at, count)

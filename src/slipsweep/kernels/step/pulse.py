@@ -23,6 +23,7 @@ from slipsweep.kernels.block import (
     slope_root,
     starting_acceleration,
 )
+from slipsweep.kernels.events import first_of
 from slipsweep.kernels.excitation import offset_at, phase_at, plane
 from slipsweep.kernels.pulse import (
     DISPLACEMENT,
@@ -112,6 +113,29 @@ def take_one_held(block: Block, steps: Steps, p: int, i: int, state: np.ndarray)
 
 
 @scalar
+def _is_below(where: tuple[np.ndarray, int, float, float], k: int) -> bool:
+    nodes, at, amplitude, level = where
+    return amplitude * nodes[at + k] < level
+
+
+@scalar
+def _has_stopped(where: tuple[Block, Steps, int, int, np.ndarray], k: int) -> bool:
+    block, steps, p, i, state = where
+    return held_velocity(block, steps, p, i, k, state) <= 0.0
+
+
+@scalar
+def _has_reached(where: tuple[np.ndarray, int, float, float], k: int) -> bool:
+    nodes, at, amplitude, level = where
+    return amplitude * nodes[at + k] >= level
+
+
+_first_below = first_of(_is_below)
+_first_stopped = first_of(_has_stopped)
+_first_reached = first_of(_has_reached)
+
+
+@scalar
 def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.ndarray) -> None:
     """Steps i to `until` of piece p, on which Üg falls or is negative, with b held, up to the stop.
 
@@ -119,12 +143,9 @@ def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.n
     """
     steps, level, at = room.steps, state[HELD], room.steps.offset[p]
     if block.amplitude * steps.nodes[at + i] > level:
-        low, high = i, until
-        while high > low:  # the first node at which Üg < b; `until` if none is before it
-            middle = (low + high) // 2
-            low, high = (low, middle) if block.amplitude * steps.nodes[at + middle] < level else (middle + 1, high)
-        turns = block.amplitude * steps.nodes[at + low] < level
-        last = low - 1 if turns else until
+        below = _first_below((steps.nodes, at, block.amplitude, level), i, until + 1)
+        turns = below <= until
+        last = below - 1
         take_held(block, steps, p, i, last, state)
         i = last
         if turns:
@@ -134,15 +155,11 @@ def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.n
         if held_velocity(block, steps, p, i, until, state) > 0.0:
             take_held(block, steps, p, i, until, state)
         else:
-            low, high = i + 1, until
-            while high > low:  # the first node at which V ≤ 0
-                middle = (low + high) // 2
-                stopped = held_velocity(block, steps, p, i, middle, state) <= 0.0
-                low, high = (low, middle) if stopped else (middle + 1, high)
-            take_held(block, steps, p, i, low - 1, state)
-            take_one_held(block, steps, p, low - 1, state)
-            if state[SLIDES] > 0.0 and low < until:  # but for rounding
-                take_one_held(block, steps, p, low, state)
+            stopped = _first_stopped((block, steps, p, i, state), i + 1, until)
+            take_held(block, steps, p, i, stopped - 1, state)
+            take_one_held(block, steps, p, stopped - 1, state)
+            if state[SLIDES] > 0.0 and stopped < until:  # but for rounding
+                take_one_held(block, steps, p, stopped, state)
 
 
 @scalar
@@ -340,11 +357,7 @@ def quiet_steps(block: Block, steps: Steps, p: int, i: int, state: np.ndarray) -
         if relative_acceleration(block, x) >= 0.0:
             return 0
         level = relative_acceleration_root(block, x, top)
-    low, high = i + 1, end
-    while high > low:  # the first node at which Üg ≥ level
-        middle = (low + high) // 2
-        low, high = (low, middle) if block.amplitude * steps.nodes[at + middle] >= level else (middle + 1, high)
-    return low - 1 - i
+    return _first_reached((steps.nodes, at, block.amplitude, level), i + 1, end) - 1 - i
 
 
 @scalar
