@@ -154,6 +154,22 @@ def test_slides_that_run_past_the_end_of_a_cycle(wave: dict[str, Any], given: di
         np.testing.assert_allclose(found[name], exact[name], rtol=1e-7, err_msg=name)
 
 
+@RULES
+def test_a_slide_stops_before_another_positive_wave(rule: str) -> None:
+    """With b below Üy (literal rise) held on, a wave that stays below Üy would take V up again after the stop."""
+    block: dict[str, Any] = {"theta": 8.77, "mu_s": 0.78, "amplitude": 1.06, "frequency": 1.0, "g": 1.62}
+    block |= {"waveform": "harmonics", "harmonics": "0.172:1:180,0.105:2:90,-0.316:4:248.8"}
+    block |= {"rise": "literal", "recoupling": "integrate"}
+    once, exact = (slipsweep.sweep(**choices(**block, cycles=cycles, solver="cycle")) for cycles in (1, 6))
+    assert float(exact.permanent_displacement) == pytest.approx(6 * float(once.permanent_displacement), rel=1e-12)
+    for steps in (1024, 4096):
+        found = slipsweep.sweep(**choices(**block, cycles=6, solver="step", rule=rule, steps_per_cycle=steps))
+        assert int(found.validity) == int(exact.validity)
+        for name in ("permanent_displacement", "peak_relative_velocity"):
+            allowed = 4 * (2 * pi / steps) ** ORDERS[rule]
+            np.testing.assert_allclose(found[name], exact[name], rtol=allowed, err_msg=name)
+
+
 @pytest.mark.parametrize("steps", [8, 1000, 4000])
 @RULES
 def test_a_slide_that_begins_at_the_end_of_a_piece(rule: str, steps: int) -> None:

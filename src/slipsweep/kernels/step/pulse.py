@@ -63,7 +63,7 @@ from slipsweep.kernels.step.slides import (
 )
 from slipsweep.kernels.step.table import AHEAD, Steps, node, tau_within
 from slipsweep.kernels.train import train_of
-from slipsweep.motion.pieces import BEGIN, END, FINISH, LAST, TOP, Wave
+from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, LAST, TOP, Wave
 
 #: More events than any step holds.
 _MOST_EVENTS = 16
@@ -136,30 +136,36 @@ _first_reached = first_of(_has_reached)
 
 
 @scalar
-def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.ndarray) -> None:
-    """Steps i to `until` of piece p, on which Üg falls or is negative, with b held, up to the stop.
+def hold_one_way(block: Block, steps: Steps, p: int, i: int, until: int, state: np.ndarray) -> None:
+    """Steps i to `until` of piece p with b held, up to the stop, where V only grows or only falls."""
+    if i >= until or state[SLIDES] == 0.0:
+        return
+    if held_velocity(block, steps, p, i, until, state) > 0.0:
+        take_held(block, steps, p, i, until, state)
+        return
+    stopped = _first_stopped((block, steps, p, i, state), i + 1, until)
+    take_held(block, steps, p, i, stopped - 1, state)
+    take_one_held(block, steps, p, stopped - 1, state)
+    if state[SLIDES] > 0.0 and stopped < until:  # but for rounding
+        take_one_held(block, steps, p, stopped, state)
 
-    V is largest where Üg falls through b; from there on it decreases.
+
+@scalar
+def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.ndarray) -> None:
+    """Steps i to `until` of piece p with b held, up to the stop.
+
+    V turns where Üg passes b: where Üg falls it is largest there, where Üg rises, after t5, least.
     """
-    steps, level, at = room.steps, state[HELD], room.steps.offset[p]
+    steps, level, at, turn = room.steps, state[HELD], room.steps.offset[p], until + 1
+    where = (steps.nodes, at, block.amplitude, level)
     if block.amplitude * steps.nodes[at + i] > level:
-        below = _first_below((steps.nodes, at, block.amplitude, level), i, until + 1)
-        turns = below <= until
-        last = below - 1
-        take_held(block, steps, p, i, last, state)
-        i = last
-        if turns:
-            take_one_held(block, steps, p, i, state)
-            i += 1
-    if i < until and state[SLIDES] > 0.0:
-        if held_velocity(block, steps, p, i, until, state) > 0.0:
-            take_held(block, steps, p, i, until, state)
-        else:
-            stopped = _first_stopped((block, steps, p, i, state), i + 1, until)
-            take_held(block, steps, p, i, stopped - 1, state)
-            take_one_held(block, steps, p, stopped - 1, state)
-            if state[SLIDES] > 0.0 and stopped < until:  # but for rounding
-                take_one_held(block, steps, p, stopped, state)
+        turn = _first_below(where, i + 1, until + 1)
+    elif steps.wave.pieces[p, FIRST] < steps.wave.pieces[p, LAST]:
+        turn = _first_reached(where, i + 1, until + 1)
+    hold_one_way(block, steps, p, i, turn - 1, state)
+    if turn <= until and state[SLIDES] > 0.0:
+        take_one_held(block, steps, p, turn - 1, state)
+        hold_one_way(block, steps, p, turn, until, state)
 
 
 @scalar
