@@ -3,7 +3,8 @@
 A solver brings `rise` (along a piece on which the plane's acceleration rises) and `hold` (with the block's
 acceleration b held, along a part of a piece or to the stop); here stands what decides between them:
 
-- where a rise or a plateau begins and where the plane's acceleration jumps up, Eq. 4 gives b anew (`reset_held`);
+- where a rise or a plateau begins, where the plane's acceleration jumps up, and where the block comes to rest on a
+  plateau, Eq. 4 gives b anew (`reset_held`);
 - on a rise the block sticks, holds b or follows Eq. 4 (`rise`); elsewhere b is held;
 - from Üg = 0 (t5) on, Eq. 12 takes V down, or b is held on (`recoupling`), up to the next pulse;
 - after the shaking Eq. 12 goes on to the stop.
@@ -101,8 +102,8 @@ def begin_slide(b: float, phase: float, state: np.ndarray) -> None:
 
 
 @in_lanes
-def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: np.ndarray) -> None:
-    """Reset b of a block that slides at the beginning of piece p, Üg = x, or begin a slide (t1), if not by a rise."""
+def reset_held(block: Block, pieces: np.ndarray, p: int, tau: float, x: float, state: np.ndarray) -> None:
+    """Reset b of a block that slides at τ on piece p, Üg = x, or begin a slide there (t1), if not by a rise."""
     state[FOLLOWS] = 1.0 if block.rise == LITERAL else 0.0
     if state[SLIDES] > 0.0:
         if block.rise == LITERAL:
@@ -112,7 +113,7 @@ def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: np.nda
     elif x >= block.yield_acceleration and pieces[p, FIRST] >= pieces[p, LAST]:
         b = starting_acceleration(block, x)
         if b < x:
-            begin_slide(b, pieces[p, START], state)
+            begin_slide(b, phase_at(pieces, p, tau), state)
 
 
 @scalar
@@ -125,14 +126,14 @@ def attenuate(state: np.ndarray, duration: float) -> None:
 
 def pulse_of(
     rise: Callable[[Block, np.ndarray, Any, int, float, float, np.ndarray], Any],
-    hold: Callable[[Block, np.ndarray, Any, int, float, float, np.ndarray], Any],
+    hold: Callable[[Block, np.ndarray, Any, int, float, float, np.ndarray], float],
     note: Callable[[Any, float, float, np.ndarray], None],
 ) -> Callable[[Block, Options, Wave, Any, int, int, float, np.ndarray], Pulse]:
     """The jitted pulse of a solver.
 
     ``rise(block, options, wave, table, p, tau, x, state)`` goes along piece p from τ, where Üg = x, to its end;
-    ``hold(block, wave.pieces, table, p, start, end, state)`` from τ = start to end, or to the stop; `table`
-    is what the solver itself has tabulated.  ``note(table, start, end, state)`` is told of a leg of Eq. 12.
+    ``hold(block, wave.pieces, table, p, start, end, state)`` from τ = start to end, or to the stop, and returns that τ;
+    `table` is what the solver itself has tabulated.  ``note(table, start, end, state)`` is told of a leg of Eq. 12.
     """
 
     @scalar
@@ -140,19 +141,23 @@ def pulse_of(
         """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of stretch k."""
         for q in range(p, wave.stretch[k, 1]):
             first, last = wave.pieces[q, FIRST], wave.pieces[q, LAST]
-            x = block.amplitude * first
+            x, finish = block.amplitude * first, wave.pieces[q, FINISH]
             if q == p:
                 x = max(x, block.yield_acceleration)
             else:
                 tau = wave.pieces[q, BEGIN]
             if rises_anew(wave.pieces, q):
-                reset_held(block, wave.pieces, q, x, state)
+                reset_held(block, wave.pieces, q, tau, x, state)
             if first < last:
                 rise(block, wave.pieces, table, q, tau, x, state)
             elif state[SLIDES] > 0.0:
                 if first > last:
                     state[LEAST_HELD] = min(state[LEAST_HELD], state[HELD])
-                hold(block, wave.pieces, table, q, tau, wave.pieces[q, FINISH], state)
+                tau = hold(block, wave.pieces, table, q, tau, finish, state)
+                if first == last and state[SLIDES] == 0.0:
+                    reset_held(block, wave.pieces, q, tau, x, state)
+                    if state[SLIDES] > 0.0:
+                        hold(block, wave.pieces, table, q, tau, finish, state)
 
     @scalar
     def integrate_on(block: Block, wave: Wave, table: Any, q: int, p: int, tau: float, state: np.ndarray) -> None:

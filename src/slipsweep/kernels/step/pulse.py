@@ -171,8 +171,12 @@ def hold_steps(block: Block, room: Room, p: int, i: int, until: int, state: np.n
 @scalar
 def fall_steps(
     block: Block, pieces: np.ndarray, room: Room, p: int, start: float, end: float, state: np.ndarray
-) -> None:
-    """From the beginning of piece p (τ = `start`) to `end` with b held, finer while a slide just begun asks for it."""
+) -> float:
+    """From the beginning of piece p (τ = `start`) to `end` with b held, finer while a slide just begun asks for it.
+
+    Where on the piece the block stops is not kept: no waveform has a plateau on which it does, and elsewhere nothing
+    follows from it.
+    """
     steps, first = room.steps, 0
     whole = steps.counts[p] if end == pieces[p, FINISH] else int((end - start) / steps.length[p])
     resolve_fall(block, pieces, p, state)
@@ -189,6 +193,7 @@ def fall_steps(
         hold_step(block, steps.rule, pieces, p, node(steps, p, whole), end, state)
     if state[SLIDES] == 0.0:
         state[STOPPED_AT] = pieces[p, END]
+    return end
 
 
 @scalar
