@@ -296,7 +296,7 @@ def test_legs_that_begin_at_a_turn_of_eq4_come_to_an_end() -> None:
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 def test_a_block_that_stops_on_a_plateau_slides_again_at_once(recoupling: str) -> None:
     """Held at what the peak before gave, b is above the plateau; at rest there it is below it: c of the plateau."""
-    times, values = [0.0, 0.02, 0.04, 0.06, 0.12, 0.14], np.array([4.3, 3.1, 1.2, 2.07, 2.07, 0.0])
+    times, values = np.array([0.0, 0.02, 0.04, 0.06, 0.12, 0.14]), np.array([4.3, 3.1, 1.2, 2.07, 2.07, 0.0])
     given: dict[str, Any] = {"yield_acceleration": 1.033, "recoupling": recoupling}
     expected = Block(0.0, 0.8157, G, **given).respond(Record(times, values), 1.0)
     found = sweep(0.0, 0.8157, **choices(**given, excitation=Record(times, values)))

@@ -95,3 +95,28 @@ def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | Cosi
     history = slipsweep.simulate(**cell, excitation=excitation)
     assert int(swept.validity) & slipsweep.Validity.NOT_RECOUPLED
     assert float(swept.permanent_displacement) == pytest.approx(float(history.relative_displacement[-1]), rel=1e-10)
+
+
+#: The sample's motions have many pieces; harmonic ones come again and again at phases that are rounded.
+WHOLE: dict[str, Any] = {
+    **SHAKEN,
+    "triangle": slipsweep.Triangle(cycles=40, ramp_in=1.5),
+    "record": slipsweep.Record.sampled(3.0 * np.sin(0.7 * np.arange(60.0)) * np.linspace(0.3, 1.0, 60), 0.01),
+}
+
+
+@pytest.mark.parametrize("model", ["newmark", slipsweep.Mendez(), slipsweep.Mendez(recoupling="integrate")], ids=str)
+@pytest.mark.parametrize("shaken", WHOLE)
+def test_velocity_has_no_gaps_where_pieces_meet(shaken: str, model: Any) -> None:
+    """At an instant that rounding puts between two pieces the block does not stand still."""
+    excitation, given = WHOLE[shaken], {"theta": 3, "mu_s": 0.4, "yield_acceleration": 0.3, "model": model}
+    if isinstance(excitation, slipsweep.Record):
+        times = excitation.times
+    else:
+        given |= {"amplitude": 2.5, "frequency": 1.7}
+        times = np.arange(48 * excitation.cycles + 1) / 48 / 1.7
+    about = np.concatenate([np.nextafter(times, 0), times, np.nextafter(times, np.inf)])
+    about = np.concatenate([np.nextafter(about, 0), about, np.nextafter(about, np.inf), times + 1e-13, times - 1e-13])
+    velocity = slipsweep.simulate(excitation=excitation, **given, times=np.unique(about.clip(0))).relative_velocity
+    assert np.abs(np.diff(velocity)[np.diff(velocity.time) < 1e-12]).max() < 1e-10
+    assert velocity.max() > 0.01
