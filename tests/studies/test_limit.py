@@ -149,6 +149,22 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
         assert ((first - limits >= 0) & (first - limits <= step)).all()
 
 
+def test_beside_a_gap_every_displacement_is_reached() -> None:
+    """With the literal rise Kd comes to 0 at the gap's edge, and the run-out v²/(2 g Kd) beyond all bounds."""
+    given: dict[str, Any] = {"theta": 0, "mu_s": [0.3, 0.4, 0.6], "yield_acceleration": 1.0, "frequency": 1.0}
+    given["model"] = slipsweep.Mendez("literal")
+    limits = slipsweep.limit_amplitude([1e3, 1e6, 1e9], **given).transpose("mu_s", "displacement")
+    assert (limits.limit_status[:, 2] == LimitStatus.AFTER_GAP).all()
+    assert (limits.permanent_displacement >= limits.displacement).all()
+    edges = limits.limit_amplitude.values[:, 2]
+    assert (np.ptp(limits.limit_amplitude.values, axis=1) <= 1e-9 * edges).all()
+    for mu_s, edge in zip(given["mu_s"], edges, strict=True):
+        one = given | {"mu_s": mu_s}
+        below = slipsweep.sweep(amplitude=np.nextafter(edge, 0), **one)
+        assert int(below.validity) & slipsweep.Validity.KD_NOT_POSITIVE
+        assert slipsweep.sweep(amplitude=edge * (1 + 1e-3), **one).permanent_displacement < 1e5
+
+
 def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     """The limit is never above the first of 20 000 amplitudes that reaches the target, where u(A) is a saw."""
     cases = {

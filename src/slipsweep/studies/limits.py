@@ -212,7 +212,8 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
 
     reached = _first_step(amplitudes, scanned >= displacement[:, np.newaxis, :])
     hidden = _hidden_peaks(amplitudes, scanned, found["validity"], displacement, displaced)
-    row, column, low, high = _first_of(shape, reached, hidden)
+    beside = _beside_gaps(amplitudes, found["validity"], partial(_in_gap, problem, arrays), displaced)
+    row, column, low, high = _first_of(shape, reached, hidden, beside)
     cells = _zipped(arrays, row, column)
     low, high = _bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
     wanted = ("permanent_displacement", *_codes(problem), "validity")
@@ -338,6 +339,33 @@ def _hidden_peaks(
         at = np.maximum(reaches[:, which].argmax(axis=0), 1)
         found.append(_Steps(rows[which], columns[which], parts[at - 1, which], parts[at, which]))
     return _Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+
+def _in_gap(problem: Problem, arrays: Mapping[str, Floats], amplitude: Floats, row: NDArray[np.intp]) -> Any:
+    """Whether blocks have no value at these amplitudes because Kd ≤ 0: at all that is asked of them, or at none."""
+    cells = _zipped(arrays, row, np.zeros_like(row))
+    return _at(problem, cells, amplitude, ("validity",))["validity"] & Validity.KD_NOT_POSITIVE != 0
+
+
+def _beside_gaps(
+    amplitudes: Floats,
+    validity: NDArray[np.int16],
+    in_gap: Callable[[Floats, NDArray[np.intp]], NDArray[np.bool_]],
+    displaced: Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]],
+) -> _Steps:
+    """Steps up to the last amplitude before a gap, or to the first behind it, at which a target is reached.
+
+    With the literal rise Kd vanishes beside the gap in which it would be negative, and u grows beyond all bounds.
+    """
+    gap = validity[:, :, 0] & Validity.KD_NOT_POSITIVE != 0
+    row, step = np.nonzero(gap[:, 1:] != gap[:, :-1])
+    start, ends = amplitudes[row, step], gap[row, step]
+    low, high = _bisect(start, amplitudes[row, step + 1], lambda at, which: in_gap(at, row[which]) != ends[which])
+    every = np.arange(validity.shape[2])
+    row, column = np.repeat(row, every.size), np.tile(every, row.size)
+    below, beside = (np.repeat(np.where(ends, *sides), every.size) for sides in ((low, start), (high, low)))
+    reaches = displaced(beside, row, column)
+    return _Steps(row[reaches], column[reaches], below[reaches], beside[reaches])
 
 
 def _first_of(shape: tuple[int, ...], *found: _Steps) -> _Steps:
