@@ -30,9 +30,9 @@ BASE = "0c4c6a1"
 
 #: What is timed, by the names that `CHILD` knows.
 TASKS = (
-    "sine, displacement", "sine, all results", "cosine", "triangle", "square", "three harmonics",
-    "1024 steps, rectangle", "1024 steps, Simpson", "64 steps, rectangle", "64 steps, Simpson",
-    "record, friction law", "record, Newmark",
+    "sine, displacement", "sine, all results", "cosine", "triangle", "square", "triangle with ramps", "three harmonics",
+    "64 steps, rectangle", "64 steps, Simpson", "1024 steps, rectangle", "1024 steps, Simpson",
+    "4096 steps, rectangle", "4096 steps, Simpson", "record, friction law", "record, Newmark",
 )  # fmt: skip
 
 #: Solves the tasks it is told, with the slipsweep that it finds, by whichever of its interfaces there is.
@@ -52,6 +52,10 @@ def wave(name, harmonics=None):
     if not new:
         return {"waveform": name} | ({"harmonics": harmonics} if harmonics else {})
     return {"excitation": slipsweep.Harmonics(*harmonics.values()) if harmonics else name}
+
+def ramped():
+    ramps = {"ramp_in": 2, "ramp_out": 2}
+    return {"excitation": slipsweep.Triangle(**ramps)} if new else {"waveform": "triangle"} | ramps
 
 def step(rule, count):
     if not new:
@@ -74,11 +78,14 @@ tasks = {
     "cosine": lambda: slipsweep.sweep(**grid(60_000), **wave("cosine"), **one),
     "triangle": lambda: slipsweep.sweep(**grid(60_000), **wave("triangle"), **one),
     "square": lambda: slipsweep.sweep(**grid(60_000), **wave("square"), **one),
+    "triangle with ramps": lambda: slipsweep.sweep(**grid(20_000), **ramped(), **one),
     "three harmonics": lambda: slipsweep.sweep(**grid(10_000), **wave("harmonics", terms), **one),
-    "1024 steps, rectangle": lambda: slipsweep.sweep(**grid(20_000), **step("rectangle", 1024), **one),
-    "1024 steps, Simpson": lambda: slipsweep.sweep(**grid(20_000), **step("simpson", 1024), **one),
     "64 steps, rectangle": lambda: slipsweep.sweep(**grid(60_000), **step("rectangle", 64), **one),
     "64 steps, Simpson": lambda: slipsweep.sweep(**grid(60_000), **step("simpson", 64), **one),
+    "1024 steps, rectangle": lambda: slipsweep.sweep(**grid(20_000), **step("rectangle", 1024), **one),
+    "1024 steps, Simpson": lambda: slipsweep.sweep(**grid(20_000), **step("simpson", 1024), **one),
+    "4096 steps, rectangle": lambda: slipsweep.sweep(**grid(5_000), **step("rectangle", 4096), **one),
+    "4096 steps, Simpson": lambda: slipsweep.sweep(**grid(5_000), **step("simpson", 4096), **one),
     "record, friction law": recorded,
     "record, Newmark": lambda: recorded(model="newmark"),
 }
@@ -159,7 +166,7 @@ def measured(commits: list[str], rounds: int, many: float) -> dict[str, dict[str
 
 def drawn(ratios: dict[str, dict[str, float]], commits: list[str], path: Path) -> None:
     """Time over that of `BASE` by task and commit, a panel a task: nothing to tell apart by colour."""
-    figure, panels = plt.subplots(4, 3, figsize=(9.0, 8.5), sharex=True, sharey=True, layout="constrained")
+    figure, panels = plt.subplots(5, 3, figsize=(9.0, 10.0), sharex=True, sharey=True, layout="constrained")
     for panel, (task, found) in zip(panels.flat, ratios.items(), strict=True):
         places = [place for place, commit in enumerate(commits) if commit in found]
         values = [found[commit] for commit in commits if commit in found]
