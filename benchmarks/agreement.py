@@ -1,19 +1,25 @@
 """The solvers held to each other: ``python -m benchmarks.agreement`` writes agreement.md.
 
 Draws cells as tests/support/agreement.py does, under all options and waveforms, and solves each in every way
-that there is.  ``.ci/include-report`` puts the table into docs/waveforms.md.  Nothing is timed; it ends with an
-error where two ways disagree.
+that there is; and records as tests/support/made_up_records.py does.  ``.ci/include-report`` puts the table into
+docs/waveforms.md.  Nothing is timed; it ends with an error where two ways disagree.
 """
 
 import random
 from collections import Counter, defaultdict
+from collections.abc import Iterator
+from itertools import chain
 from statistics import median
 
 from benchmarks.machine import arguments, measured_on, number, table
 from tests.support.agreement import FLOORS, Comparison, compare, group_of
+from tests.support.made_up_records import SEEN, difference, made
 
-#: Cells drawn, and in a group.
-CELLS, SIZE = 10_000, 32
+#: Cells drawn, and in a group; and made-up records for each group.
+CELLS, SIZE, RECORDS = 10_000, 32, 4
+
+#: What the made-up records are held to.
+BY_RECORD = "SciPy under a record"
 
 
 def rows_of(found: dict[str, list[Comparison]]) -> list[list[object]]:
@@ -28,6 +34,14 @@ def rows_of(found: dict[str, list[Comparison]]) -> list[list[object]]:
     return rows
 
 
+def compare_records(seed: int) -> Iterator[Comparison]:
+    """The comparisons of some made-up records, where the block slides."""
+    for one in range(seed, seed + RECORDS):
+        found = difference(made(one))
+        if found is not None:
+            yield Comparison(BY_RECORD, "record", 1, found, found / SEEN, f"tests.support.made_up_records.made({one})")
+
+
 HEADER = ["the cycle solver against", "cells", "agreed", "median difference", "largest", "largest over its bound"]
 
 
@@ -37,12 +51,14 @@ def main() -> None:
     seed = given.seed if given.seed >= 0 else random.randrange(2**31)
     cells = 2 * SIZE if given.tiny else given.cells
     print(f"seed {seed}", flush=True)
-    kinds: dict[str, list[Comparison]] = {kind: [] for kind in FLOORS}
+    kinds: dict[str, list[Comparison]] = {kind: [] for kind in (*FLOORS, BY_RECORD)}
     regimes: dict[str, list[Comparison]] = defaultdict(list)
     modes: Counter[int] = Counter()
     wrong = []
     for drawn in range(0, cells, SIZE):
-        for comparison in compare(group_of(seed + drawn // SIZE, min(SIZE, cells - drawn))):
+        number_of_group = drawn // SIZE
+        group = group_of(seed + number_of_group, min(SIZE, cells - drawn))
+        for comparison in chain(compare(group), compare_records(seed + RECORDS * number_of_group)):
             kinds[comparison.kind].append(comparison)
             if comparison.kind.startswith("step"):
                 regimes[comparison.regime].append(comparison)

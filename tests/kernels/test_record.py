@@ -22,6 +22,7 @@ from slipsweep.kernels.linear import held_stop
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.pieces import BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START
 from tests.support.cases import choices
+from tests.support.made_up_records import SEEN, difference, made
 from tests.support.record_reference import Block
 
 G = 9.81
@@ -267,10 +268,6 @@ def test_mendez_against_scipy_on_recorded_motions(
         assert result[quantity].item() == pytest.approx(value, rel=3e-12), quantity
 
 
-#: Accelerations that meet each other: plateaus, samples at zero, peaks of one height.
-LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)
-
-
 def test_legs_that_begin_at_a_turn_of_eq4_come_to_an_end() -> None:
     """A pulse of an earthquake in which the leg from a turn of Eq. 4 on ended, by rounding, at that turn."""
     values = [
@@ -310,34 +307,13 @@ def test_a_block_that_stops_on_a_plateau_slides_again_at_once(recoupling: str) -
     )
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(0, 600, 100))
 def test_mendez_against_scipy_on_made_up_records(seed: int) -> None:
-    """Plateaus, zeros touched, records that begin and end anywhere, under all options."""
-    rng = np.random.default_rng(seed)
-    compared = 0
-    for _ in range(12):
-        count = int(rng.integers(3, 25))
-        steps = np.clip(np.cumsum(rng.normal(0.0, 2.0, count)), -7.0, 7.0)
-        values = rng.choice(LEVELS, count) * rng.choice([1, 1, -1], count) if rng.random() < 0.6 else steps
-        record = Record.sampled(values, float(rng.choice([0.02, 0.05, 0.1])))
-        theta, mu_s = float(rng.choice([0.0, 5.0, 8.0])), float(rng.choice([0.3, 0.38, 0.5]))
-        given: dict[str, Any] = {
-            name: float(rng.choice(choices))
-            for name, choices in (
-                ("yield_acceleration", [0.59, 1.0, 2.0]),
-                ("decay_rate", [0.5, 2.7, 8.0]),
-                ("delta_mu", [0.0, 0.09, 0.3]),
-            )
-            if rng.random() < 0.5
-        }
-        given["recoupling"] = str(rng.choice(["eq12", "integrate"]))
-        given["rise"] = str(rng.choice(["monotone", "literal"]))
-        result = sweep(theta, mu_s, **choices(**given, excitation=record))
-        if not np.isnan(result.permanent_displacement):
-            compared += 1
-            for quantity, value in vars(Block(theta, mu_s, G, **given).respond(record, 1.0)).items():
-                assert result[quantity].item() == pytest.approx(value, rel=1e-9, abs=1e-12), (quantity, values, given)
-    assert compared >= 8
+    """Plateaus, zeros touched, records that begin and end anywhere, all options; ``benchmarks.agreement`` has more."""
+    found = {one: difference(made(one)) for one in range(seed, seed + 100)}
+    apart = {one: value for one, value in found.items() if value is not None}
+    assert len(apart) > 40
+    assert max(apart.values()) < SEEN, max(apart, key=lambda one: apart[one])
 
 
 class Stepped:
