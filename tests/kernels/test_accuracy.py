@@ -314,11 +314,11 @@ def test_pulses_that_stop_anew_as_event_by_event() -> None:
 
 
 @pytest.mark.parametrize("cycles", [1, 2, 10])
-@pytest.mark.parametrize("delta_mu", [0.0, 0.02, 0.3])
+@pytest.mark.parametrize("delta_mu", [0.0, 0.02, 0.3, 6.0])
 def test_peaks_of_continuous_sliding(delta_mu: float, cycles: int) -> None:
     """Whether the velocity turns on both half cycles, on one or on none; from friction that hardly falls to e^-7."""
     theta, mu_s, amplitude = 3.0, 0.3, 1.9 * strategies.G
-    decay_rate = np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 5.5, 7.0]) * strategies.G / amplitude
+    decay_rate = np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 3.1, 3.5, 4.5, 5.5, 7.0]) * strategies.G / amplitude
     cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "delta_mu": delta_mu}
     cell |= {"frequency": 1.0, "cycles": cycles}
     swept = slipsweep.sweep(**choices(**cell, decay_rate=decay_rate))

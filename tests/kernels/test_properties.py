@@ -512,15 +512,15 @@ def test_grazing_displacement_has_its_leading_term() -> None:
 @strategies.reproducible
 @given(
     mu_s=st.floats(0.05, 1.5),
-    steep=st.floats(0.0, 0.99),
-    delta_mu=st.floats(1e-6, 1.0),
+    steep=st.floats(0.0, 3.0),
+    delta_mu=st.just(0.0) | st.floats(1e-6, 1.0),
     e_foldings=st.floats(1e-3, 300.0),
     top=st.floats(1e-3, 50.0),
 )
 def test_relative_acceleration_turns_as_the_step_solver_relies_on(
     mu_s: float, steep: float, delta_mu: float, e_foldings: float, top: float
 ) -> None:
-    """Where Üg > 0 D goes from below 0 at most up and then down through it; where Üg < 0 at most down and then up."""
+    """As |Üg| grows, where Üg > 0 D goes at most up and then down through 0, where Üg < 0 at most down."""
     tan_theta = steep * mu_s
     assume(top * tan_theta < G)
     decay = e_foldings / top
@@ -534,5 +534,9 @@ def test_relative_acceleration_turns_as_the_step_solver_relies_on(
         clear = np.sign([rate for rate in rates if abs(rate) > 1e-13 * G])
         return [int(sign) for sign in clear[np.flatnonzero(np.diff(clear, prepend=0.0))]]
 
-    assert signs(1.0) in ([-1], [-1, 1], [-1, 1, -1])
-    assert signs(-1.0) in ([1], [1, -1], [1, -1, 1])
+    upper: list[list[int]] = [[-1], [-1, 1], [-1, 1, -1]]
+    lower: list[list[int]] = [[1], [1, -1]]
+    if delta_mu == 0.0:  # D begins with 0
+        upper, lower = [*upper, [], [1], [1, -1]], [*lower, [], [-1]]
+    assert signs(1.0) in upper
+    assert signs(-1.0) in lower

@@ -101,17 +101,14 @@ _first_falling = first_of(_is_falling)
 def turning_step(block: Block, steps: Steps, p: int, i: int, until: int) -> int:
     """Of steps i to `until` of piece p the one in which the rate of V falls through 0; `until` if none; -1: not known.
 
-    As |Üg| grows D bends upwards; where Üg > 0 only up to the inflection, and from D = −g Δμ on.  It has one zero at
-    most between places where its signs differ, and none where Üg > 0 between those where it is positive.
+    As |Üg| grows D falls through 0 once where Üg < 0; where Üg > 0 it rises through 0 and then falls through it, if
+    at all.
     """
     at, upper = steps.offset[p], steps.wave.pieces[p, TOP] > 0.0
     rate, rate_end = node_rate(block, steps.nodes, at + i), node_rate(block, steps.nodes, at + until)
-    known = block.delta_mu > 0.0 or not upper
-    if known and (rate < 0.0 < rate_end or (upper and min(rate, rate_end) > 0.0)):
-        return until
-    if not known or not rate > 0.0 > rate_end:
-        return -1
-    return _first_falling((block, steps.nodes, at), i + 1, until) - 1
+    if rate > 0.0 >= rate_end:
+        return _first_falling((block, steps.nodes, at), i + 1, until) - 1
+    return -1 if upper and max(rate, rate_end) <= 0.0 else until
 
 
 @scalar
