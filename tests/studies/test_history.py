@@ -101,6 +101,7 @@ def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | Cosi
 WHOLE: dict[str, Any] = {
     **SHAKEN,
     "triangle": slipsweep.Triangle(cycles=40, ramp_in=1.5),
+    "square": slipsweep.Square(cycles=40),
     "record": slipsweep.Record.sampled(3.0 * np.sin(0.7 * np.arange(60.0)) * np.linspace(0.3, 1.0, 60), 0.01),
 }
 

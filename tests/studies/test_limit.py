@@ -165,6 +165,17 @@ def test_beside_a_gap_every_displacement_is_reached() -> None:
         assert slipsweep.sweep(amplitude=edge * (1 + 1e-3), **one).permanent_displacement < 1e5
 
 
+@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+def test_before_a_gap_every_displacement_is_reached(recoupling: str) -> None:
+    """The same where Kd falls to 0 as the amplitude grows."""
+    given: dict[str, Any] = {"theta": 6, "mu_s": 0.6, "frequency": 1.0, "yield_acceleration": 1.5, "decay_rate": 9.0}
+    given |= {**choices(rise="literal", recoupling=recoupling), "excitation": slipsweep.Cosine(6)}
+    limits = slipsweep.limit_amplitude([1.0, 1e3, 1e6, 1e9], **given)
+    np.testing.assert_allclose(limits.permanent_displacement, limits.displacement, rtol=1e-4)
+    beyond = slipsweep.sweep(amplitude=limits.limit_amplitude[-1].item() * (1 + 1e-7), **given)
+    assert int(beyond.validity) & slipsweep.Validity.KD_NOT_POSITIVE
+
+
 def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     """The limit is never above the first of 20 000 amplitudes that reaches the target, where u(A) is a saw."""
     cases = {

@@ -15,7 +15,7 @@ from slipsweep.kernels.cycle.eq4 import eq4_integrals
 from slipsweep.kernels.cycle.legs import ATTENUATE, FOLLOW, MOST_LEGS, STATE_SIZE, Room, room_of
 from slipsweep.kernels.cycle.pulse import pulse
 from slipsweep.kernels.excitation import held_integrals, phase_at, plane
-from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
+from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.kernels.record import block_in_pulse, end_of_following, one_pulse, slides_on
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP
@@ -94,27 +94,24 @@ def begins_at(block: Block, wave: Wave, k: int) -> float:
 @scalar
 def sample_pulse(
     block: Block, wave: Wave, room: Room, start: float, until: float, offset: float, displacement: float,
-    now: Pulse, phases: np.ndarray, at: int, history: np.ndarray,
+    gained: float, phases: np.ndarray, at: int, history: np.ndarray,
 ) -> int:  # fmt: skip
     """Fill Ü, V and W up to phase `until`, from the legs of a pulse that begins at `start`; the first sample beyond.
 
-    W is `displacement` before the pulse; phases of the table are less by `offset`.
+    W is `displacement` before the pulse and `gained` more after it; phases of the table are less by `offset`.
     """
     row, legs = 1, room.legs
-    last = int(legs[0, 0])
     while at < phases.size and phases[at] < until:
         phi = phases[at] - offset
-        while row <= last and phi >= legs[row, 4]:
+        while row <= legs[0, 0] and phi >= legs[row, 4]:
             row += 1
-        if row <= last:
-            # a leg that is entered with V follows the one before: what lies between them is rounding
-            leg = row if phi >= legs[row, 3] or legs[row, 6] > 0.0 else 0
-            moved = legs[row, 7] if phases[at] >= start else 0.0
-        else:
-            leg, moved = (last, 0.0) if now.velocity > 0.0 else (0, now.displacement)
+        moved = 0.0
+        if phases[at] >= start:
+            moved = gained if row > legs[0, 0] else legs[row, 7]
         history[at, DISPLACEMENT] = displacement + moved
-        if leg > 0:
-            sample_leg(block, wave, room, leg, phi, history[at], displacement)
+        # a leg that is entered with V follows the one before: what lies between them is rounding
+        if row <= legs[0, 0] and (phi >= legs[row, 3] or legs[row, 6] > 0.0):
+            sample_leg(block, wave, room, row, phi, history[at], displacement)
         at += 1
     return at
 
@@ -133,7 +130,7 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         room.legs[0, 0] = 0.0
         start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, again) + offset
         now = pulse(block, options, wave, room, k, again, velocity)
-        at = sample_pulse(block, wave, room, start, until, offset, displacement, now, phases, at, history)
+        at = sample_pulse(block, wave, room, start, until, offset, displacement, now.displacement, phases, at, history)
         velocity = now.velocity
         displacement += now.displacement
         if again < stretches and repeat < wave.repeats - 1 and wave.stretch[again, 0] >= wave.cycle[wave.lead + 1]:
@@ -253,7 +250,7 @@ def _record_history(cells: np.ndarray, options: Options, wave: Wave, times: np.n
             at = sample_continuous_pulse(block, wave, k, following, peak, moving, room.state, times, at, history)
         else:
             start, until = begins_at(block, wave, k), begins_at(block, wave, following)
-            at = sample_pulse(block, wave, room, start, until, 0.0, displacement, now, times, at, history)
+            at = sample_pulse(block, wave, room, start, until, 0.0, displacement, now.displacement, times, at, history)
         velocity, displacement = now.velocity, displacement + now.displacement
         k = following
     fill_friction(block, history)
