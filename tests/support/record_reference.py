@@ -130,14 +130,16 @@ class Block:
             self.v, self.sliding = 0.0, False
         return float(solution.t[-1])
 
-    def hold(self, piece: Piece) -> float:
-        # in two parts where the velocity turns: within a step it could fall below zero and rise again unseen
-        turn = (self.held - piece.x) / piece.slope if piece.slope else 0.0
+    def to_rest(self, piece: Piece, block: Rate, turn: float) -> float:
+        """`integrate` in two parts where the velocity turns: within a step it could fall below 0 and rise unseen."""
         if not 1e-9 * piece.end < turn < piece.end:
-            return self.integrate(piece, lambda x: self.held, True)
+            return self.integrate(piece, block, True)
         first, second = piece.cut(turn)
-        took = self.integrate(first, lambda x: self.held, True)
-        return took + self.integrate(second, lambda x: self.held, True) if self.sliding else took
+        took = self.integrate(first, block, True)
+        return took + self.integrate(second, block, True) if self.sliding else took
+
+    def hold(self, piece: Piece) -> float:
+        return self.to_rest(piece, lambda x: self.held, (self.held - piece.x) / piece.slope if piece.slope else 0.0)
 
     def brake(self, duration: float) -> None:
         """Eq. 12 until the velocity, of either sign, is zero."""
@@ -173,7 +175,7 @@ class Block:
                 continue
             if switch is None:
                 return
-            took = self.integrate(rest, self.eq4, True)
+            took = self.to_rest(rest, self.eq4, _first(rest, lambda x: x - self.eq4(x)) or 0.0)
             piece = rest.cut(took)[1]
             self.held = self.eq4(piece.x)
             if self.sliding:

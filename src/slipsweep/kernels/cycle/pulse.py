@@ -128,12 +128,12 @@ _followed_stop = root_of(_followed_lost)
 def advance(
     pieces: np.ndarray, p: int, end: float, stops: bool, gained: float, moved: float, width: float, state: np.ndarray
 ) -> None:
-    """Add a leg's gains; where the block stops there, it is at rest from then on."""
+    """Add a leg's gains; where the block stops there, it is at rest from then on, and the next slide has its own b."""
     state[DISPLACEMENT] += state[VELOCITY] * width + moved
     state[VELOCITY] += gained
     if stops:
         state[VELOCITY] = state[SLIDES] = 0.0
-        state[STOPPED_AT] = phase_at(pieces, p, end)
+        state[STOPPED_AT], state[LEG_END] = phase_at(pieces, p, end), -math.inf
     state[PEAK] = max(state[PEAK], state[VELOCITY])
     state[LEAST] = min(state[LEAST], state[VELOCITY])
 
@@ -232,7 +232,7 @@ def rise(block: Block, pieces: np.ndarray, legs: np.ndarray, p: int, tau: float,
             beyond = began > max(x, block.yield_acceleration)
             b = began if beyond else min(starting_acceleration(block, began), began)
             begin_slide(b, phase_at(pieces, p, tau), state)
-            x, state[FOLLOWS], state[LEG_END] = began, 1.0 if literal else 0.0, -math.inf
+            x, state[FOLLOWS] = began, 1.0 if literal else 0.0
         if not (x == state[LEG_AT] and x < state[LEG_END]):
             end, follows, follows_on = rising_leg(block, x, state[CREST], state[HELD], state[FOLLOWS] > 0.0)
             state[LEG_END], state[LEG_FOLLOWS] = end, 1.0 if follows else 0.0
