@@ -35,7 +35,7 @@ def rows_of(found: dict[str, list[Comparison]]) -> list[list[object]]:
 
 
 def compare_records(seed: int) -> Iterator[Comparison]:
-    """The comparisons of some made-up records, where the block slides."""
+    """The comparisons of some made-up records, where there is a value."""
     for one in range(seed, seed + RECORDS):
         found = difference(made(one))
         if found is not None:

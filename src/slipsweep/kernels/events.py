@@ -5,7 +5,7 @@ or come to no end.  A root that it does not find is NaN, and so is then the disp
 with an error that names the cell (`block.UNSOLVED`).  `sine.roots` takes the lanes of a strip to their
 roots together, each from the side from which Newton's iteration comes there without a bracket, and marks those
 that are not there in the end: they are left to the former.  Why an event's error hardly matters:
-docs/numerics.md#finding-events.
+docs/numerics.md#finding-events.  `first_of` finds the first of many places, such as steps, at which something holds.
 """
 
 import math

@@ -210,9 +210,14 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
         moved = _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
         return np.asarray(moved >= displacement[row, column])
 
+    def in_gap(amplitude: Floats, row: NDArray[np.intp]) -> NDArray[np.bool_]:
+        # Kd ≤ 0 at all that is asked of a block, or at none
+        flags = _at(problem, _zipped(arrays, row, np.zeros_like(row)), amplitude, ("validity",))["validity"]
+        return np.asarray(flags & Validity.KD_NOT_POSITIVE != 0)
+
     reached = _first_step(amplitudes, scanned >= displacement[:, np.newaxis, :])
     hidden = _hidden_peaks(amplitudes, scanned, found["validity"], displacement, displaced)
-    beside = _beside_gaps(amplitudes, found["validity"], partial(_in_gap, problem, arrays), displaced)
+    beside = _beside_gaps(amplitudes, found["validity"], in_gap, displaced)
     row, column, low, high = _first_of(shape, reached, hidden, beside)
     cells = _zipped(arrays, row, column)
     low, high = _bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
@@ -339,12 +344,6 @@ def _hidden_peaks(
         at = np.maximum(reaches[:, which].argmax(axis=0), 1)
         found.append(_Steps(rows[which], columns[which], parts[at - 1, which], parts[at, which]))
     return _Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
-
-
-def _in_gap(problem: Problem, arrays: Mapping[str, Floats], amplitude: Floats, row: NDArray[np.intp]) -> Any:
-    """Whether blocks have no value at these amplitudes because Kd ≤ 0: at all that is asked of them, or at none."""
-    cells = _zipped(arrays, row, np.zeros_like(row))
-    return _at(problem, cells, amplitude, ("validity",))["validity"] & Validity.KD_NOT_POSITIVE != 0
 
 
 def _beside_gaps(
