@@ -54,17 +54,17 @@ if synced:
 print(time.perf_counter() - start)
 """
 
-#: Writes as many bytes, 8 MiB at a time, past the system's cache where that can be: what the disk takes by itself.
+#: Writes as many bytes, 2 MiB at a time, past the system's cache where that can be: what the disk takes by itself.
 DISK = """
 import mmap, os, sys, time
 from slipsweep.runs.placed import open_directly
 path, nbytes = sys.argv[1], int(sys.argv[2])
-piece = mmap.mmap(-1, 2**23)
-piece.write(os.urandom(2**23))
+piece = mmap.mmap(-1, 2**21)
+piece.write(os.urandom(2**21))
 start = time.perf_counter()
 buffered = os.open(path, os.O_WRONLY | os.O_CREAT)
 file = open_directly(path) or buffered
-for _ in range(-(-nbytes // 2**23)):
+for _ in range(-(-nbytes // 2**21)):
     os.write(file, piece)
 os.fsync(file)
 print(time.perf_counter() - start)

@@ -157,3 +157,15 @@ def test_ratios_of_any_sign_and_size_are_in_order() -> None:
     for at, value in enumerate(values[:8]):
         assert ratios.quantile((at + 0.5) / 8) == pytest.approx(value, rel=1e-3)
     assert math.isnan(Ratios().quantile(0.5))
+
+
+def test_ratios_of_a_large_grid_are_those_of_its_parts() -> None:
+    values = np.random.default_rng(1).lognormal(0.0, 2.0, (300, 1, 700))
+    values[::7] = math.nan
+    whole, parts = Ratios(), Ratios()
+    whole.add(values, np.full(values.shape, -2.0))
+    for row in values:
+        parts.add(row, np.full(row.shape, -2.0))
+    assert whole.counts == parts.counts
+    assert whole.number == np.isfinite(values).sum()
+    assert whole.quantile(0.25) == pytest.approx(np.nanquantile(values / -2.0, 0.25, method="inverted_cdf"), rel=1e-3)

@@ -8,10 +8,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.grid.chunks import slabs
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
 
-#: Bits that are left off a ratio in single precision where ratios are counted: to one part in a thousand.
+#: Bits that are left off a ratio in single precision where ratios are counted, to one part in a thousand; and how many
+#: different ones are left.
 _LEFT_OFF = 13
+_KEYS = 2 ** (32 - _LEFT_OFF)
+
+#: Ratios that are counted at a time: numpy keeps other threads waiting meanwhile, among them the one that writes.  With
+#: those of a chunk at once a run of 1.9 GB takes 5 % longer.
+_TOGETHER = 65536
+
+
+def _keys(values: NDArray[Any], others: NDArray[Any]) -> NDArray[np.int32]:
+    """Values over others, where neither is zero or missing, as whole numbers in the same order."""
+    there = np.isfinite(values) & np.isfinite(others) & (values != 0.0) & (others != 0.0)
+    with np.errstate(over="ignore", under="ignore"):
+        bits = np.divide(values[there], others[there], dtype=np.float32).view(np.int32)
+    # as integers, negative numbers in single precision are in reverse order
+    return (bits ^ ((bits >> 31) & np.int32(0x7FFFFFFF))) >> _LEFT_OFF
 
 
 @dataclass
@@ -30,17 +46,16 @@ class Ratios:
 
     def add(self, values: NDArray[Any], others: NDArray[Any]) -> None:
         """Count values over others, where neither is zero or missing."""
-        there = np.isfinite(values) & np.isfinite(others) & (values != 0.0) & (others != 0.0)
-        if not there.any():
-            return
-        with np.errstate(over="ignore", under="ignore"):
-            bits = np.divide(values[there], others[there], dtype=np.float32).view(np.int32)
-        # as integers, negative numbers in single precision are in reverse order
-        keys = (bits ^ ((bits >> 31) & np.int32(0x7FFFFFFF))) >> _LEFT_OFF
-        least = int(keys.min())
-        counts = np.bincount(keys - least)
-        for at in np.flatnonzero(counts).tolist():
-            self.counts[least + at] = self.counts.get(least + at, 0) + int(counts[at])
+        found = np.zeros(_KEYS, np.int64)  # memory that is not used takes none
+        for slab in slabs(values.shape, _TOGETHER):
+            keys = _keys(values[slab], others[slab]) + _KEYS // 2
+            if keys.size:
+                least = int(keys.min())
+                counts = np.bincount(keys - least)
+                found[least : least + counts.size] += counts
+        for at in np.flatnonzero(found).tolist():
+            key = at - _KEYS // 2
+            self.counts[key] = self.counts.get(key, 0) + int(found[at])
 
     def merge(self, other: "Ratios") -> None:
         """Add the counts of other cells."""

@@ -27,7 +27,6 @@ import shutil
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -67,12 +66,15 @@ def identity(asked: Mapping[str, Any], target: Mapping[str, Any]) -> dict[str, A
 
 def installation() -> dict[str, str]:
     """What two processes must have in common to compute the same."""
+    import numba
+    import scipy
+
     return {
         "slipsweep version": __version__,
         "slipsweep sources": sources.keys().results,
-        "numpy version": version("numpy"),
-        "numba version": version("numba"),
-        "scipy version": version("scipy"),  # which draws uncertain inputs
+        "numpy version": np.__version__,
+        "numba version": numba.__version__,
+        "scipy version": scipy.__version__,  # which draws uncertain inputs
     }
 
 

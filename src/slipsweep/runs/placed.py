@@ -35,8 +35,9 @@ from slipsweep.grid.chunks import places
 #: What is written directly begins and ends at multiples of this, in the file and in memory: as much as any disk asks.
 _SECTOR = 4096
 
-#: Bytes that are written directly at a time, and the least for which that is done: each time waits for the disk.
-_PIECE = 8 * 2**20
+#: Bytes that are written directly at a time, and the least for which that is done: each time waits for the disk, but
+#: what is copied there first stays in the processor's cache (8 MiB at a time take 1.03 times as long).
+_PIECE = 2 * 2**20
 _LEAST = 2**20
 
 
