@@ -7,6 +7,7 @@ content; and it looks only at the file of the outermost function, so that a chan
 would not be noticed.
 """
 
+import functools
 import hashlib
 import pickle
 import sys
@@ -17,6 +18,7 @@ from typing import Any
 
 import llvmlite
 import llvmlite.binding
+import llvmlite.ir
 import numba
 from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
@@ -41,6 +43,9 @@ need(type(cpu_target), target_context=None)
 need(_nrt_python, c_helpers=None)
 
 
+_ZERO = llvmlite.ir.Constant(llvmlite.ir.IntType(8), 0)
+
+
 class Disk(NullCache):
     """Where a dispatcher looks for machine code before it compiles: one file."""
 
@@ -49,11 +54,7 @@ class Disk(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kernel as numba wants it, or None."""
-        # all that machine code needs of numba is its memory functions by name.  `rtsys.initialize`, which gives them,
-        # compiles some more (17 ms), and `refresh`, which compiling calls, would bring whatever may be compiled,
-        # scipy's BLAS among it: 0.2 of the 0.85 s that a small run takes
-        for name, address in _nrt_python.c_helpers.items():
-            llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+        _name_memory_functions()
         try:
             content = self.path.read_bytes()
             checksum, data = content[:32], content[32:]
@@ -69,8 +70,35 @@ class Disk(NullCache):
         # a full disk, or something in the kernel that holds in this process only: it runs all the same
         with suppress(Exception):
             if not cres.library.has_dynamic_globals:
-                data = dumps(cres._reduce())
+                library, *others = cres._reduce()
+                data = dumps((_names_only(library), *others))
                 folders.write(self.path, hashlib.sha256(data).digest() + data)
+
+
+@functools.cache
+def _name_memory_functions() -> None:
+    """Have machine code find all that it needs of numba: its memory functions, by their names.
+
+    `rtsys.initialize`, which names them, compiles some more (17 ms), and `refresh`, which compiling calls, would bring
+    whatever may be compiled, scipy's BLAS among it: 0.2 of the 0.85 s that a small run takes.
+    """
+    for name, address in _nrt_python.c_helpers.items():
+        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
+def _names_only(library: tuple[str, str, tuple[bytes, bytes]]) -> tuple[str, str, tuple[bytes, bytes]]:
+    """A library as numba keeps it, but of the code from which machine code was made nothing but the names.
+
+    numba keeps that, too, to compile it into other functions, which nobody does with a kernel.  To parse it took 14 of
+    the 500 ms of a small run, and it was two thirds of the file.
+    """
+    name, kind, (machine_code, bitcode) = library
+    whole, names = llvmlite.binding.parse_bitcode(bitcode), llvmlite.ir.Module()
+    for group in (whole.functions, whole.global_variables):
+        for one in group:
+            if not one.is_declaration:
+                llvmlite.ir.GlobalVariable(names, llvmlite.ir.IntType(8), one.name).initializer = _ZERO
+    return name, kind, (machine_code, llvmlite.binding.parse_assembly(str(names)).as_bitcode())
 
 
 def digest_of(function: Callable[..., Any], signature: Any) -> str:
