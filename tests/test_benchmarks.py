@@ -17,6 +17,7 @@ WRITES = {
     "paper_waveforms": ["paper_waveforms.md", "paper_waveforms.png"],
     "faults": ["faults.md"],
     "agreement": ["agreement.md"],
+    "limits": ["limits.md"],
     "hunt": ["hunt.md"],
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
     "waveforms": ["waveforms.md"],

@@ -19,6 +19,7 @@ from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 from slipsweep.studies.limits import plan_limits
 from tests.support.cases import choices
 from tests.support.commands import command
+from tests.support.made_up_records import made
 
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -177,20 +178,37 @@ def test_before_a_gap_every_displacement_is_reached(recoupling: str) -> None:
 
 
 def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
-    """The limit is never above the first of 20 000 amplitudes that reaches the target, where u(A) is a saw."""
-    cases = {
-        "theta": [2.3172513553765843, 0.36648698271118385, 15.89918679025317, 24.5976881494476, 3.6498712978278363],
-        "mu_s": [0.1577915701729295, 0.46619195565406957, 0.4068037810141504, 0.3295178983842375, 0.3445097343681004],
-        "yield_acceleration": [0.0515279329701465, 0.10852104853669972, 0.6496015442182281, 0.471275, 0.370525],
-        "displacement": [1.9511674594282442, 5.5909408592753485, 3.7266584270787724, 2.280030173177515, 3.500075],
-    }
-    given: dict[str, Any] = {name: xr.DataArray(values, dims="case") for name, values in cases.items()}
+    """The limit is never above the first of 20 000 amplitudes that reaches the target: u(A) is a saw, or has a kink."""
+    names = ("theta", "mu_s", "yield_acceleration", "displacement")
+    rows = [
+        (2.3172513553765843, 0.1577915701729295, 0.0515279329701465, 1.9511674594282442),
+        (0.36648698271118385, 0.46619195565406957, 0.10852104853669972, 5.5909408592753485),
+        (15.89918679025317, 0.4068037810141504, 0.6496015442182281, 3.7266584270787724),
+        (24.5976881494476, 0.3295178983842375, 0.471275, 2.280030173177515),
+        (3.6498712978278363, 0.3445097343681004, 0.370525, 3.500075),
+        (4.018, 0.5588, 0.4121, 4.9024),
+        (6.531864096216997, 0.7620945159987893, 0.06682691928764979, 3.885477466657119),
+    ]
+    columns = zip(names, zip(*rows, strict=True), strict=True)
+    given: dict[str, Any] = {name: xr.DataArray([*values], dims="case") for name, values in columns}
     target = given.pop("displacement")
     limits = slipsweep.limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
-    amplitudes = np.geomspace(0.05, 5.0, 20_001)
+    amplitudes = np.geomspace(0.05, 6.0, 20_001)
     moved = slipsweep.sweep(amplitude=amplitudes, frequency=1.0, **given).permanent_displacement
     first = amplitudes[(moved >= target).transpose("case", "amplitude").values.argmax(axis=1)]
     assert ((limits <= first) & (limits > 0.9 * first)).all()
+
+
+@pytest.mark.parametrize(("seed", "displacement"), [(70, 0.01), (1514, 0.003), (4277, 0.01), (5903, 0.1), (5429, 0.1)])
+def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float) -> None:
+    """The limit is never above the first of 20 000 amplitudes that reaches the target."""
+    one = made(seed)
+    given: dict[str, Any] = {"theta": one.theta, "mu_s": one.mu_s, **choices(**one.given, excitation=one.record)}
+    limit = slipsweep.limit_amplitude(displacement, **given).limit_amplitude.item()
+    amplitudes = np.geomspace(0.5 * limit, 1.5 * limit, 20_001)
+    moved = slipsweep.sweep(amplitude=amplitudes, **given).permanent_displacement.values
+    first = amplitudes[(moved >= displacement).argmax()]
+    assert 0.999 * first < limit <= first
 
 
 def test_statuses_without_a_limit() -> None:
@@ -212,7 +230,8 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
         "mu_s": [0.3, 0.5, 0.4],
         "frequency": [1.0, 2.0, 0.7],
     }
-    monkeypatch.setattr("slipsweep.studies.limits._SCANNED", 1024)
+    for module in ("limits", "limit_scans"):
+        monkeypatch.setattr(f"slipsweep.studies.{module}.SCANNED", 1024)
     zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
     together = slipsweep.limit_amplitude(**choices(**zipped))
     assert together.limit_amplitude.dims == ("case",)

@@ -9,10 +9,10 @@ bisection ask the cycle solver, for all cells at once.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,26 +39,29 @@ from slipsweep.model.variables import (
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
+from slipsweep.studies.limit_scans import (
+    SCANNED,
+    UNDER_RECORD,
+    UNDER_WAVEFORM,
+    Change,
+    Scan,
+    Steps,
+    beside_changes,
+    bisect,
+    first_of,
+    first_step,
+    hidden_peaks,
+)
 
 Floats = NDArray[np.float64]
 
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 256
 
-#: Parts of a step that may hide a peak.
-_PARTS = 256
-
-#: Which steps may: those of a block that does not recouple, where u jumps up by a fifth and more each time that one
-#: pulse less stops it and then falls, from this part of the target on; and those beside a maximum of the scan.
-_SAW, _MAXIMUM = 0.7, 0.99
-
 #: What a limit takes beside its block's scan, in cells of the cycle solver: the bisection, and a scan's scaling.
 _COST = 100.0
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
-
-#: Displacements scanned together: 16 MB, and as much again to compare them.
-_SCANNED = 2_000_000
 
 #: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
 JUMP = 1e-6
@@ -170,7 +173,7 @@ def _solve_motion(maximum_amplitude: float, steps: int, asked: Request) -> Array
     rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in arrays.items()}
     whole = replace(asked, shape=table, arrays=rows, empty=np.empty)
     found = whole.results()
-    for slab in slabs(table, max(1, _SCANNED // (steps + _most_changes(asked)))):
+    for slab in slabs(table, max(1, SCANNED // (steps + _most_changes(asked)))):
         part = whole.part(slab)
         solved = _solve_slab(part, maximum_amplitude, steps)
         for name, values in found.items():
@@ -202,7 +205,9 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     # every amplitude of the scan, at every frequency
     every = {name: values[:, np.newaxis, :] for name, values in arrays.items()}
     size = (shape[0], amplitudes.shape[1], shape[1])
-    found = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement", "validity"), size)
+    hides = UNDER_RECORD if isinstance(problem.excitation, Record) else UNDER_WAVEFORM
+    codes = {"validity", *(change.result for change in hides.changes)}
+    found = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement", *codes), size)
     scanned = found["permanent_displacement"]
 
     def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -210,17 +215,21 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
         moved = _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
         return np.asarray(moved >= displacement[row, column])
 
-    def in_gap(amplitude: Floats, row: NDArray[np.intp]) -> NDArray[np.bool_]:
-        # Kd ≤ 0 at all that is asked of a block, or at none
-        flags = _at(problem, _zipped(arrays, row, np.zeros_like(row)), amplitude, ("validity",))["validity"]
-        return np.asarray(flags & Validity.KD_NOT_POSITIVE != 0)
+    def beside(change: Change) -> Steps:
+        def state(amplitude: Floats, row: NDArray[np.intp]) -> NDArray[np.integer[Any]]:
+            # the same at all that is asked of a block
+            cells = _zipped(arrays, row, np.zeros_like(row))
+            return np.asarray(_at(problem, cells, amplitude, (change.result,))[change.result] & change.bits)
 
-    reached = _first_step(amplitudes, scanned >= displacement[:, np.newaxis, :])
-    hidden = _hidden_peaks(amplitudes, scanned, found["validity"], displacement, displaced)
-    beside = _beside_gaps(amplitudes, found["validity"], in_gap, displaced)
-    row, column, low, high = _first_of(shape, reached, hidden, beside)
+        return beside_changes(scan, change, found[change.result][:, :, 0] & change.bits, state, displaced)
+
+    carried = found["validity"] & Validity.NOT_RECOUPLED != 0
+    scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
+    row, column, low, high = first_of(
+        shape, first_step(scan), hidden_peaks(scan, displaced), *map(beside, hides.changes)
+    )
     cells = _zipped(arrays, row, column)
-    low, high = _bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
+    low, high = bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
     wanted = ("permanent_displacement", *_codes(problem), "validity")
     before, after = _at(problem, cells, low, wanted), _at(problem, cells, high, wanted)
 
@@ -300,82 +309,6 @@ def _mode_changes(thresholds: Floats, heights: Floats) -> Floats:
         return np.hstack([places * (1.0 - _BESIDE), places * (1.0 + _BESIDE)])
 
 
-class _Steps(NamedTuple):
-    """Steps of a scan in which a target is reached: of which block (row), for which target (column), from where."""
-
-    row: NDArray[np.intp]
-    column: NDArray[np.intp]
-    low: Floats
-    high: Floats
-
-
-def _first_step(amplitudes: Floats, reaches: NDArray[np.bool_]) -> _Steps:
-    """The first step of the scan that reaches each target, of those that are reached."""
-    row, column = np.nonzero(reaches.any(axis=1))
-    # the scan begins at yield, where no block has moved: there is always a step before
-    at = reaches.argmax(axis=1)[row, column]
-    return _Steps(row, column, amplitudes[row, at - 1], amplitudes[row, at])
-
-
-def _hidden_peaks(
-    amplitudes: Floats,
-    scanned: Floats,
-    validity: NDArray[np.int16],
-    target: Floats,
-    displaced: Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]],
-) -> _Steps:
-    """Places between the points of a scan at which a target is reached, up to the one where the scan itself reaches it.
-
-    Block, amplitude and target are the dimensions of `scanned`; block and target those of `target`.
-    """
-    wanted = target[:, np.newaxis, :]
-    saw = (validity & Validity.NOT_RECOUPLED != 0) & (scanned >= _SAW * wanted)
-    inner = scanned[:, 1:-1]
-    saw[:, 1:-1] |= (inner > scanned[:, :-2]) & (inner > scanned[:, 2:]) & (inner >= _MAXIMUM * wanted)
-    before = ~np.logical_or.accumulate(scanned >= wanted, axis=1)[:, :-1]
-    row, step, column = np.nonzero((saw[:, 1:] | saw[:, :-1]) & before)
-    found = [_Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
-    for (some,) in slabs((row.size,), _SCANNED // _PARTS):
-        rows, columns = row[some], column[some]
-        ends = amplitudes[rows, step[some]], amplitudes[rows, step[some] + 1]
-        parts = np.linspace(*ends, _PARTS + 1)  # part, step
-        reaches = displaced(parts.ravel(), np.tile(rows, _PARTS + 1), np.tile(columns, _PARTS + 1)).reshape(parts.shape)
-        (which,) = np.nonzero(reaches.any(axis=0))
-        at = np.maximum(reaches[:, which].argmax(axis=0), 1)
-        found.append(_Steps(rows[which], columns[which], parts[at - 1, which], parts[at, which]))
-    return _Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
-
-
-def _beside_gaps(
-    amplitudes: Floats,
-    validity: NDArray[np.int16],
-    in_gap: Callable[[Floats, NDArray[np.intp]], NDArray[np.bool_]],
-    displaced: Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]],
-) -> _Steps:
-    """Steps up to the last amplitude before a gap, or to the first behind it, at which a target is reached.
-
-    With the literal rise Kd vanishes beside the gap in which it would be negative, and u grows beyond all bounds.
-    """
-    gap = validity[:, :, 0] & Validity.KD_NOT_POSITIVE != 0
-    row, step = np.nonzero(gap[:, 1:] != gap[:, :-1])
-    start, ends = amplitudes[row, step], gap[row, step]
-    low, high = _bisect(start, amplitudes[row, step + 1], lambda at, which: in_gap(at, row[which]) != ends[which])
-    every = np.arange(validity.shape[2])
-    row, column = np.repeat(row, every.size), np.tile(every, row.size)
-    below, beside = (np.repeat(np.where(ends, *sides), every.size) for sides in ((low, start), (high, low)))
-    reaches = displaced(beside, row, column)
-    return _Steps(row[reaches], column[reaches], below[reaches], beside[reaches])
-
-
-def _first_of(shape: tuple[int, ...], *found: _Steps) -> _Steps:
-    """The lowest of the steps found for each block and target."""
-    row, column, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
-    order = np.argsort(high, kind="stable")
-    _, first = np.unique((row * shape[1] + column)[order], return_index=True)
-    chosen = order[first]
-    return _Steps(row[chosen], column[chosen], low[chosen], high[chosen])
-
-
 def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp]) -> dict[str, Floats]:
     """Cells picked from two-dimensional inputs, one after the other."""
     picked = {}
@@ -387,27 +320,6 @@ def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray
         across = column if values.shape[1] > 1 else np.zeros_like(row)
         picked[name] = values[down, across]
     return picked
-
-
-def _bisect(
-    low: Floats, high: Floats, holds: Callable[[Floats, NDArray[np.intp]], NDArray[np.bool_]]
-) -> tuple[Floats, Floats]:
-    """Halve every interval until its ends are neighbours in double precision.
-
-    `holds` is false at `low` and true at `high`, and stays so; it is asked at amplitudes
-    together with the numbers of the intervals that they belong to.
-    """
-    low, high = low.copy(), high.copy()
-    active = np.arange(low.size)
-    while active.size:
-        middle = low[active] + 0.5 * (high[active] - low[active])
-        between = (low[active] < middle) & (middle < high[active])
-        active, middle = active[between], middle[between]
-        if active.size:
-            above = holds(middle, active)
-            high[active[above]] = middle[above]
-            low[active[~above]] = middle[~above]
-    return low, high
 
 
 def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:

@@ -1,0 +1,199 @@
+"""Where a scan of amplitudes first reaches a target, and what may lie hidden between its points.
+
+The displacement u(A) is known at the points of a scan.  Steps that may hide a peak are cut into parts; where something
+changes with which u jumps or grows beyond all bounds, the place of the change is found.  docs/limit.md says what is
+missed all the same.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.grid.chunks import slabs
+from slipsweep.model.variables import Validity
+
+Floats = NDArray[np.float64]
+
+#: Displacements scanned together: 16 MB, and as much again to compare them.
+SCANNED = 2_000_000
+
+#: A maximum of the scan from this part of the target on may be that of a peak that is higher beside it.
+_MAXIMUM = 0.9
+
+
+class Change(NamedTuple):
+    """What changes with which u jumps, or grows beyond all bounds.
+
+    Attributes
+    ----------
+    result : str
+        In which result it is seen, ...
+    bits : int
+        ... and in which of its bits.
+    least : float
+        From this part of the target on, on either side of a step, its place is looked for, ...
+    part : float
+        ... to this part of the step; 0: to neighbouring numbers.
+    """
+
+    result: str
+    bits: int
+    least: float
+    part: float
+
+
+class Hides(NamedTuple):
+    """Where a scan may hide a peak.
+
+    Attributes
+    ----------
+    saw : float
+        From this part of the target on the steps of blocks that do not recouple are cut into parts: there u jumps up
+        each time that one pulse less stops a block, and then falls.
+    parts : int
+        Parts of such a step.
+    changes : tuple of Change
+        What has its places looked for.
+    """
+
+    saw: float
+    parts: int
+    changes: tuple[Change, ...]
+
+
+#: The gap of the literal rise, in which Kd would be negative: beside it Kd vanishes, and u grows beyond all bounds.
+_GAP = Change("validity", int(Validity.KD_NOT_POSITIVE), 0.0, 0.0)
+
+#: Under a record u jumps where there are more slips or fewer, as two become one; under a waveform, of which no slips
+#: are counted, jumps are found by finer parts.
+UNDER_WAVEFORM = Hides(0.5, 512, (_GAP,))
+UNDER_RECORD = Hides(0.7, 128, (_GAP, Change("number_of_slips", -1, 0.25, 1e-5)))
+
+
+class Steps(NamedTuple):
+    """Steps of a scan in which a target is reached: of which block (row), for which target (column), from where."""
+
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+    low: Floats
+    high: Floats
+
+
+class Scan(NamedTuple):
+    """Blocks at increasing amplitudes, for targets.
+
+    Attributes
+    ----------
+    hides : Hides
+    amplitudes : array, (block, amplitude)
+    moved : array, (block, amplitude, target)
+        Displacements.
+    wanted : array, (block, 1, target)
+        Displacements to be reached.
+    carried : array of bool, (block, amplitude, target)
+        Whether the block does not recouple.
+    """
+
+    hides: Hides
+    amplitudes: Floats
+    moved: Floats
+    wanted: Floats
+    carried: NDArray[np.bool_]
+
+    def before(self) -> NDArray[np.bool_]:
+        """Whether a target is reached nowhere in the scan up to the start of a step, (block, step, target)."""
+        return ~np.logical_or.accumulate(self.moved >= self.wanted, axis=1)[:, :-1]
+
+
+#: Whether targets (columns) are reached by blocks (rows) at amplitudes.
+Displaced: TypeAlias = Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]]
+
+
+def first_step(scan: Scan) -> Steps:
+    """The first step of the scan that reaches each target, of those that are reached."""
+    reaches = scan.moved >= scan.wanted
+    row, column = np.nonzero(reaches.any(axis=1))
+    # the scan begins at yield, where no block has moved: there is always a step before
+    at = reaches.argmax(axis=1)[row, column]
+    return Steps(row, column, scan.amplitudes[row, at - 1], scan.amplitudes[row, at])
+
+
+def hidden_peaks(scan: Scan, displaced: Displaced) -> Steps:
+    """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it."""
+    wanted, inner, parts = scan.wanted, scan.moved[:, 1:-1], scan.hides.parts
+    may = scan.carried & (scan.moved >= scan.hides.saw * wanted)
+    peaks = (inner > scan.moved[:, :-2]) & (inner > scan.moved[:, 2:])
+    may[:, 1:-1] |= peaks & (inner >= _MAXIMUM * wanted)
+    row, step, column = np.nonzero((may[:, 1:] | may[:, :-1]) & scan.before())
+    found = [Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
+    for (some,) in slabs((row.size,), SCANNED // parts):
+        rows, columns = row[some], column[some]
+        # part, step
+        at = np.linspace(scan.amplitudes[rows, step[some]], scan.amplitudes[rows, step[some] + 1], parts + 1)
+        reaches = displaced(at.ravel(), np.tile(rows, parts + 1), np.tile(columns, parts + 1)).reshape(at.shape)
+        (which,) = np.nonzero(reaches.any(axis=0))
+        first = np.maximum(reaches[:, which].argmax(axis=0), 1)
+        found.append(Steps(rows[which], columns[which], at[first - 1, which], at[first, which]))
+    return Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+
+def beside_changes(
+    scan: Scan,
+    change: Change,
+    states: NDArray[np.integer[Any]],
+    state: Callable[[Floats, NDArray[np.intp]], NDArray[np.integer[Any]]],
+    displaced: Displaced,
+) -> Steps:
+    """Steps up to the last amplitude before a change, or to the first behind it, at which a target is reached.
+
+    `states` are those of the scan, (block, amplitude), `state` gives those of blocks (rows) at other amplitudes.
+    """
+    higher = np.maximum(scan.moved[:, 1:], scan.moved[:, :-1])
+    may = scan.before() & ~(higher < change.least * scan.wanted)  # NaN beside a gap
+    row, step = np.nonzero((states[:, 1:] != states[:, :-1]) & may.any(axis=2))
+    start, end, known = scan.amplitudes[row, step], scan.amplitudes[row, step + 1], states[row, step]
+    low, high = bisect(
+        start, end, lambda at, which: np.asarray(state(at, row[which]) != known[which]), change.part * (end - start)
+    )
+    every = np.arange(scan.moved.shape[2])
+    row, column = np.repeat(row, every.size), np.tile(every, row.size)
+    start, low, high = (np.repeat(values, every.size) for values in (start, low, high))
+    at_low = displaced(low, row, column)
+    reaches = at_low | displaced(high, row, column)
+    below, beside = np.where(at_low, start, low), np.where(at_low, low, high)
+    return Steps(row[reaches], column[reaches], below[reaches], beside[reaches])
+
+
+def first_of(shape: tuple[int, ...], *found: Steps) -> Steps:
+    """The lowest of the steps found for each block and target."""
+    row, column, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
+    order = np.argsort(high, kind="stable")
+    _, first = np.unique((row * shape[1] + column)[order], return_index=True)
+    chosen = order[first]
+    return Steps(row[chosen], column[chosen], low[chosen], high[chosen])
+
+
+def bisect(
+    low: Floats,
+    high: Floats,
+    holds: Callable[[Floats, NDArray[np.intp]], NDArray[np.bool_]],
+    width: Floats | float = 0.0,
+) -> tuple[Floats, Floats]:
+    """Halve every interval until its ends are neighbours in double precision, or it is no wider than `width`.
+
+    `holds` is false at `low` and true at `high`, and stays so; it is asked at amplitudes
+    together with the numbers of the intervals that they belong to.
+    """
+    low, high = low.copy(), high.copy()
+    active, enough = np.arange(low.size), np.broadcast_to(width, low.shape)
+    while active.size:
+        middle = low[active] + 0.5 * (high[active] - low[active])
+        between = (low[active] < middle) & (middle < high[active]) & (high[active] - low[active] > enough[active])
+        active, middle = active[between], middle[between]
+        if active.size:
+            above = holds(middle, active)
+            high[active[above]] = middle[above]
+            low[active[~above]] = middle[~above]
+    return low, high
