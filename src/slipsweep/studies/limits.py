@@ -3,9 +3,9 @@
 The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall
 behind a jump, and has gaps where the model gives no value.  So every block is first scanned
 from its yield acceleration upwards, with both sides of the amplitudes at which its mode changes.
-Steps of the scan that may hide a peak are scanned once more, finely.  The first step that reaches
-the target is bisected until two neighbouring double-precision numbers are left.  Scans and the
-bisection ask the cycle solver, for all cells at once.
+What may lie hidden in its steps is looked for (`limit_scans`).  The first step that reaches the
+target is bisected until two neighbouring double-precision numbers are left.  Scans and bisections
+ask the cycle solver, for all cells at once.
 """
 
 import math
@@ -208,7 +208,8 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     hides = UNDER_RECORD if isinstance(problem.excitation, Record) else UNDER_WAVEFORM
     codes = {"validity", *(change.result for change in hides.changes)}
     found = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement", *codes), size)
-    scanned = found["permanent_displacement"]
+    scanned, carried = found["permanent_displacement"], found["validity"] & Validity.NOT_RECOUPLED != 0
+    scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
 
     def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
         cells = _zipped(arrays, row, column)
@@ -223,11 +224,8 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
 
         return beside_changes(scan, change, found[change.result][:, :, 0] & change.bits, state, displaced)
 
-    carried = found["validity"] & Validity.NOT_RECOUPLED != 0
-    scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
-    row, column, low, high = first_of(
-        shape, first_step(scan), hidden_peaks(scan, displaced), *map(beside, hides.changes)
-    )
+    places = (first_step(scan), hidden_peaks(scan, displaced), *map(beside, hides.changes))
+    row, column, low, high = first_of(shape, *places)
     cells = _zipped(arrays, row, column)
     low, high = bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
     wanted = ("permanent_displacement", *_codes(problem), "validity")
