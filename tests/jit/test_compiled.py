@@ -2,6 +2,7 @@
 
 import ast
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import filelock
+import llvmlite.binding
 import numba
 import numba.core.event as events
 import numba.core.registry
@@ -228,6 +230,19 @@ def test_a_damaged_file_is_compiled_anew(cache: Path, damage: str) -> None:
     assert compilations(2.0) == (4.0, True)
     if damage != "folder":
         assert compilations(2.0) == (4.0, False)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_of_what_a_kernel_was_made_of_only_names_are_kept(cache: Path) -> None:
+    """numba would parse all of it when it loads the kernel, and looks up names in it only."""
+    compilations(2.0)
+    (path,) = files(cache)
+    (_, kind, (machine_code, bitcode)), *_ = pickle.loads(path.read_bytes()[32:])
+    kept = llvmlite.binding.parse_bitcode(bitcode)
+    assert (kind, [*kept.functions]) == ("object", [])
+    names = [one.name for one in kept.global_variables]
+    assert any(name.startswith("_ZN08NumbaEnv") for name in names)
+    assert any(name.startswith("_ZN7cpython") and name.encode() in machine_code for name in names)
 
 
 def test_no_folder_to_write_in(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,9 +43,6 @@ need(type(cpu_target), target_context=None)
 need(_nrt_python, c_helpers=None)
 
 
-_ZERO = llvmlite.ir.Constant(llvmlite.ir.IntType(8), 0)
-
-
 class Disk(NullCache):
     """Where a dispatcher looks for machine code before it compiles: one file."""
 
@@ -93,11 +90,11 @@ def _names_only(library: tuple[str, str, tuple[bytes, bytes]]) -> tuple[str, str
     the 500 ms of a small run, and it was two thirds of the file.
     """
     name, kind, (machine_code, bitcode) = library
-    whole, names = llvmlite.binding.parse_bitcode(bitcode), llvmlite.ir.Module()
+    whole, names, byte = llvmlite.binding.parse_bitcode(bitcode), llvmlite.ir.Module(), llvmlite.ir.IntType(8)
     for group in (whole.functions, whole.global_variables):
         for one in group:
             if not one.is_declaration:
-                llvmlite.ir.GlobalVariable(names, llvmlite.ir.IntType(8), one.name).initializer = _ZERO
+                llvmlite.ir.GlobalVariable(names, byte, one.name).initializer = llvmlite.ir.Constant(byte, 0)
     return name, kind, (machine_code, llvmlite.binding.parse_assembly(str(names)).as_bitcode())
 
 
