@@ -199,6 +199,17 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     assert ((limits <= first) & (limits > 0.9 * first)).all()
 
 
+def test_narrow_peaks_are_found_for_all_that_is_asked_of_a_block() -> None:
+    """Parts of a step are solved once for all displacements and frequencies: the bits are those of single calls."""
+    block: dict[str, Any] = {"theta": 4.018, "mu_s": 0.5588, "yield_acceleration": 0.4121}
+    targets, frequencies = [0.3, 1.3, 4.9024, 5.1], [0.5, 1.0, 1.7]
+    together = slipsweep.limit_amplitude(targets, frequency=frequencies, **block).limit_amplitude
+    for target in targets:
+        for frequency in frequencies:
+            alone = slipsweep.limit_amplitude(target, frequency=frequency, **block).limit_amplitude
+            assert together[frequencies.index(frequency), targets.index(target)].item() == alone.item()
+
+
 @pytest.mark.parametrize(("seed", "displacement"), [(70, 0.01), (1514, 0.003), (4277, 0.01), (5903, 0.1), (5429, 0.1)])
 def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float) -> None:
     """The limit is never above the first of 20 000 amplitudes that reaches the target."""

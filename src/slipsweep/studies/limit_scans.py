@@ -106,6 +106,13 @@ class Scan(NamedTuple):
         """Whether a target is reached nowhere in the scan up to the start of a step, (block, step, target)."""
         return ~np.logical_or.accumulate(self.moved >= self.wanted, axis=1)[:, :-1]
 
+    def ratios(self) -> Floats:
+        """Displacements for each target over those for the first, (block, target); NaN where a block does not move."""
+        most = np.nan_to_num(self.moved[:, :, :1], nan=-1.0).argmax(axis=1, keepdims=True)
+        found = np.take_along_axis(self.moved, most, axis=1)[:, 0]
+        with np.errstate(invalid="ignore"):
+            return np.asarray(found / found[:, :1])
+
 
 #: Whether targets (columns) are reached by blocks (rows) at amplitudes.
 Displaced: TypeAlias = Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]]
@@ -120,23 +127,33 @@ def first_step(scan: Scan) -> Steps:
     return Steps(row, column, scan.amplitudes[row, at - 1], scan.amplitudes[row, at])
 
 
-def hidden_peaks(scan: Scan, displaced: Displaced) -> Steps:
-    """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it."""
+def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats], displaced: Displaced) -> Steps:
+    """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it.
+
+    `moved` gives the displacement of blocks (rows) for the first target at other amplitudes.  Those for the others are
+    in the same ratio to it at all amplitudes, so that each part is solved once.
+    """
     wanted, inner, parts = scan.wanted, scan.moved[:, 1:-1], scan.hides.parts
     may = scan.carried & (scan.moved >= scan.hides.saw * wanted)
     peaks = (inner > scan.moved[:, :-2]) & (inner > scan.moved[:, 2:])
     may[:, 1:-1] |= peaks & (inner >= _MAXIMUM * wanted)
     row, step, column = np.nonzero((may[:, 1:] | may[:, :-1]) & scan.before())
+    places, which = np.unique(np.stack([row, step]), axis=1, return_inverse=True)
+    least = wanted[row, 0, column] / scan.ratios()[row, column]
     found = [Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
-    for (some,) in slabs((row.size,), SCANNED // parts):
-        rows, columns = row[some], column[some]
-        # part, step
-        at = np.linspace(scan.amplitudes[rows, step[some]], scan.amplitudes[rows, step[some] + 1], parts + 1)
-        reaches = displaced(at.ravel(), np.tile(rows, parts + 1), np.tile(columns, parts + 1)).reshape(at.shape)
-        (which,) = np.nonzero(reaches.any(axis=0))
-        first = np.maximum(reaches[:, which].argmax(axis=0), 1)
-        found.append(Steps(rows[which], columns[which], at[first - 1, which], at[first, which]))
-    return Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+    for (some,) in slabs((which.max(initial=-1) + 1,), SCANNED // parts):
+        rows, steps = places[:, some]
+        # part, place
+        at = np.linspace(scan.amplitudes[rows, steps], scan.amplitudes[rows, steps + 1], parts + 1)
+        there = moved(at.ravel(), np.tile(rows, parts + 1)).reshape(at.shape)
+        (asked,) = np.nonzero((which >= some.start) & (which < some.stop))
+        asked = asked[np.fmax.reduce(there)[which[asked] - some.start] >= least[asked]]
+        place = which[asked] - some.start
+        first = np.maximum((there[:, place] >= least[asked]).argmax(axis=0), 1)
+        found.append(Steps(row[asked], column[asked], at[first - 1, place], at[first, place]))
+    rows, columns, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
+    reaches = displaced(high, rows, columns) & ~displaced(low, rows, columns)  # the ratio is known to rounding
+    return Steps(rows[reaches], columns[reaches], low[reaches], high[reaches])
 
 
 def beside_changes(

@@ -211,6 +211,10 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     scanned, carried = found["permanent_displacement"], found["validity"] & Validity.NOT_RECOUPLED != 0
     scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
 
+    def moved(amplitude: Floats, row: NDArray[np.intp]) -> Floats:
+        cells = _zipped(arrays, row, np.zeros_like(row))
+        return _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
+
     def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
         cells = _zipped(arrays, row, column)
         moved = _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
@@ -224,7 +228,7 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
 
         return beside_changes(scan, change, found[change.result][:, :, 0] & change.bits, state, displaced)
 
-    places = (first_step(scan), hidden_peaks(scan, displaced), *map(beside, hides.changes))
+    places = (first_step(scan), hidden_peaks(scan, moved, displaced), *map(beside, hides.changes))
     row, column, low, high = first_of(shape, *places)
     cells = _zipped(arrays, row, column)
     low, high = bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
