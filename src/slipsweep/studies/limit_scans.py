@@ -138,11 +138,12 @@ def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats]
     peaks = (inner > scan.moved[:, :-2]) & (inner > scan.moved[:, 2:])
     may[:, 1:-1] |= peaks & (inner >= _MAXIMUM * wanted)
     row, step, column = np.nonzero((may[:, 1:] | may[:, :-1]) & scan.before())
-    places, which = np.unique(np.stack([row, step]), axis=1, return_inverse=True)
+    points = scan.amplitudes.shape[1]
+    places, which = np.unique(row * points + step, return_inverse=True)
     least = wanted[row, 0, column] / scan.ratios()[row, column]
     found = [Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
-    for (some,) in slabs((which.max(initial=-1) + 1,), SCANNED // parts):
-        rows, steps = places[:, some]
+    for (some,) in slabs(places.shape, SCANNED // parts):
+        rows, steps = np.divmod(places[some], points)
         # part, place
         at = np.linspace(scan.amplitudes[rows, steps], scan.amplitudes[rows, steps + 1], parts + 1)
         there = moved(at.ravel(), np.tile(rows, parts + 1)).reshape(at.shape)
