@@ -6,6 +6,8 @@ missed all the same.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -81,7 +83,8 @@ class Steps(NamedTuple):
     high: Floats
 
 
-class Scan(NamedTuple):
+@dataclass(frozen=True)
+class Scan:
     """Blocks at increasing amplitudes, for targets.
 
     Attributes
@@ -102,9 +105,15 @@ class Scan(NamedTuple):
     wanted: Floats
     carried: NDArray[np.bool_]
 
+    @cached_property
+    def reaches(self) -> NDArray[np.bool_]:
+        """Whether a target is reached, (block, amplitude, target)."""
+        return np.asarray(self.moved >= self.wanted)
+
+    @cached_property
     def before(self) -> NDArray[np.bool_]:
         """Whether a target is reached nowhere in the scan up to the start of a step, (block, step, target)."""
-        return ~np.logical_or.accumulate(self.moved >= self.wanted, axis=1)[:, :-1]
+        return ~np.logical_or.accumulate(self.reaches, axis=1)[:, :-1]
 
     def ratios(self) -> Floats:
         """Displacements for each target over those for the first, (block, target); NaN where a block does not move."""
@@ -120,10 +129,9 @@ Displaced: TypeAlias = Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], ND
 
 def first_step(scan: Scan) -> Steps:
     """The first step of the scan that reaches each target, of those that are reached."""
-    reaches = scan.moved >= scan.wanted
-    row, column = np.nonzero(reaches.any(axis=1))
+    row, column = np.nonzero(scan.reaches.any(axis=1))
     # the scan begins at yield, where no block has moved: there is always a step before
-    at = reaches.argmax(axis=1)[row, column]
+    at = scan.reaches.argmax(axis=1)[row, column]
     return Steps(row, column, scan.amplitudes[row, at - 1], scan.amplitudes[row, at])
 
 
@@ -137,7 +145,7 @@ def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats]
     may = scan.carried & (scan.moved >= scan.hides.saw * wanted)
     peaks = (inner > scan.moved[:, :-2]) & (inner > scan.moved[:, 2:])
     may[:, 1:-1] |= peaks & (inner >= _MAXIMUM * wanted)
-    row, step, column = np.nonzero((may[:, 1:] | may[:, :-1]) & scan.before())
+    row, step, column = np.nonzero((may[:, 1:] | may[:, :-1]) & scan.before)
     points = scan.amplitudes.shape[1]
     places, which = np.unique(row * points + step, return_inverse=True)
     least = wanted[row, 0, column] / scan.ratios()[row, column]
@@ -169,7 +177,7 @@ def beside_changes(
     `states` are those of the scan, (block, amplitude), `state` gives those of blocks (rows) at other amplitudes.
     """
     higher = np.maximum(scan.moved[:, 1:], scan.moved[:, :-1])
-    may = scan.before() & ~(higher < change.least * scan.wanted)  # NaN beside a gap
+    may = scan.before & ~(higher < change.least * scan.wanted)  # NaN beside a gap
     row, step = np.nonzero((states[:, 1:] != states[:, :-1]) & may.any(axis=2))
     start, end, known = scan.amplitudes[row, step], scan.amplitudes[row, step + 1], states[row, step]
     low, high = bisect(
