@@ -365,6 +365,21 @@ def lane_relative_acceleration(lanes: np.ndarray, j: int, x: float, g: float) ->
 
 
 @in_lanes
+def lane_resistance(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """n μ at x of a lane: of D all whose integral over a part of the sine has no closed form.
+
+    docs/numerics.md#eq-4-as-a-lag
+    """
+    return eq.normal_acceleration(x, lanes[TAN_THETA + j], g) * lane_friction(lanes, j, x)
+
+
+@in_lanes
+def lane_share(lanes: np.ndarray, j: int) -> float:
+    """κ tan θ of a lane, the part of |x| that D has: D = ± (g μs − n μ) + |x| κ tan θ."""
+    return lanes[TAN_THETA + j] * (lanes[MU_S + j] - lanes[TAN_THETA + j])
+
+
+@in_lanes
 def lane_rate_and_slope(lanes: np.ndarray, j: int, x: float, g: float) -> tuple[float, float]:
     """D and dD/dx of a lane (x ≠ 0, or a zero with the sign of its side)."""
     tan_theta, mu_s = lanes[TAN_THETA + j], lanes[MU_S + j]

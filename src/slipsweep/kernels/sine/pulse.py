@@ -12,8 +12,10 @@ from slipsweep.jit.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
+    MU_S,
     YIELD,
-    lane_relative_acceleration,
+    lane_resistance,
+    lane_share,
 )
 from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
@@ -85,18 +87,20 @@ def lane_rise(kind: int, g: float, lanes: np.ndarray) -> None:
         lanes[PSI + j] = psi
         lanes[V + j], lanes[W + j] = held_motion(amplitude, lanes[LEVEL + j], lanes[START + j], psi)
         lanes[RATE + j] = lanes[MOMENT + j] = 0.0
-    # Eq. 4
+    # Eq. 4: n μ at nodes, the rest in closed form
     for node in range(LANE_NODES.size):
         left, weight = 1.0 - LANE_NODES[node], LANE_WEIGHTS[node]
         for j in range(STRIP):
             x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[PSI + j] * left))
-            weighted = weight * lane_relative_acceleration(lanes, j, x, g)
+            weighted = weight * lane_resistance(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
-        width = -lanes[PSI + j]
-        lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width
-        lanes[V + j] += lanes[RATE + j] * width
+        width, static, share = -lanes[PSI + j], g * lanes[MU_S + j], lane_share(lanes, j)
+        plane, plane_moment = held_motion(lanes[AMPLITUDE + j], 0.0, -width, 0.0)
+        rate, moment = static - lanes[RATE + j], 0.5 * static - lanes[MOMENT + j]
+        lanes[W + j] += share * plane_moment + (lanes[V + j] + moment * width) * width
+        lanes[V + j] += share * plane + rate * width
 
 
 @scalar
