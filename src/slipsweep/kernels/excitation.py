@@ -41,19 +41,18 @@ def from_top(pieces: np.ndarray, p: int, tau: float) -> float:
         return -pieces[p, TOP] * versine(tau)
     sum_ = 0.0
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        sum_ = (sum_ + pieces[p, COEFFICIENTS + TERM * k]) * tau
-    return sum_
+        sum_ = sum_ * tau + pieces[p, COEFFICIENTS + TERM * k]
+    return sum_ * tau
 
 
 @scalar
-def slope(pieces: np.ndarray, p: int, tau: float) -> float:
-    """dw/dτ on piece p."""
-    if pieces[p, ARC] > 0.0:
-        return -pieces[p, TOP] * math.sin(tau)
-    sum_ = 0.0
+def from_top_and_slope(pieces: np.ndarray, p: int, tau: float) -> tuple[float, float]:
+    """w − top and dw/dτ on a curved piece p that is no arc."""
+    sum_, slope = 0.0, 0.0
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        sum_ = sum_ * tau + (k + 1.0) * pieces[p, COEFFICIENTS + TERM * k]
-    return sum_
+        slope = slope * tau + sum_
+        sum_ = sum_ * tau + pieces[p, COEFFICIENTS + TERM * k]
+    return sum_ * tau, slope * tau + sum_
 
 
 @scalar
@@ -63,11 +62,9 @@ def integral(pieces: np.ndarray, p: int, start: float, end: float) -> float:
         return -pieces[p, TOP] * (angle_minus_sine(end) - angle_minus_sine(start))
     sum_start, sum_end = 0.0, 0.0
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        sum_start, sum_end = (
-            (sum_start + pieces[p, ONCE + TERM * k]) * start,
-            (sum_end + pieces[p, ONCE + TERM * k]) * end,
-        )
-    return sum_end * end - sum_start * start
+        once = pieces[p, ONCE + TERM * k]
+        sum_start, sum_end = sum_start * start + once, sum_end * end + once
+    return sum_end * end * end - sum_start * start * start
 
 
 @scalar
@@ -82,10 +79,11 @@ def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[flo
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
         once, twice = pieces[p, ONCE + TERM * k], pieces[p, TWICE + TERM * k]
-        once_start, once_end = (once_start + once) * start, (once_end + once) * end
-        twice_start, twice_end = (twice_start + twice) * start, (twice_end + twice) * end
-    once_start *= start
-    return once_end * end - once_start, twice_end * end * end - twice_start * start * start - once_start * (end - start)
+        once_start, once_end = once_start * start + once, once_end * end + once
+        twice_start, twice_end = twice_start * start + twice, twice_end * end + twice
+    once_start *= start * start
+    moment = twice_end * end * end * end - twice_start * start * start * start
+    return once_end * end * end - once_start, moment - once_start * (end - start)
 
 
 @scalar
@@ -114,7 +112,8 @@ def held_integrals(
 @scalar
 def _beyond(where: tuple[np.ndarray, int, float], tau: float) -> tuple[float, float]:
     pieces, p, wanted = where
-    return from_top(pieces, p, tau) - wanted, slope(pieces, p, tau)
+    value, slope = from_top_and_slope(pieces, p, tau)
+    return value - wanted, slope
 
 
 #: τ on a piece between two places, from a third on, at which w − top is `wanted`.

@@ -77,9 +77,9 @@ def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: 
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
         coefficient = pieces[p, COEFFICIENTS + TERM * k]
         for node in range(NODES.size):
-            x[node] = (x[node] + coefficient) * (start + width * NODES[node])
+            x[node] = x[node] * (start + width * NODES[node]) + coefficient
     for node in range(NODES.size):
-        x[node] = amplitude * abs(top + x[node])
+        x[node] = amplitude * abs(top + x[node] * (start + width * NODES[node]))
 
 
 @summed
