@@ -17,6 +17,18 @@ REGIMES: dict[str, dict[str, Any]] = {"stuck": {}, "stick_slip": {}, "continuous
 _CLEAR_OF_YIELD = 1.01
 
 
+#: θ in degrees, μs and A in g of boxes of the design grid that lie in one regime, or in that part of stick-slip in
+#: which one of its two laws governs all cells.
+BOXES = {
+    "stuck": ((0.0, 5.0), (0.75, 0.9), (0.2, 0.5)),
+    "stick_slip": ((12.0, 17.0), (0.75, 0.9), (0.7, 0.95)),
+    "stick_slip, yield governs": ((13.0, 17.0), (0.7, 0.9), (0.58, 0.66)),
+    "stick_slip, Eq. 4 governs": ((14.0, 18.0), (0.8, 0.9), (1.05, 1.25)),
+    "continuous": ((12.0, 17.0), (0.35, 0.55), (1.05, 1.35)),
+    "newmark": ((12.0, 17.0), (0.75, 0.9), (0.7, 0.95)),
+}
+
+
 def design_grid(thetas: int, frictions: int, amplitudes: int) -> dict[str, Any]:
     """θ 0-20°, μs 0.2-0.9 and A 0.05-1.4 g at 1 Hz."""
     return {
@@ -25,6 +37,24 @@ def design_grid(thetas: int, frictions: int, amplitudes: int) -> dict[str, Any]:
         "amplitude": np.linspace(0.05, 1.4, amplitudes) * G,
         "frequency": 1.0,
     }
+
+
+def regime_box(regime: str, count: int) -> dict[str, Any]:
+    """About `count` cells of one of the `BOXES`, on axes: what each costs when its inputs cost nothing."""
+    side = max(2, round((count / 8) ** (1 / 3)))
+    sizes = (side, side, 8 * side)
+    theta, mu_s, amplitude = (np.linspace(*ends, size) for ends, size in zip(BOXES[regime], sizes, strict=True))
+    name, _, law = regime.partition(", ")
+    grid = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude * G, "frequency": 1.0, **REGIMES[name]}
+    found = slipsweep.sweep(**grid, variables=["sliding_mode", "validity"])
+    governs = (found.validity.values & Validity.YIELD_GOVERNS) > 0
+    assert (found.sliding_mode == _mode(name)).all(), regime
+    assert not law or np.all(governs == law.startswith("yield")), regime
+    return grid
+
+
+def _mode(regime: str) -> SlidingMode:
+    return SlidingMode.STICK_SLIP if regime == "newmark" else SlidingMode[regime.upper()]
 
 
 def regime_cells(regime: str, count: int) -> dict[str, Any]:
@@ -38,8 +68,7 @@ def regime_cells(regime: str, count: int) -> dict[str, Any]:
     while True:
         grid = design_grid(side, side, 8 * side)
         found = slipsweep.sweep(**grid, **options, variables=["sliding_mode", "validity", "yield_acceleration"])
-        mode = SlidingMode.STICK_SLIP if regime == "newmark" else SlidingMode[regime.upper()]
-        inside = (found.sliding_mode == mode) & ((found.validity & Validity.NOT_RECOUPLED) == 0)
+        inside = (found.sliding_mode == _mode(regime)) & ((found.validity & Validity.NOT_RECOUPLED) == 0)
         if regime in ("stick_slip", "newmark"):
             inside &= found.amplitude > _CLEAR_OF_YIELD * found.yield_acceleration
         places = np.flatnonzero(inside.transpose("theta", "mu_s", "amplitude").values)

@@ -18,7 +18,7 @@ import xarray as xr
 
 import slipsweep
 from benchmarks import model, sample
-from benchmarks.grids import REGIMES, design_grid, regime_cells
+from benchmarks.grids import REGIMES, design_grid, regime_box, regime_cells
 from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
 from slipsweep.model.options import Rule
 
@@ -46,10 +46,10 @@ def percentiles(errors: np.ndarray) -> tuple[float, float]:
 
 
 def cycle_solver(tiny: bool) -> str:
-    """Cells of a 3-D grid, and of each regime alone."""
+    """Cells of 3-D grids, and of those in one regime."""
     grids = {"design chart": design_grid(*((4, 4, 8) if tiny else (60, 50, 200)))}
     grids["finer design chart"] = design_grid(*((4, 4, 16) if tiny else (100, 100, 400)))
-    grids |= {regime: regime_cells(regime, 64 if tiny else 200_000) for regime in REGIMES}
+    grids |= {regime: regime_box(regime, 64 if tiny else 4_000_000) for regime in REGIMES}
 
     def run(grid: dict[str, Any]) -> Callable[[], object]:
         return lambda: displacement(**grid, solver="cycle")
