@@ -365,18 +365,12 @@ def lane_relative_acceleration(lanes: np.ndarray, j: int, x: float, g: float) ->
 
 
 @in_lanes
-def lane_resistance(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """n μ at x of a lane: of D all whose integral over a part of the sine has no closed form.
+def lane_loss(lanes: np.ndarray, j: int, x: float, g: float) -> float:
+    """n (μs − μ) at x of a lane, what friction has lost: D = ± n (μs − μ) − |x| tan²θ.
 
-    docs/numerics.md#eq-4-as-a-lag
+    Of D all that has no integral in closed form over a part of the sine (docs/numerics.md#eq-4-as-a-lag).
     """
-    return eq.normal_acceleration(x, lanes[TAN_THETA + j], g) * lane_friction(lanes, j, x)
-
-
-@in_lanes
-def lane_share(lanes: np.ndarray, j: int) -> float:
-    """κ tan θ of a lane, the part of |x| that D has: D = ± (g μs − n μ) + |x| κ tan θ."""
-    return lanes[TAN_THETA + j] * (lanes[MU_S + j] - lanes[TAN_THETA + j])
+    return eq.normal_acceleration(x, lanes[TAN_THETA + j], g) * (lanes[MU_S + j] - lane_friction(lanes, j, x))
 
 
 @in_lanes

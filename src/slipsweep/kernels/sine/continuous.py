@@ -23,9 +23,8 @@ from slipsweep.kernels.block import (
     Motion,
     Options,
     friction,
+    lane_loss,
     lane_rate_and_slope,
-    lane_resistance,
-    lane_share,
     opposite,
     phase,
     relative_acceleration,
@@ -256,10 +255,11 @@ def lane_turns(g: float, lanes: np.ndarray) -> None:
             for j in range(STRIP):
                 phi = lanes[PSI + j] * at
                 x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-                lanes[RATE + j] += weight * lane_resistance(lanes, j, side * x, g)
+                lanes[RATE + j] += weight * lane_loss(lanes, j, side * x, g)
         for j in range(STRIP):
-            phi, plane = lanes[PSI + j], lanes[AMPLITUDE + j] * lane_share(lanes, j)
-            lanes[RATE + j] = side * (g * lanes[MU_S + j] - lanes[RATE + j]) * phi + plane * versine(phi)
+            phi, tan_theta = lanes[PSI + j], lanes[TAN_THETA + j]
+            slant = tan_theta * tan_theta * lanes[AMPLITUDE + j]
+            lanes[RATE + j] = side * lanes[RATE + j] * phi - slant * versine(phi)
     for j in range(STRIP):
         # as in `continuous_peaks`: the fall mirrors the rise
         bump, half_gain = lanes[RATE + j], lanes[GAIN + j] - 2.0 * lanes[V + j]
@@ -291,16 +291,15 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
             # sin φ on the way from Üg = 0 to Üg = Üy
             phi = (HALF_PI + lanes[BEGAN + j]) * at
             x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
-            weighted = weight * lane_resistance(lanes, j, x, g)
+            weighted = weight * lane_loss(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
         began, drift = lanes[BEGAN + j], lanes[GAIN + j]
-        width = HALF_PI + began
-        static, plane = g * lanes[MU_S + j], lanes[AMPLITUDE + j] * lane_share(lanes, j)
-        rate, moment = static - lanes[RATE + j], 0.5 * static - lanes[MOMENT + j]
-        missed = rate * width + plane * versine(width)
-        missed_moment = moment * width * width + plane * angle_minus_sine(width)
+        width, tan_theta = HALF_PI + began, lanes[TAN_THETA + j]
+        slant = tan_theta * tan_theta * lanes[AMPLITUDE + j]
+        missed = lanes[RATE + j] * width - slant * versine(width)
+        missed_moment = lanes[MOMENT + j] * width * width - slant * angle_minus_sine(width)
         lanes[W + j] = continuous_displacement(lanes[V + j], missed, missed_moment, drift, began, options.cycles)
         lanes[_MISSED + j] = missed
     if options.wants_peak:

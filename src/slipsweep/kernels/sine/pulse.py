@@ -12,10 +12,9 @@ from slipsweep.jit.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
-    MU_S,
+    TAN_THETA,
     YIELD,
-    lane_resistance,
-    lane_share,
+    lane_loss,
 )
 from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
@@ -87,20 +86,20 @@ def lane_rise(kind: int, g: float, lanes: np.ndarray) -> None:
         lanes[PSI + j] = psi
         lanes[V + j], lanes[W + j] = held_motion(amplitude, lanes[LEVEL + j], lanes[START + j], psi)
         lanes[RATE + j] = lanes[MOMENT + j] = 0.0
-    # Eq. 4: n μ at nodes, the rest in closed form
+    # Eq. 4: n (μs − μ) at nodes, the rest in closed form
     for node in range(LANE_NODES.size):
         left, weight = 1.0 - LANE_NODES[node], LANE_WEIGHTS[node]
         for j in range(STRIP):
             x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[PSI + j] * left))
-            weighted = weight * lane_resistance(lanes, j, x, g)
+            weighted = weight * lane_loss(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
-        width, static, share = -lanes[PSI + j], g * lanes[MU_S + j], lane_share(lanes, j)
+        width, tan_theta = -lanes[PSI + j], lanes[TAN_THETA + j]
         plane, plane_moment = held_motion(lanes[AMPLITUDE + j], 0.0, -width, 0.0)
-        rate, moment = static - lanes[RATE + j], 0.5 * static - lanes[MOMENT + j]
-        lanes[W + j] += share * plane_moment + (lanes[V + j] + moment * width) * width
-        lanes[V + j] += share * plane + rate * width
+        slant = tan_theta * tan_theta
+        lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width - slant * plane_moment
+        lanes[V + j] += lanes[RATE + j] * width - slant * plane
 
 
 @scalar
