@@ -47,7 +47,9 @@ def from_top(pieces: np.ndarray, p: int, tau: float) -> float:
 
 @scalar
 def from_top_and_slope(pieces: np.ndarray, p: int, tau: float) -> tuple[float, float]:
-    """w − top and dw/dτ on a curved piece p that is no arc."""
+    """w − top and dw/dτ on piece p."""
+    if pieces[p, ARC] > 0.0:
+        return -pieces[p, TOP] * versine(tau), -pieces[p, TOP] * math.sin(tau)
     sum_, slope = 0.0, 0.0
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
         slope = slope * tau + sum_

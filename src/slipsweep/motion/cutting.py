@@ -3,7 +3,7 @@
 `wave_of` gives a `pieces.Wave`: the shaking cut where w jumps,
 bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece (and further
 where a smooth one would be too long for its polynomial).  `kernels.excitation` evaluates a piece
-(`plane`, `from_top`, `slope`), integrates it (`held_integrals`) and inverts it (`offset_at`); τ, the
+(`plane`, `from_top_and_slope`), integrates it (`held_integrals`) and inverts it (`offset_at`); τ, the
 phase on a piece, runs from `BEGIN` to `FINISH` (columns of ``pieces``), and `START` to `END` is the same
 in the table's phases.  Pieces do not depend on the cell.  What happens between two pieces: w
 goes from `LAST` of the one to `FIRST` of the other, whose `JUMPS` tells a jump upwards.  Before piece 0
