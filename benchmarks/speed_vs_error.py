@@ -205,7 +205,8 @@ def draw(found: list[Point], path: Path) -> None:
                     zorder=3 if star else 2,
                 )  # fmt: skip
                 if method:
-                    axis.annotate(method, (times[-1], middle[-1]), (4, -2), textcoords="offset points", fontsize=6)
+                    beside = (4, {"CyRK": -8, "diffrax": 5}.get(family, -2))  # their points lie side by side
+                    axis.annotate(method, (times[-1], middle[-1]), beside, textcoords="offset points", fontsize=6)
         axis.set(xscale="log", yscale="log", title=regime.replace("_", "–"), ylim=(3e-18, 30))
         axis.grid(which="major", alpha=0.3)
     for axis in axes[1]:
