@@ -138,8 +138,8 @@ def first_step(scan: Scan) -> Steps:
 def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats], displaced: Displaced) -> Steps:
     """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it.
 
-    `moved` gives the displacement of blocks (rows) for the first target at other amplitudes.  Those for the others are
-    in the same ratio to it at all amplitudes, so that each part is solved once.
+    `moved` gives the displacement of blocks (rows) for the first target, each at other amplitudes of its own.  Those
+    for the others are in the same ratio to it at all amplitudes, so that each part is solved once.
     """
     wanted, inner, parts = scan.wanted, scan.moved[:, 1:-1], scan.hides.parts
     may = scan.carried & (scan.moved >= scan.hides.saw * wanted)
@@ -152,14 +152,14 @@ def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats]
     found = [Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
     for (some,) in slabs(places.shape, SCANNED // parts):
         rows, steps = np.divmod(places[some], points)
-        # part, place
-        at = np.linspace(scan.amplitudes[rows, steps], scan.amplitudes[rows, steps + 1], parts + 1)
-        there = moved(at.ravel(), np.tile(rows, parts + 1)).reshape(at.shape)
+        # place, part
+        at = np.linspace(scan.amplitudes[rows, steps], scan.amplitudes[rows, steps + 1], parts + 1, axis=1)
+        there = moved(at, rows)
         (asked,) = np.nonzero((which >= some.start) & (which < some.stop))
-        asked = asked[np.fmax.reduce(there)[which[asked] - some.start] >= least[asked]]
+        asked = asked[np.fmax.reduce(there, axis=1)[which[asked] - some.start] >= least[asked]]
         place = which[asked] - some.start
-        first = np.maximum((there[:, place] >= least[asked]).argmax(axis=0), 1)
-        found.append(Steps(row[asked], column[asked], at[first - 1, place], at[first, place]))
+        first = np.maximum((there[place] >= least[asked, np.newaxis]).argmax(axis=1), 1)
+        found.append(Steps(row[asked], column[asked], at[place, first - 1], at[place, first]))
     rows, columns, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
     reaches = displaced(high, rows, columns) & ~displaced(low, rows, columns)  # the ratio is known to rounding
     return Steps(rows[reaches], columns[reaches], low[reaches], high[reaches])

@@ -212,7 +212,7 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
 
     def moved(amplitude: Floats, row: NDArray[np.intp]) -> Floats:
-        cells = _zipped(arrays, row, np.zeros_like(row))
+        cells = {name: values[:, np.newaxis] for name, values in _zipped(arrays, row, np.zeros_like(row)).items()}
         return _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
 
     def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
