@@ -106,14 +106,18 @@ class Scan:
     carried: NDArray[np.bool_]
 
     @cached_property
-    def reaches(self) -> NDArray[np.bool_]:
-        """Whether a target is reached, (block, amplitude, target)."""
-        return np.asarray(self.moved >= self.wanted)
+    def first(self) -> NDArray[np.intp]:
+        """The first amplitude that reaches a target, (block, target); their number where none does."""
+        reaches = self.moved >= self.wanted
+        first = reaches.argmax(axis=1)
+        reached = np.take_along_axis(reaches, first[:, np.newaxis], axis=1)[:, 0]
+        return np.asarray(np.where(reached, first, self.moved.shape[1]))
 
     @cached_property
     def before(self) -> NDArray[np.bool_]:
         """Whether a target is reached nowhere in the scan up to the start of a step, (block, step, target)."""
-        return ~np.logical_or.accumulate(self.reaches, axis=1)[:, :-1]
+        steps = np.arange(self.moved.shape[1] - 1)
+        return np.asarray(steps[:, np.newaxis] < self.first[:, np.newaxis])
 
     def ratios(self) -> Floats:
         """Displacements for each target over those for the first, (block, target); NaN where a block does not move."""
@@ -129,10 +133,15 @@ Displaced: TypeAlias = Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], ND
 
 def first_step(scan: Scan) -> Steps:
     """The first step of the scan that reaches each target, of those that are reached."""
-    row, column = np.nonzero(scan.reaches.any(axis=1))
+    row, column = np.nonzero(scan.first < scan.moved.shape[1])
     # the scan begins at yield, where no block has moved: there is always a step before
-    at = scan.reaches.argmax(axis=1)[row, column]
+    at = scan.first[row, column]
     return Steps(row, column, scan.amplitudes[row, at - 1], scan.amplitudes[row, at])
+
+
+def _places(holds: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
+    """As `np.nonzero`, where few places hold: in a tenth of the time."""
+    return np.unravel_index(np.flatnonzero(holds), holds.shape)
 
 
 def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats], displaced: Displaced) -> Steps:
@@ -145,7 +154,7 @@ def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats]
     may = scan.carried & (scan.moved >= scan.hides.saw * wanted)
     peaks = (inner > scan.moved[:, :-2]) & (inner > scan.moved[:, 2:])
     may[:, 1:-1] |= peaks & (inner >= _MAXIMUM * wanted)
-    row, step, column = np.nonzero((may[:, 1:] | may[:, :-1]) & scan.before)
+    row, step, column = _places((may[:, 1:] | may[:, :-1]) & scan.before)
     points = scan.amplitudes.shape[1]
     places, which = np.unique(row * points + step, return_inverse=True)
     least = wanted[row, 0, column] / scan.ratios()[row, column]
