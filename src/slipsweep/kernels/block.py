@@ -359,18 +359,18 @@ def lane_response(lanes: np.ndarray, j: int, x: float, g: float) -> float:
 
 
 @in_lanes
-def lane_relative_acceleration(lanes: np.ndarray, j: int, x: float, g: float) -> float:
-    """D(x) of a lane."""
-    return eq.relative_acceleration(x, lane_friction(lanes, j, x), lanes[MU_S + j], lanes[TAN_THETA + j], g)
-
-
-@in_lanes
 def lane_loss(lanes: np.ndarray, j: int, x: float, g: float) -> float:
     """n (μs − μ) at x of a lane, what friction has lost: D = ± n (μs − μ) − |x| tan²θ.
 
     Of D all that has no integral in closed form over a part of the sine (docs/numerics.md#eq-4-as-a-lag).
     """
     return eq.normal_acceleration(x, lanes[TAN_THETA + j], g) * (lanes[MU_S + j] - lane_friction(lanes, j, x))
+
+
+@in_lanes
+def lane_slant(lanes: np.ndarray, j: int, plane: float) -> float:
+    """|x| tan²θ of a lane, the rest of D, or its integral from that of |x|."""
+    return lanes[TAN_THETA + j] * lanes[TAN_THETA + j] * plane
 
 
 @in_lanes

@@ -15,8 +15,9 @@ from slipsweep.kernels.block import (
     NOT_RECOUPLED,
     YIELD,
     Options,
-    lane_relative_acceleration,
+    lane_loss,
     lane_response,
+    lane_slant,
 )
 from slipsweep.kernels.events import STRIP, root_of
 from slipsweep.kernels.sine.cycles import lane_series, pause_of
@@ -169,10 +170,11 @@ def followed_to_peak(lanes: np.ndarray, j: int, start: float, g: float) -> tuple
     for node in range(LANE_NODES.size):
         left = 1.0 - LANE_NODES[node]
         x = lanes[AMPLITUDE + j] * (1.0 - versine(start * left))
-        weighted = LANE_WEIGHTS[node] * lane_relative_acceleration(lanes, j, x, g)
+        weighted = LANE_WEIGHTS[node] * lane_loss(lanes, j, x, g)
         rate += weighted
         moment += left * weighted
-    return -start * rate, start * start * moment
+    plane, plane_moment = held_motion(lanes[AMPLITUDE + j], 0.0, start, 0.0)
+    return -start * rate - lane_slant(lanes, j, plane), start * start * moment - lane_slant(lanes, j, plane_moment)
 
 
 @scalar

@@ -25,6 +25,7 @@ from slipsweep.kernels.block import (
     friction,
     lane_loss,
     lane_rate_and_slope,
+    lane_slant,
     opposite,
     phase,
     relative_acceleration,
@@ -257,8 +258,7 @@ def lane_turns(g: float, lanes: np.ndarray) -> None:
                 x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
                 lanes[RATE + j] += weight * lane_loss(lanes, j, side * x, g)
         for j in range(STRIP):
-            phi, tan_theta = lanes[PSI + j], lanes[TAN_THETA + j]
-            slant = tan_theta * tan_theta * lanes[AMPLITUDE + j]
+            phi, slant = lanes[PSI + j], lane_slant(lanes, j, lanes[AMPLITUDE + j])
             lanes[RATE + j] = side * lanes[RATE + j] * phi - slant * versine(phi)
     for j in range(STRIP):
         # as in `continuous_peaks`: the fall mirrors the rise
@@ -296,8 +296,7 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
         began, drift = lanes[BEGAN + j], lanes[GAIN + j]
-        width, tan_theta = HALF_PI + began, lanes[TAN_THETA + j]
-        slant = tan_theta * tan_theta * lanes[AMPLITUDE + j]
+        width, slant = HALF_PI + began, lane_slant(lanes, j, lanes[AMPLITUDE + j])
         missed = lanes[RATE + j] * width - slant * versine(width)
         missed_moment = lanes[MOMENT + j] * width * width - slant * angle_minus_sine(width)
         lanes[W + j] = continuous_displacement(lanes[V + j], missed, missed_moment, drift, began, options.cycles)

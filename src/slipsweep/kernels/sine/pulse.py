@@ -12,9 +12,9 @@ from slipsweep.jit.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
-    TAN_THETA,
     YIELD,
     lane_loss,
+    lane_slant,
 )
 from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
@@ -95,11 +95,10 @@ def lane_rise(kind: int, g: float, lanes: np.ndarray) -> None:
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
-        width, tan_theta = -lanes[PSI + j], lanes[TAN_THETA + j]
+        width = -lanes[PSI + j]
         plane, plane_moment = held_motion(lanes[AMPLITUDE + j], 0.0, -width, 0.0)
-        slant = tan_theta * tan_theta
-        lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width - slant * plane_moment
-        lanes[V + j] += lanes[RATE + j] * width - slant * plane
+        lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width - lane_slant(lanes, j, plane_moment)
+        lanes[V + j] += lanes[RATE + j] * width - lane_slant(lanes, j, plane)
 
 
 @scalar
