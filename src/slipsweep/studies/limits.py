@@ -211,8 +211,12 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     scanned, carried = found["permanent_displacement"], found["validity"] & Validity.NOT_RECOUPLED != 0
     scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
 
+    def of_blocks(row: NDArray[np.intp]) -> dict[str, Floats]:
+        # but for a factor the same at all that is asked of a block
+        return _zipped(arrays, row, np.zeros_like(row))
+
     def moved(amplitude: Floats, row: NDArray[np.intp]) -> Floats:
-        cells = {name: values[:, np.newaxis] for name, values in _zipped(arrays, row, np.zeros_like(row)).items()}
+        cells = {name: values[:, np.newaxis] for name, values in of_blocks(row).items()}
         return _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
 
     def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -222,9 +226,7 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
 
     def beside(change: Change) -> Steps:
         def state(amplitude: Floats, row: NDArray[np.intp]) -> NDArray[np.integer[Any]]:
-            # the same at all that is asked of a block
-            cells = _zipped(arrays, row, np.zeros_like(row))
-            return np.asarray(_at(problem, cells, amplitude, (change.result,))[change.result] & change.bits)
+            return np.asarray(_at(problem, of_blocks(row), amplitude, (change.result,))[change.result] & change.bits)
 
         return beside_changes(scan, change, found[change.result][:, :, 0] & change.bits, state, displaced)
 
