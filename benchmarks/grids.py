@@ -16,9 +16,10 @@ REGIMES: dict[str, dict[str, Any]] = {"stuck": {}, "stick_slip": {}, "continuous
 #: A stick-slip slide closer to yield than this is stepped by finer steps of its own.
 _CLEAR_OF_YIELD = 1.01
 
+#: The ranges of the design grid: θ in degrees, μs, and A in g.
+_DESIGN = ((0.0, 20.0), (0.2, 0.9), (0.05, 1.4))
 
-#: θ in degrees, μs and A in g of boxes of the design grid that lie in one regime, or in that part of stick-slip in
-#: which one of its two laws governs all cells.
+#: Those of boxes of it that lie in one regime, or in that part of stick-slip in which one of its two laws governs.
 BOXES = {
     "stuck": ((0.0, 5.0), (0.75, 0.9), (0.2, 0.5)),
     "stick_slip": ((12.0, 17.0), (0.75, 0.9), (0.7, 0.95)),
@@ -29,23 +30,21 @@ BOXES = {
 }
 
 
+def _axes(ranges: tuple[tuple[float, float], ...], *sizes: int) -> dict[str, Any]:
+    theta, mu_s, amplitude = (np.linspace(*ends, size) for ends, size in zip(ranges, sizes, strict=True))
+    return {"theta": theta, "mu_s": mu_s, "amplitude": amplitude * G, "frequency": 1.0}
+
+
 def design_grid(thetas: int, frictions: int, amplitudes: int) -> dict[str, Any]:
     """θ 0-20°, μs 0.2-0.9 and A 0.05-1.4 g at 1 Hz."""
-    return {
-        "theta": np.linspace(0.0, 20.0, thetas),
-        "mu_s": np.linspace(0.2, 0.9, frictions),
-        "amplitude": np.linspace(0.05, 1.4, amplitudes) * G,
-        "frequency": 1.0,
-    }
+    return _axes(_DESIGN, thetas, frictions, amplitudes)
 
 
 def regime_box(regime: str, count: int) -> dict[str, Any]:
     """About `count` cells of one of the `BOXES`, on axes: what each costs when its inputs cost nothing."""
     side = max(2, round((count / 8) ** (1 / 3)))
-    sizes = (side, side, 8 * side)
-    theta, mu_s, amplitude = (np.linspace(*ends, size) for ends, size in zip(BOXES[regime], sizes, strict=True))
     name, _, law = regime.partition(", ")
-    grid = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude * G, "frequency": 1.0, **REGIMES[name]}
+    grid = _axes(BOXES[regime], side, side, 8 * side) | REGIMES[name]
     found = slipsweep.sweep(**grid, variables=["sliding_mode", "validity"])
     governs = (found.validity.values & Validity.YIELD_GOVERNS) > 0
     assert (found.sliding_mode == _mode(name)).all(), regime
