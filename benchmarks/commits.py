@@ -32,7 +32,7 @@ BASE = "0c4c6a1"
 TASKS = (
     "sine, displacement", "sine, all results", "cosine", "triangle", "square", "triangle with ramps", "three harmonics",
     "64 steps, rectangle", "64 steps, Simpson", "1024 steps, rectangle", "1024 steps, Simpson",
-    "4096 steps, rectangle", "4096 steps, Simpson", "record, friction law", "record, Newmark",
+    "4096 steps, rectangle", "4096 steps, Simpson", "record, friction law", "record, Newmark", "limits",
 )  # fmt: skip
 
 #: Solves the tasks it is told, with the slipsweep that it finds, by whichever of its interfaces there is.
@@ -70,6 +70,11 @@ def recorded(**options):
     scale = given.pop("amplitude") / 3.0
     return slipsweep.sweep_record(slipsweep.read_record(record), scale=scale, **given, **one, **options)
 
+def limits():
+    given = grid(200_000)
+    given.pop("amplitude")
+    return slipsweep.limit_amplitude(0.05, **given | {"frequency": np.geomspace(0.5, 10.0, 30)})
+
 one = {"variables": ["permanent_displacement"]}
 terms = {"amplitudes": (1.0, 0.6, 0.35), "multiples": (1, 2, 5), "phases": (0.0, 40.0, 100.0)}
 tasks = {
@@ -88,6 +93,7 @@ tasks = {
     "4096 steps, Simpson": lambda: slipsweep.sweep(**grid(5_000), **step("simpson", 4096), **one),
     "record, friction law": recorded,
     "record, Newmark": lambda: recorded(model="newmark"),
+    "limits": limits,
 }
 for line in sys.stdin:
     start = time.process_time()
@@ -166,7 +172,7 @@ def measured(commits: list[str], rounds: int, many: float) -> dict[str, dict[str
 
 def drawn(ratios: dict[str, dict[str, float]], commits: list[str], path: Path) -> None:
     """Time over that of `BASE` by task and commit, a panel a task: nothing to tell apart by colour."""
-    figure, panels = plt.subplots(5, 3, figsize=(9.0, 10.0), sharex=True, sharey=True, layout="constrained")
+    figure, panels = plt.subplots(4, 4, figsize=(10.0, 9.0), sharex=True, sharey=True, layout="constrained")
     for panel, (task, found) in zip(panels.flat, ratios.items(), strict=True):
         places = [place for place, commit in enumerate(commits) if commit in found]
         values = [found[commit] for commit in commits if commit in found]

@@ -16,6 +16,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid.tables import Variable
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
+from slipsweep.studies.limit_scans import narrow
 from slipsweep.studies.limits import plan_limits
 from tests.support.cases import choices
 from tests.support.commands import command
@@ -39,6 +40,39 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
             amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
         )
     ).permanent_displacement
+
+
+#: Functions with one change of sign in [1, 2], at that place; the last two lack values, below it and above it.
+SIGNS: dict[str, tuple[float, Any]] = {
+    "smooth": (1.4, lambda x: x**3 - 1.4**3),
+    "steep": (1.4, lambda x: np.expm1(40.0 * (x - 1.4))),
+    "flat": (1.4, lambda x: (x - 1.4) ** 9),
+    "jump": (math.e / 2, lambda x: np.where(x < math.e / 2, -1e-9, 1e9)),
+    "after a gap": (math.e / 2, lambda x: np.where(x < math.e / 2, np.nan, x)),
+    "unbounded": (math.e / 2, lambda x: np.where(x < math.e / 2, x - 9.0, np.inf)),
+}
+
+
+@pytest.mark.parametrize("name", SIGNS)
+@pytest.mark.parametrize("ends", [(1.0, 2.0), (1e-300, 2.0), (1.0, 1e300)])
+def test_an_interval_is_narrowed_to_neighbours_in_at_most_one_step_more_than_by_halves(
+    name: str, ends: tuple[float, float]
+) -> None:
+    place, excess = SIGNS[name]
+    asked = []
+
+    def counted(at: np.ndarray, which: np.ndarray) -> np.ndarray:
+        asked.append(at)
+        with np.errstate(over="ignore"):
+            return np.asarray(excess(at))
+
+    low, high = narrow(*(np.array([end]) for end in ends), counted)
+    assert np.nextafter(low, high) == high
+    assert high[0] == pytest.approx(place, rel=1e-14)
+    # both ends are asked first; halves: down to the spacing of doubles at the root
+    halves = math.ceil(math.log2(ends[1] - ends[0]) - math.log2(math.ulp(place)))
+    assert len(asked) <= 2 + halves + 1
+    assert len(asked) <= 12 or name != "smooth" or ends != (1.0, 2.0)
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)

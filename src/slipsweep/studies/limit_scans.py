@@ -8,6 +8,7 @@ missed all the same.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -23,6 +24,10 @@ SCANNED = 2_000_000
 
 #: A maximum of the scan from this part of the target on may be that of a peak that is higher beside it.
 _MAXIMUM = 0.9
+
+#: By this part of an interval, times its length over that at first, a secant's guess is moved towards the middle: past
+#: the root, so that both ends come to it.
+_INWARD = 0.2
 
 
 class Change(NamedTuple):
@@ -189,8 +194,11 @@ def beside_changes(
     may = scan.before & ~(higher < change.least * scan.wanted)  # NaN beside a gap
     row, step = np.nonzero((states[:, 1:] != states[:, :-1]) & may.any(axis=2))
     start, end, known = scan.amplitudes[row, step], scan.amplitudes[row, step + 1], states[row, step]
-    low, high = bisect(
-        start, end, lambda at, which: np.asarray(state(at, row[which]) != known[which]), change.part * (end - start)
+    low, high = narrow(
+        start,
+        end,
+        lambda at, which: np.where(state(at, row[which]) != known[which], 1.0, -1.0),
+        change.part * (end - start),
     )
     every = np.arange(scan.moved.shape[2])
     row, column = np.repeat(row, every.size), np.tile(every, row.size)
@@ -210,25 +218,39 @@ def first_of(shape: tuple[int, ...], *found: Steps) -> Steps:
     return Steps(row[chosen], column[chosen], low[chosen], high[chosen])
 
 
-def bisect(
+def narrow(
     low: Floats,
     high: Floats,
-    holds: Callable[[Floats, NDArray[np.intp]], NDArray[np.bool_]],
+    excess: Callable[[Floats, NDArray[np.intp]], Floats],
     width: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Halve every interval until its ends are neighbours in double precision, or it is no wider than `width`.
+    """Narrow every interval until its ends are neighbours in double precision, or it is no wider than `width`.
 
-    `holds` is false at `low` and true at `high`, and stays so; it is asked at amplitudes
-    together with the numbers of the intervals that they belong to.
+    `excess` is negative or NaN at `low`, not negative at `high`, and changes its sign once; it is asked at amplitudes
+    together with the numbers of the intervals that they belong to.  By ITP (Oliveira and Takahashi 2020): the guess of
+    a secant is moved towards the middle, and is never so far from it that more than one step is lost to bisection.
+    Where excess has no finite value it is bisection.
     """
     low, high = low.copy(), high.copy()
     active, enough = np.arange(low.size), np.broadcast_to(width, low.shape)
-    while active.size:
-        middle = low[active] + 0.5 * (high[active] - low[active])
-        between = (low[active] < middle) & (middle < high[active]) & (high[active] - low[active] > enough[active])
-        active, middle = active[between], middle[between]
-        if active.size:
-            above = holds(middle, active)
-            high[active[above]] = middle[above]
-            low[active[~above]] = middle[~above]
+    below, above = excess(low, active), excess(high, active)
+    widest = high - low
+    for step in count():
+        start, end = low[active], high[active]
+        middle = start + 0.5 * (end - start)
+        wide = (start < middle) & (middle < end) & (end - start > enough[active])
+        active, start, end, middle = active[wide], start[wide], end[wide], middle[wide]
+        if not active.size:
+            break
+        length, first, last = end - start, below[active], above[active]
+        with np.errstate(invalid="ignore"):
+            aside = -np.nan_to_num(0.5 + first / (last - first)) * length
+        inward = _INWARD * length * (length / widest[active])
+        furthest = np.maximum(np.ldexp(widest[active], -step) - 0.5 * length, 0.0)
+        at = middle + np.copysign(np.clip(np.abs(aside) - inward, 0.0, furthest), aside)
+        at = np.clip(at, np.nextafter(start, end), np.nextafter(end, start))
+        found = excess(at, active)
+        reaches = found >= 0.0
+        high[active[reaches]], above[active[reaches]] = at[reaches], found[reaches]
+        low[active[~reaches]], below[active[~reaches]] = at[~reaches], found[~reaches]
     return low, high

@@ -4,8 +4,8 @@ The displacement u(A) is no simple function: it jumps where the sliding mode cha
 behind a jump, and has gaps where the model gives no value.  So every block is first scanned
 from its yield acceleration upwards, with both sides of the amplitudes at which its mode changes.
 What may lie hidden in its steps is looked for (`limit_scans`).  The first step that reaches the
-target is bisected until two neighbouring double-precision numbers are left.  Scans and bisections
-ask the cycle solver, for all cells at once.
+target is narrowed until two neighbouring double-precision numbers are left.  Both ask the cycle
+solver, for all cells at once.
 """
 
 import math
@@ -47,10 +47,10 @@ from slipsweep.studies.limit_scans import (
     Scan,
     Steps,
     beside_changes,
-    bisect,
     first_of,
     first_step,
     hidden_peaks,
+    narrow,
 )
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ Floats = NDArray[np.float64]
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 256
 
-#: What a limit takes beside its block's scan, in cells of the cycle solver: the bisection, and a scan's scaling.
+#: What a limit takes beside its block's scan, in cells of the cycle solver: the search in a step, a scan's scaling.
 _COST = 100.0
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
@@ -219,10 +219,13 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
         cells = {name: values[:, np.newaxis] for name, values in of_blocks(row).items()}
         return _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
 
-    def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
+    def excess(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> Floats:
         cells = _zipped(arrays, row, column)
         moved = _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
-        return np.asarray(moved >= displacement[row, column])
+        return np.asarray(moved - displacement[row, column])
+
+    def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray(excess(amplitude, row, column) >= 0.0)
 
     def beside(change: Change) -> Steps:
         def state(amplitude: Floats, row: NDArray[np.intp]) -> NDArray[np.integer[Any]]:
@@ -233,7 +236,7 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     places = (first_step(scan), hidden_peaks(scan, moved, displaced), *map(beside, hides.changes))
     row, column, low, high = first_of(shape, *places)
     cells = _zipped(arrays, row, column)
-    low, high = bisect(low, high, lambda amplitude, which: displaced(amplitude, row[which], column[which]))
+    low, high = narrow(low, high, lambda amplitude, which: excess(amplitude, row[which], column[which]))
     wanted = ("permanent_displacement", *_codes(problem), "validity")
     before, after = _at(problem, cells, low, wanted), _at(problem, cells, high, wanted)
 
