@@ -24,6 +24,6 @@ def solve_cells(
         codes[0, j], codes[1, j] = block.sliding_mode, validity_before(block, wave)
         motion[0, j] = motion[1, j] = 0.0 if block.sliding_mode == STUCK else math.nan
         if block.sliding_mode == CONTINUOUS:
-            store_motion(continuous(block, room), j, motion, codes)
+            store_motion(continuous(block, options.wants_peak, room), j, motion, codes)
         elif block.sliding_mode == STICK_SLIP:
             store_motion(train(block, options, wave, room), j, motion, codes)

@@ -14,7 +14,7 @@ from slipsweep.kernels.events import first_of
 from slipsweep.kernels.excitation import offset_at, plane
 from slipsweep.kernels.pulse import DISPLACEMENT, PEAK, VELOCITY
 from slipsweep.kernels.step.lanes import MIDDLE, RATE, Room, advance, eq4_rates, node_rate, steps_to_turn, take_followed
-from slipsweep.kernels.step.rates import SIMPSON, coefficients, take, velocity_gain
+from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, coefficients, take, velocity_gain
 from slipsweep.kernels.step.slides import LAYER, LEAST_STEP, SHARE_OF_CYCLE, layer_of, reset_state
 from slipsweep.kernels.step.table import AHEAD, Steps, node
 from slipsweep.model import equations as eq
@@ -61,24 +61,16 @@ def continuous_step(
         h = (last - first) / max(parts, 1)
         for part in range(parts):
             tau = first + part * h
-            x, x_middle = (
-                plane(pieces, p, block.amplitude, tau),
-                plane(pieces, p, block.amplitude, tau + 0.5 * h),
-            )
-            x_end = plane(pieces, p, block.amplitude, tau + h)
-            c0, c1, c2 = coefficients(
-                rule,
-                sided_relative_acceleration(block, pieces, p, x),
-                sided_relative_acceleration(block, pieces, p, x_middle),
-                sided_relative_acceleration(block, pieces, p, x_end),
-            )
+            middle = rate_at(block, pieces, p, tau + 0.5 * h) if rule == SIMPSON else 0.0
+            end_rate = rate_at(block, pieces, p, tau + h) if rule != RECTANGLE else 0.0
+            c0, c1, c2 = coefficients(rule, rate_at(block, pieces, p, tau), middle, end_rate)
             take(c0, c1, c2, h, False, state)
 
 
 @scalar
-def sided_relative_acceleration(block: Block, pieces: np.ndarray, p: int, x: float) -> float:
-    """D at Üg = x on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
-    return relative_acceleration(block, math.copysign(x, pieces[p, TOP]))
+def rate_at(block: Block, pieces: np.ndarray, p: int, tau: float) -> float:
+    """D at τ on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
+    return relative_acceleration(block, math.copysign(plane(pieces, p, block.amplitude, tau), pieces[p, TOP]))
 
 
 @scalar
@@ -112,10 +104,14 @@ def turning_step(block: Block, steps: Steps, p: int, i: int, until: int) -> int:
 
 
 @scalar
-def steps_along(block: Block, p: int, i: int, until: int, room: Room) -> None:
+def steps_along(block: Block, p: int, i: int, until: int, wants_peak: bool, room: Room) -> None:
     """Steps i to `until` of piece p."""
     steps, state, lanes = room.steps, room.state, room.lanes
-    turn = turning_step(block, steps, p, i, until) if state[LAYER] == 0.0 and until - i >= _AT_ONCE else -1
+    turn = -1
+    if state[LAYER] == 0.0 and not wants_peak:
+        turn = until  # where V turns is nothing to W
+    elif state[LAYER] == 0.0 and until - i >= _AT_ONCE:
+        turn = turning_step(block, steps, p, i, until)
     if turn >= 0:
         take_followed(block, steps, p, i, turn, state)
         if turn < until:
@@ -143,13 +139,13 @@ def steps_along(block: Block, p: int, i: int, until: int, room: Room) -> None:
 
 
 @scalar
-def part_of_cycle(block: Block, p: int, i: int, last: int, until: int, room: Room) -> Gain:
+def part_of_cycle(block: Block, p: int, i: int, last: int, until: int, wants_peak: bool, room: Room) -> Gain:
     """From step i of piece p to step `until` of piece `last`, from rest."""
     steps, state = room.steps, room.state
     state[VELOCITY] = state[DISPLACEMENT] = state[PEAK] = phase = 0.0
     for q in range(p, last + 1):
         begin, end = i if q == p else 0, until if q == last else steps.counts[q]
-        steps_along(block, q, begin, end, room)
+        steps_along(block, q, begin, end, wants_peak, room)
         phase += (end - begin) * steps.length[q]
     return Gain(state[VELOCITY], state[DISPLACEMENT], state[PEAK], phase)
 
@@ -199,7 +195,7 @@ def drift(block: Block, x: float) -> float:
 
 
 @scalar
-def continuous(block: Block, room: Room) -> Motion:
+def continuous(block: Block, wants_peak: bool, room: Room) -> Motion:
     """Continuous sliding from the first Üg > Üy on; repeated cycles are a series."""
     steps, state, pieces = room.steps, room.state, room.steps.wave.pieces
     reset_state(block, state)
@@ -211,7 +207,7 @@ def continuous(block: Block, room: Room) -> Motion:
             times = steps.wave.repeats - 1.0 + (1.0 if steps.wave.alike else 0.0)
         whole = Gain(0.0, 0.0, 0.0, 0.0)
         if begun:
-            whole = part_of_cycle(block, first, 0, last, steps.counts[last], room)
+            whole = part_of_cycle(block, first, 0, last, steps.counts[last], wants_peak, room)
             total = then(total, whole)
         else:
             p, i, tau = onset(block, steps, c)
@@ -220,10 +216,10 @@ def continuous(block: Block, room: Room) -> Motion:
             state[VELOCITY] = state[DISPLACEMENT] = state[PEAK] = 0.0
             continuous_step(block, steps.rule, steps, pieces, p, tau, node(steps, p, i + 1), state)
             total = Gain(state[VELOCITY], state[DISPLACEMENT], state[PEAK], 0.0)
-            after = part_of_cycle(block, p, i + 1, last, steps.counts[last], room)
+            after = part_of_cycle(block, p, i + 1, last, steps.counts[last], wants_peak, room)
             total, begun = then(total, after), True
             if times > 0.0:
-                whole = then(part_of_cycle(block, first, 0, p, i + 1, room), after)
+                whole = then(part_of_cycle(block, first, 0, p, i + 1, wants_peak, room), after)
         if times > 0.0:
             # entered with V, a cycle adds W + 2πV
             gain = mirrored_gain(block, steps, c) if steps.mirrored else whole.velocity
@@ -237,4 +233,4 @@ def continuous(block: Block, room: Room) -> Motion:
             )
         if c == steps.wave.lead and steps.wave.repeats > 0 and steps.wave.alike:
             break
-    return Motion(total.displacement, total.peak, 0)
+    return Motion(total.displacement, total.peak if wants_peak else math.nan, 0)
