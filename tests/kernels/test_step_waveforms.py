@@ -18,6 +18,7 @@ RULES = pytest.mark.parametrize("rule", ORDERS)
 #: Several maxima in a pulse, no symmetry, a beginning above zero.
 HARMONICS: dict[str, Any] = {"waveform": "harmonics", "harmonics": "1:1:0,0.6:2:40,0.35:5:100"}
 WAVES: dict[str, dict[str, Any]] = {
+    "sine": {},
     "cosine": {"waveform": "cosine"},
     "triangle": {"waveform": "triangle"},
     "square": {"waveform": "square"},
@@ -62,6 +63,19 @@ def newmark(wave: str, rule: str, steps: int, **options: Any) -> float:
     block = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0, "frequency": 1 / (2 * pi)}
     result = slipsweep.sweep(**choices(**block, model="newmark", cycles=3, waveform=wave, **stepping, **options))
     return float(result.permanent_displacement)
+
+
+@pytest.mark.parametrize("steps", [None, 64, 1024])
+@EVERY_WAVE
+def test_a_result_alone_is_the_one_among_all(wave: str, steps: int | None) -> None:
+    """What is not asked for is not computed: where V turns is found for the largest V only."""
+    given = {"solver": "cycle"} if steps is None else {"solver": "step", "rule": "simpson", "steps_per_cycle": steps}
+    every = solve(wave, **given)
+    assert {1, 2} <= {*every.sliding_mode.values.flat}
+    for name in ("permanent_displacement", "peak_relative_velocity"):
+        alone = solve(wave, **given, variables=[name])
+        assert list(alone.data_vars) == [name]
+        np.testing.assert_allclose(alone[name], every[name], rtol=1e-11)
 
 
 @RULES

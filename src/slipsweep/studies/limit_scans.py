@@ -100,7 +100,7 @@ class Scan:
         Displacements.
     wanted : array, (block, 1, target)
         Displacements to be reached.
-    carried : array of bool, (block, amplitude, target)
+    carried : array of bool, (block, amplitude)
         Whether the block does not recouple.
     """
 
@@ -155,14 +155,17 @@ def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats]
     `moved` gives the displacement of blocks (rows) for the first target, each at other amplitudes of its own.  Those
     for the others are in the same ratio to it at all amplitudes, so that each part is solved once.
     """
-    wanted, inner, parts = scan.wanted, scan.moved[:, 1:-1], scan.hides.parts
-    may = scan.carried & (scan.moved >= scan.hides.saw * wanted)
-    peaks = (inner > scan.moved[:, :-2]) & (inner > scan.moved[:, 2:])
-    may[:, 1:-1] |= peaks & (inner >= _MAXIMUM * wanted)
+    moves, parts, points = scan.moved[:, :, 0], scan.hides.parts, scan.amplitudes.shape[1]
+    # from which part of a target on a point is beside what may be a peak
+    least_part = np.where(scan.carried, scan.hides.saw, np.inf)
+    peaks = (moves[:, 1:-1] > moves[:, :-2]) & (moves[:, 1:-1] > moves[:, 2:])
+    least_part[:, 1:-1][peaks & ~scan.carried[:, 1:-1]] = _MAXIMUM
+    row, point = np.nonzero(least_part < np.inf)
+    may = np.zeros(scan.moved.shape, np.bool_)
+    may[row, point] = scan.moved[row, point] >= least_part[row, point, np.newaxis] * scan.wanted[row, 0]
     row, step, column = _places((may[:, 1:] | may[:, :-1]) & scan.before)
-    points = scan.amplitudes.shape[1]
     places, which = np.unique(row * points + step, return_inverse=True)
-    least = wanted[row, 0, column] / scan.ratios()[row, column]
+    least = scan.wanted[row, 0, column] / scan.ratios()[row, column]
     found = [Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
     for (some,) in slabs(places.shape, SCANNED // parts):
         rows, steps = np.divmod(places[some], points)
@@ -190,9 +193,10 @@ def beside_changes(
 
     `states` are those of the scan, (block, amplitude), `state` gives those of blocks (rows) at other amplitudes.
     """
-    higher = np.maximum(scan.moved[:, 1:], scan.moved[:, :-1])
-    may = scan.before & ~(higher < change.least * scan.wanted)  # NaN beside a gap
-    row, step = np.nonzero((states[:, 1:] != states[:, :-1]) & may.any(axis=2))
+    row, step = np.nonzero(states[:, 1:] != states[:, :-1])
+    higher = np.maximum(scan.moved[row, step + 1], scan.moved[row, step])
+    may = scan.before[row, step] & ~(higher < change.least * scan.wanted[row, 0])  # NaN beside a gap
+    row, step = row[may.any(axis=1)], step[may.any(axis=1)]
     start, end, known = scan.amplitudes[row, step], scan.amplitudes[row, step + 1], states[row, step]
     low, high = narrow(
         start,

@@ -208,7 +208,7 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
     hides = UNDER_RECORD if isinstance(problem.excitation, Record) else UNDER_WAVEFORM
     codes = {"validity", *(change.result for change in hides.changes)}
     found = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement", *codes), size)
-    scanned, carried = found["permanent_displacement"], found["validity"] & Validity.NOT_RECOUPLED != 0
+    scanned, carried = found["permanent_displacement"], found["validity"][:, :, 0] & Validity.NOT_RECOUPLED != 0
     scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
 
     def of_blocks(row: NDArray[np.intp]) -> dict[str, Floats]:
@@ -242,13 +242,14 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
 
     # what is missing says why in its validity: that of the greatest amplitude
     results = _at(problem, arrays, np.full((1, 1), maximum_amplitude), ("validity",), shape)
-    has_value = (~np.isnan(scanned)).any(axis=1)
+    has_value = ~np.isnan(scanned[:, :, 0]).all(axis=1)
     results |= {
         "limit_amplitude": np.full(shape, math.nan),
-        "limit_status": np.where(has_value, LimitStatus.NOT_REACHED, LimitStatus.INVALID).astype(np.int8),
+        "limit_status": np.full(shape, LimitStatus.NOT_REACHED, np.int8),
         "permanent_displacement": np.full(shape, math.nan),
         **{name: np.full(shape, SlidingMode.MISSING, RESULT_DTYPES[name]) for name in _codes(problem)},
     }
+    results["limit_status"][~has_value] = LimitStatus.INVALID
     for name in wanted:
         results[name][row, column] = after[name]
     results["limit_amplitude"][row, column] = high
