@@ -66,7 +66,7 @@ def test_an_interval_is_narrowed_to_neighbours_in_at_most_one_step_more_than_by_
         with np.errstate(over="ignore"):
             return np.asarray(excess(at))
 
-    low, high = narrow(*(np.array([end]) for end in ends), counted)
+    low, high = narrow(np.array([ends[0]]), np.array([ends[1]]), counted)
     assert np.nextafter(low, high) == high
     assert high[0] == pytest.approx(place, rel=1e-14)
     # both ends are asked first; halves: down to the spacing of doubles at the root
