@@ -247,7 +247,7 @@ def narrow(
         if not active.size:
             break
         length, first, last = end - start, below[active], above[active]
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             aside = -np.nan_to_num(0.5 + first / (last - first)) * length
         inward = _INWARD * length * (length / widest[active])
         furthest = np.maximum(np.ldexp(widest[active], -step) - 0.5 * length, 0.0)
