@@ -56,7 +56,7 @@ class Failing:
         next(one for one in arguments if isinstance(one, Results)).unsolved[0] = 4
 
 
-@pytest.mark.parametrize("options", [{"excitation": "triangle"}, {"solver": "step"}])
+@pytest.mark.parametrize("options", [{"excitation": slipsweep.Triangle(ramp_in=1)}, {"solver": "step"}])
 def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

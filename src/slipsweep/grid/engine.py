@@ -30,7 +30,9 @@ from slipsweep.kernels.grid import (
     RECORD_KERNEL,
     REMAINING_KERNEL,
     SINE_KERNEL,
+    SQUARE_KERNEL,
     STEP_KERNEL,
+    TRIANGLE_KERNEL,
     WAVE_KERNEL,
     Grid,
     Results,
@@ -47,7 +49,7 @@ from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Cosine, Sine, Waveform
+from slipsweep.motion.waveforms import Cosine, Sine, Square, Triangle, Waveform
 
 if TYPE_CHECKING:
     from slipsweep.jit.cache import Handed, Kernel
@@ -305,14 +307,15 @@ def _amplitudes(arrays: Mapping[str, Array]) -> int:
 
 
 def _is_plain(motion: Waveform | Record | Suite) -> bool:
-    """Whether a motion is a sine or a cosine without ramps, for which there are shorter ways."""
-    return isinstance(motion, (Sine, Cosine)) and motion.ramp_in == motion.ramp_out == 0.0
+    """Whether a motion is a wave without ramps for which there are shorter ways."""
+    return isinstance(motion, (Sine, Cosine, Triangle, Square)) and motion.ramp_in == motion.ramp_out == 0.0
 
 
 def _lanes(motion: Waveform | Record | Suite, newmark: bool) -> "tuple[Handed, Kernel | None]":
     """What solves a plain motion in lanes, and what solves the cells that it leaves, if it leaves any."""
-    if isinstance(motion, Cosine):
-        return COSINE_KERNEL, WAVE_KERNEL
+    for wave, kernel in ((Cosine, COSINE_KERNEL), (Triangle, TRIANGLE_KERNEL), (Square, SQUARE_KERNEL)):
+        if isinstance(motion, wave):
+            return kernel, WAVE_KERNEL
     return (NEWMARK_SINE_KERNEL, None) if newmark else (SINE_KERNEL, REMAINING_KERNEL)
 
 

@@ -300,15 +300,17 @@ def _given_to_tiles(grid: Grid, first: int, *others: Any) -> tuple[Any, ...]:
 
 
 #: Kernels of the stepping solver; of the cycle solver for any waveform, from one cell up to another of each stretch;
-#: its short ways for the sine and for the cosine, which leave some cells: the number of their stretches is returned,
+#: its short ways for plain waves, which leave some cells: the number of their stretches is returned,
 #: and `remaining` holds them (rows: the first cell, and the first after it); what solves those of the sine (most
-#: sweeps leave none, and half the first compilation is spared; those of the cosine are as of any wave); and
+#: sweeps leave none, and half the first compilation is spared; those of the others are as of any wave); and
 #: what solves Newmark's block under a sine, which leaves none.
 STEP_KERNEL = Kernel(_step_grid)
 WAVE_KERNEL = Kernel(_wave_grid)
 _OVER_TILES = Kernel(_sine_grid)
 SINE_KERNEL = Handed(_OVER_TILES, sine.solve_under_sine, _given_to_tiles)
 COSINE_KERNEL = Handed(_OVER_TILES, cosine.solve_under_cosine, _given_to_tiles)
+TRIANGLE_KERNEL = Handed(_OVER_TILES, sine.solve_under_triangle, _given_to_tiles)
+SQUARE_KERNEL = Handed(_OVER_TILES, sine.solve_under_square, _given_to_tiles)
 REMAINING_KERNEL = Kernel(_remaining_grid)
 NEWMARK_SINE_KERNEL = Handed(_OVER_TILES, sine_newmark.solve_newmark_under_sine, _given_to_tiles)
 

@@ -6,7 +6,7 @@ on a curved one), so that no step is taken and the result carries rounding error
 comes in monotone pieces (`kernels.excitation`).  Along one the block moves by `pulse.rise` (stick, slide and follow
 Eq. 4; from t1 on) or by `pulse.hold` (to the stop, or to Üg = 0, t5); `kernels.pulse` goes through them and on by
 Eq. 12 or the hold, and `kernels.train` strings pulses together.
-In continuous sliding Eq. 4 is integrated over a cycle, and the cycles are a series.  The sine and the cosine have
+In continuous sliding Eq. 4 is integrated over a cycle, and the cycles are a series.  Plain waves have
 shorter ways to the same (`kernels.sine`).  Notation: τ is the phase on a piece, from its anchor, x the plane's
 acceleration, b the block's, V and W velocity and displacement (see `kernels.block`).
 

@@ -54,6 +54,7 @@ from slipsweep.kernels.sine.pulse import (
     lane_rise,
 )
 from slipsweep.kernels.sine.roots import HELD_STOP, held_motion, lane_response_and_slope, settle
+from slipsweep.kernels.sine.shapes import SINE
 from slipsweep.model import equations as eq
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
@@ -74,18 +75,18 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
         lanes[START + j], lanes[CONVERGED + j] = lanes[BEGAN + j], 1.0
     # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
-    lane_rise(FOLLOWS_EQ4, options.g, lanes)
+    lane_rise(FOLLOWS_EQ4, SINE, options.g, lanes)
     for j in range(STRIP):
         amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j], lanes[CARRIED + j]
         slowest = rising_phase(min(held, lanes[X + j]), amplitude)
-        lanes[SLOWEST + j] = carried + held_motion(amplitude, held, began, slowest)[0]
+        lanes[SLOWEST + j] = carried + held_motion(SINE, amplitude, held, began, slowest)[0]
         # held until past its slowest, or else Eq. 4 itself slows it
         through = (held >= amplitude) | (lanes[X + j] >= held)
         lanes[THROUGH + j] = lanes[CONVERGED + j] if through else 0.0
         lanes[W + j] += -carried * began
         lanes[V + j] += carried
         lanes[AT_PEAK + j], lanes[TO_PEAK + j] = lanes[V + j], lanes[W + j]
-    lane_fall(options.wants_peak, lanes)
+    lane_fall(SINE, options.wants_peak, lanes)
     for j in range(STRIP):
         # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
         carried, slowest = lanes[CARRIED + j], lanes[SLOWEST + j]
@@ -100,7 +101,7 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[V + j] = carried + (most * gain if most > 0.0 else 0.0)
         lanes[PSI + j] = lanes[BEGAN + j]
         lanes[X + j] = 0.0 if stops else 1.0
-    settle(HELD_STOP, PSI, X, 1.0, options.g, lanes)
+    settle(HELD_STOP, SINE, PSI, X, 1.0, options.g, lanes)
     lane_repeated(later, lanes)
     if later <= _MOST_PULSES:
         for j in range(count):
@@ -122,7 +123,7 @@ def lane_repeated(later: float, lanes: np.ndarray) -> None:
             lanes[GAIN + j],
             lanes[MOST + j],
         )
-        held_on = held_motion(lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
+        held_on = held_motion(SINE, lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
         again = lanes[V + j] * (psi - began) + held_on if psi > began else 0.0
         stops = psi > began
         braked = eq.attenuated_displacement(left, lanes[HELD + j], pause_of(began))
@@ -148,7 +149,7 @@ def lane_repeated(later: float, lanes: np.ndarray) -> None:
 def _lost_and_rate(where: tuple[float, float, float, float], psi: float) -> tuple[float, float]:
     """−V at ψ of a hold that was entered with `velocity` at `start`, and its rate."""
     amplitude, held, velocity, start = where
-    left = velocity + held_motion(amplitude, held, start, psi)[0]
+    left = velocity + held_motion(SINE, amplitude, held, start, psi)[0]
     return -left, held - amplitude * (1.0 - versine(psi))
 
 
@@ -173,7 +174,7 @@ def followed_to_peak(lanes: np.ndarray, j: int, start: float, g: float) -> tuple
         weighted = LANE_WEIGHTS[node] * lane_loss(lanes, j, x, g)
         rate += weighted
         moment += left * weighted
-    plane, plane_moment = held_motion(lanes[AMPLITUDE + j], 0.0, start, 0.0)
+    plane, plane_moment = held_motion(SINE, lanes[AMPLITUDE + j], 0.0, start, 0.0)
     return -start * rate - lane_slant(lanes, j, plane), start * start * moment - lane_slant(lanes, j, plane_moment)
 
 
@@ -196,7 +197,7 @@ def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, f
     level = max(lanes[YIELD + j], eq4)
     at_peak, slope_at_peak = lane_response_and_slope(lanes, j, amplitude, g)
     if at_peak <= level:
-        return level, *held_motion(amplitude, level, start, 0.0)
+        return level, *held_motion(SINE, amplitude, level, start, 0.0)
     psi = start
     if slope <= 0.0 or eq4 < level:  # as in `lane_switch`
         x = amplitude - (at_peak - level) / slope_at_peak
@@ -204,7 +205,7 @@ def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, f
         if math.isnan(x):
             return math.nan, math.nan, math.nan
         psi = max(rising_phase(x, amplitude), start)
-    held_on = held_motion(amplitude, level, start, psi)
+    held_on = held_motion(SINE, amplitude, level, start, psi)
     followed = followed_to_peak(lanes, j, psi, g)
     return at_peak, held_on[0] + followed[0], held_on[1] - held_on[0] * psi + followed[1]
 
@@ -234,7 +235,7 @@ def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
             stop = began
             if velocity > 0.0:
                 stop = held_stop(lanes, j, velocity)
-                moved += velocity * (stop - began) + held_motion(amplitude, lanes[LEVEL + j], began, stop)[1]
+                moved += velocity * (stop - began) + held_motion(SINE, amplitude, lanes[LEVEL + j], began, stop)[1]
             if stop <= lanes[ONSET + j]:
                 moved += lanes[MOVED + j] if later > 0 else lanes[LAST + j]
                 velocity = carried
@@ -242,10 +243,10 @@ def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
             held, at_peak, gained = restart(lanes, j, stop, options.g)
             moved += gained
         top = -rising_phase(held, amplitude)
-        peak = at_peak + held_motion(amplitude, held, 0.0, top)[0]
-        left = at_peak + held_motion(amplitude, held, 0.0, HALF_PI)[0]
+        peak = at_peak + held_motion(SINE, amplitude, held, 0.0, top)[0]
+        left = at_peak + held_motion(SINE, amplitude, held, 0.0, HALF_PI)[0]
         end = HALF_PI if left > 0.0 else fall_stop(amplitude, held, at_peak, peak, top)
-        moved += at_peak * end + held_motion(amplitude, held, 0.0, end)[1]
+        moved += at_peak * end + held_motion(SINE, amplitude, held, 0.0, end)[1]
         left, pause = max(left, 0.0), pause_of(began) if later > 0 else math.inf
         velocity = eq.attenuated_velocity(left, held, pause)
         moved += eq.attenuated_displacement(left, held, pause)

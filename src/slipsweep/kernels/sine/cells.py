@@ -39,6 +39,7 @@ from slipsweep.kernels.sine.lanes import (
     W,
 )
 from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
+from slipsweep.kernels.sine.shapes import SINE, SQUARE, TRIANGLE
 from slipsweep.kernels.sine.sorting import BLOCKS_SIZE, KIND, MODE, VALIDITY, runs_of, sort_strip
 from slipsweep.model.equations import STUCK
 
@@ -69,19 +70,24 @@ def room_of() -> Room:
     )  # fmt: skip
 
 
-@scalar
-def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
-    """Lanes of one kind, from the onset to the end of all cycles."""
-    if kind == SLIDES_ON:
-        lane_continuous(options, lanes)
-        return
-    lane_onset(kind, options.g, lanes)
-    lane_rise(kind, options.g, lanes)
-    lane_fall(options.wants_peak, lanes)
-    if options.recoupling == INTEGRATE:
-        lane_recoupling(options.cycles, lanes)
-    else:
-        lane_attenuation(kind, options.cycles, lanes)
+def strip_of(shape: int) -> Callable[[int, Options, np.ndarray], None]:
+    """The jitted solver of a strip under a wave of a shape (`shapes`) that begins at Üg = 0."""
+
+    @scalar
+    def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
+        """Lanes of one kind, from the onset to the end of all cycles."""
+        if kind == SLIDES_ON:
+            lane_continuous(shape, options, lanes)
+            return
+        lane_onset(kind, shape, options.g, lanes)
+        lane_rise(kind, shape, options.g, lanes)
+        lane_fall(shape, options.wants_peak, lanes)
+        if options.recoupling == INTEGRATE:
+            lane_recoupling(shape, options.cycles, lanes)
+        else:
+            lane_attenuation(kind, options.cycles, lanes)
+
+    return solve_strip
 
 
 @scalar
@@ -133,11 +139,20 @@ def carry(count: int, options: Options, room: Room, motion: np.ndarray, codes: n
         store_lane(lanes, lane, STICKS, options, room.blocks, motion[0], motion[1], codes[1], where[lane])
 
 
+@scalar
+def leave(count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+    """Leave lanes in motion to go from event to event."""
+
+
 def lanes_of(
+    shape: int,
     solve_strip: Callable[[int, Options, np.ndarray], None],
     carry: Callable[[int, Options, Room, np.ndarray, np.ndarray], None],
 ) -> Solver:
-    """The jitted solver of a tile's cells in lanes, given that of a strip, and what goes on with lanes in motion."""
+    """The jitted solver of a tile's cells in lanes under a shape of wave.
+
+    Given what solves a strip, and what goes on with lanes in motion.
+    """
 
     @scalar
     def solve_kind(kind: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
@@ -179,7 +194,7 @@ def lanes_of(
         blocks = room.blocks
         fill_up(count, 7, cells)
         for first in range(0, whole_lanes(count), STRIP):
-            sort_strip(cells[first:], options, blocks[first:])
+            sort_strip(shape, cells[first:], options, blocks[first:])
         for j in range(count):
             codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])
             motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK else math.nan
@@ -195,7 +210,9 @@ def lanes_of(
     return solve_cells
 
 
-_solve_cells = lanes_of(solve_strip, carry)
+_solve_cells = lanes_of(SINE, strip_of(SINE), carry)
+_solve_under_triangle = lanes_of(TRIANGLE, strip_of(TRIANGLE), leave)
+_solve_under_square = lanes_of(SQUARE, strip_of(SQUARE), leave)
 
 
 def solve_under_sine(
@@ -203,6 +220,20 @@ def solve_under_sine(
 ) -> int:
     """As any that `lanes_of` gives; to be handed to the kernel that brings cells."""
     return _solve_cells(cells, count, options, room, motion, codes)
+
+
+def solve_under_triangle(
+    cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
+) -> int:
+    """As `solve_under_sine`."""
+    return _solve_under_triangle(cells, count, options, room, motion, codes)
+
+
+def solve_under_square(
+    cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
+) -> int:
+    """As `solve_under_sine`."""
+    return _solve_under_square(cells, count, options, room, motion, codes)
 
 
 #: Solves the cells that are left: in continuous sliding by quarters of the sine's cycle, else as of any wave.

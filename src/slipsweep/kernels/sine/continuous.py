@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar, summed
-from slipsweep.jit.elementary import angle_minus_sine, rising_phase, sine_after, versine
+from slipsweep.jit.elementary import sine_after, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -51,6 +51,7 @@ from slipsweep.kernels.sine.lanes import (
     X,
 )
 from slipsweep.kernels.sine.roots import TURN, settle
+from slipsweep.kernels.sine.shapes import phase_of, quarter_integrals, risen, risen_integrals
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import Wave
 
@@ -58,15 +59,6 @@ from slipsweep.motion.pieces import Wave
 #: where friction falls by no more than e.
 SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
 SHORT_SINE, SHORT_E_FOLDINGS = math.sin(0.6), 1.0
-
-#: Coefficients, highest first, of ∫ e^(−k sin φ) dφ over [0, π/2] in powers of 4 − k: integrals of
-#: sinⁿ e^(−4 sin) / n!, all positive, on 8 panels of 8 nodes (more on fewer panels have weights that
-#: are wrong by 3e-15).  31 terms give 4e-16 for k from 0 to 6; about 4, no digits cancel where k is large.
-_CENTRE = 4.0
-_PANEL_WIDTH = HALF_PI / 8
-_SINES = np.sin(_PANEL_WIDTH * (np.arange(8)[:, np.newaxis] + SHORT_NODES))
-_WEIGHTED = _PANEL_WIDTH * SHORT_WEIGHTS * np.exp(-_CENTRE * _SINES)
-_QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) for n in range(30, -1, -1)])
 
 #: Rows of lanes that pulses have for something else: what V misses before Üg = Üy, and what it gains from
 #: Üg = 0 up to where its rate changes sign on the rise of the positive half cycle.
@@ -203,21 +195,6 @@ def drift_integral(block: Block) -> float:
 
 
 @in_lanes
-def quarter_integrals(k: float) -> tuple[float, float]:
-    """∫ e^(−k sin φ) dφ and ∫ sin φ e^(−k sin φ) dφ over [0, π/2], for k from 0 to the e-foldings of the lanes.
-
-    The second is the derivative of the first by −k.  In closed form they are π/2 (I₀ − L₀) and
-    1 + π/2 (L₁ − I₁), modified Bessel and Struve functions of k.
-    """
-    below = _CENTRE - k
-    first, second = 0.0, 0.0
-    for n in range(_QUARTER_SERIES.size):
-        second = second * below + first
-        first = first * below + _QUARTER_SERIES[n]
-    return first, second
-
-
-@in_lanes
 def lane_turn_start(lanes: np.ndarray, j: int) -> float:
     """From where Newton goes to D = 0: nearly where μ = μs, after ln(1 + r) e-foldings, r = Δμ/μs, by 2r/(2 + r)."""
     delta_mu = lanes[DELTA_MU + j]
@@ -225,7 +202,7 @@ def lane_turn_start(lanes: np.ndarray, j: int) -> float:
 
 
 @scalar
-def lane_turns(g: float, lanes: np.ndarray) -> None:
+def lane_turns(shape: int, g: float, lanes: np.ndarray) -> None:
     """What the peak velocity needs of both half cycles: rows DIP and X.
 
     DIP is ∫ D dψ on the rise of the positive one, from Üg = 0 up to where D changes sign, 0 where it does not; X the
@@ -244,22 +221,22 @@ def lane_turns(g: float, lanes: np.ndarray) -> None:
             lanes[CONVERGED + j] = lanes[CONVERGED + j] if turns | monotone else 0.0
             lanes[PSI + j] = 0.0 if turns else 1.0
             lanes[X + j] = lane_turn_start(lanes, j) if turns else 0.0
-        settle(TURN, X, PSI, side, g, lanes)
+        settle(TURN, shape, X, PSI, side, g, lanes)
         for j in range(STRIP):
             amplitude = lanes[AMPLITUDE + j]
             short = (lanes[X + j] <= SHORT_SINE * amplitude) | (lanes[DECAY + j] * amplitude <= SHORT_E_FOLDINGS)
             lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j]) if short else 0.0
-            lanes[PSI + j] = HALF_PI + rising_phase(lanes[X + j], amplitude)
+            lanes[PSI + j] = HALF_PI + phase_of(shape, lanes[X + j], amplitude)
             lanes[RATE + j] = 0.0
         for node in range(SHORT_NODES.size):
             at, weight = SHORT_NODES[node], SHORT_WEIGHTS[node]
             for j in range(STRIP):
                 phi = lanes[PSI + j] * at
-                x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
+                x = lanes[AMPLITUDE + j] * risen(shape, phi)
                 lanes[RATE + j] += weight * lane_loss(lanes, j, side * x, g)
         for j in range(STRIP):
             phi, slant = lanes[PSI + j], lane_slant(lanes, j, lanes[AMPLITUDE + j])
-            lanes[RATE + j] = side * lanes[RATE + j] * phi - slant * versine(phi)
+            lanes[RATE + j] = side * lanes[RATE + j] * phi - slant * risen_integrals(shape, phi)[0]
     for j in range(STRIP):
         # as in `continuous_peaks`: the fall mirrors the rise
         bump, half_gain = lanes[RATE + j], lanes[GAIN + j] - 2.0 * lanes[V + j]
@@ -267,42 +244,43 @@ def lane_turns(g: float, lanes: np.ndarray) -> None:
 
 
 @scalar
-def lane_quarters(g: float, lanes: np.ndarray) -> None:
+def lane_quarters(shape: int, g: float, lanes: np.ndarray) -> None:
     """∫ D dψ over the rise of the positive half cycle in V, over the whole cycle in GAIN."""
     for j in range(STRIP):
         amplitude, mu_s, tan_theta = lanes[AMPLITUDE + j], lanes[MU_S + j], lanes[TAN_THETA + j]
         most = mu_s + lanes[DELTA_MU + j]
-        plain, with_sine = quarter_integrals(lanes[DECAY + j] * amplitude)
-        quarter = amplitude * tan_theta * (mu_s - tan_theta - most * with_sine)
+        area, plain, with_wave = quarter_integrals(shape, lanes[DECAY + j] * amplitude)
+        quarter = amplitude * tan_theta * ((mu_s - tan_theta) * area - most * with_wave)
         lanes[V + j], lanes[GAIN + j] = g * (HALF_PI * mu_s - most * plain) + quarter, 4.0 * quarter
         lanes[PEAK + j], lanes[CODE + j], lanes[CONVERGED + j] = math.nan, 0.0, 1.0
 
 
 @scalar
-def lane_continuous(options: Options, lanes: np.ndarray) -> None:
+def lane_continuous(shape: int, options: Options, lanes: np.ndarray) -> None:
     """Continuous sliding, all cycles: W in row W, the largest V in PEAK."""
     g = options.g
-    lane_quarters(g, lanes)
+    lane_quarters(shape, g, lanes)
     for j in range(STRIP):
         lanes[RATE + j] = lanes[MOMENT + j] = 0.0
     for node in range(SHORT_NODES.size):
         at, left, weight = SHORT_NODES[node], 1.0 - SHORT_NODES[node], SHORT_WEIGHTS[node]
         for j in range(STRIP):
-            # sin φ on the way from Üg = 0 to Üg = Üy
+            # the wave on the way from Üg = 0 to Üg = Üy
             phi = (HALF_PI + lanes[BEGAN + j]) * at
-            x = lanes[AMPLITUDE + j] * (phi - angle_minus_sine(phi))
+            x = lanes[AMPLITUDE + j] * risen(shape, phi)
             weighted = weight * lane_loss(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
         began, drift = lanes[BEGAN + j], lanes[GAIN + j]
         width, slant = HALF_PI + began, lane_slant(lanes, j, lanes[AMPLITUDE + j])
-        missed = lanes[RATE + j] * width - slant * versine(width)
-        missed_moment = lanes[MOMENT + j] * width * width - slant * angle_minus_sine(width)
+        fell, fell_moment = risen_integrals(shape, width)
+        missed = lanes[RATE + j] * width - slant * fell
+        missed_moment = lanes[MOMENT + j] * width * width - slant * fell_moment
         lanes[W + j] = continuous_displacement(lanes[V + j], missed, missed_moment, drift, began, options.cycles)
         lanes[_MISSED + j] = missed
     if options.wants_peak:
-        lane_turns(g, lanes)
+        lane_turns(shape, g, lanes)
         for j in range(STRIP):
             half, dip = 2.0 * lanes[V + j], lanes[DIP + j]
             first = max(half, half - dip)

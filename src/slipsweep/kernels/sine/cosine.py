@@ -10,7 +10,7 @@ import numpy as np
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import AMPLITUDE, BEGAN, INTEGRATE, NOT_RECOUPLED, YIELD, Options, lane_response
 from slipsweep.kernels.events import STRIP
-from slipsweep.kernels.sine.cells import Room, lanes_of
+from slipsweep.kernels.sine.cells import Room, lanes_of, leave
 from slipsweep.kernels.sine.continuous import DIP, lane_quarters, lane_turns
 from slipsweep.kernels.sine.cycles import lane_attenuation, lane_recoupling
 from slipsweep.kernels.sine.lanes import (
@@ -33,6 +33,7 @@ from slipsweep.kernels.sine.lanes import (
     X,
 )
 from slipsweep.kernels.sine.pulse import lane_fall, lane_onset, lane_rise
+from slipsweep.kernels.sine.shapes import SINE
 from slipsweep.model import equations as eq
 
 #: Rows of lanes that pulses of the sine entered in motion have for something else: of a whole pulse from rest W up to
@@ -43,9 +44,9 @@ _WHOLE, _WHOLE_PEAK, _WHOLE_HELD = THROUGH, SLOWEST, MOST
 @scalar
 def lane_to_next(kind: int, options: Options, lanes: np.ndarray) -> None:
     """From the peak to the next Üg = Üy: W in MOVED, V left there in CARRIED, the largest V in PEAK."""
-    lane_fall(options.wants_peak, lanes)
+    lane_fall(SINE, options.wants_peak, lanes)
     if options.recoupling == INTEGRATE:
-        lane_recoupling(1, lanes)
+        lane_recoupling(SINE, 1, lanes)
         for j in range(STRIP):
             lanes[MOVED + j], lanes[CARRIED + j] = lanes[W + j], 0.0
     else:
@@ -58,8 +59,8 @@ def lane_pulses(kind: int, options: Options, lanes: np.ndarray) -> None:
 
     docs/numerics.md#lanes-of-the-cosine
     """
-    lane_onset(kind, options.g, lanes)
-    lane_rise(kind, options.g, lanes)
+    lane_onset(kind, SINE, options.g, lanes)
+    lane_rise(kind, SINE, options.g, lanes)
     for j in range(STRIP):
         lanes[AT_PEAK + j], lanes[TO_PEAK + j], lanes[_WHOLE_HELD + j] = lanes[V + j], lanes[W + j], lanes[HELD + j]
     lane_to_next(kind, options, lanes)
@@ -96,11 +97,11 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
 
     docs/numerics.md#lanes-of-the-cosine
     """
-    lane_quarters(options.g, lanes)
+    lane_quarters(SINE, options.g, lanes)
     for j in range(STRIP):
         lanes[W + j] = math.pi * lanes[GAIN + j] * options.cycles * options.cycles
     if options.wants_peak:
-        lane_turns(options.g, lanes)
+        lane_turns(SINE, options.g, lanes)
         for j in range(STRIP):
             up, dip, drift = lanes[V + j], lanes[DIP + j], lanes[GAIN + j]
             fall, rise = max(up, up - dip), max(max(0.0, dip), up)
@@ -117,12 +118,7 @@ def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
         lane_pulses(kind, options, lanes)
 
 
-@scalar
-def leave(used: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Leave lanes in motion to go from event to event."""
-
-
-_solve_cells = lanes_of(solve_strip, leave)
+_solve_cells = lanes_of(SINE, solve_strip, leave)
 
 
 def solve_under_cosine(

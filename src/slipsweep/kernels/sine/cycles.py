@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
-from slipsweep.jit.elementary import angle_minus_sine, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -34,6 +33,7 @@ from slipsweep.kernels.sine.lanes import (
     X,
 )
 from slipsweep.kernels.sine.roots import RECOUPLING, settle
+from slipsweep.kernels.sine.shapes import half_wave, half_wave_bound
 from slipsweep.model import equations as eq
 
 
@@ -85,7 +85,7 @@ def lane_attenuation(kind: int, cycles: int, lanes: np.ndarray) -> None:
 
 
 @scalar
-def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
+def lane_recoupling(shape: int, cycles: int, lanes: np.ndarray) -> None:
     """From Üg = 0 on by integration, χ = φ − π to the stop, which comes before 2π for b ≥ Üy; and all cycles."""
     sliding = 0
     for j in range(STRIP):
@@ -96,17 +96,16 @@ def lane_recoupling(cycles: int, lanes: np.ndarray) -> None:
     if sliding == 0:
         return
     for j in range(STRIP):
-        # vers χ ≥ 2 χ²/π²: this start lies beyond the stop
+        # as the half wave's integral is no less than this parabola, its zero lies beyond the stop
         b, left = lanes[HELD + j], lanes[LEFT + j]
-        curvature = 4.0 * lanes[AMPLITUDE + j] / (math.pi * math.pi)
+        curvature = lanes[AMPLITUDE + j] * half_wave_bound(shape)
         longest = left / b
         lanes[PSI + j] = min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * (curvature / b) * longest)), math.pi)
         lanes[X + j] = 0.0
-    settle(RECOUPLING, PSI, X, 1.0, 0.0, lanes)
+    settle(RECOUPLING, shape, PSI, X, 1.0, 0.0, lanes)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
     for j in range(STRIP):
         amplitude, b, chi = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[PSI + j]
-        sine = 2.0 * (0.5 * chi - angle_minus_sine(0.5 * chi)) * (1.0 - versine(0.5 * chi))
-        lanes[W + j] += (lanes[LEFT + j] - 0.5 * b * chi) * chi - amplitude * (chi - sine)
+        lanes[W + j] += (lanes[LEFT + j] - 0.5 * b * chi) * chi - amplitude * half_wave(shape, chi)[2]
         lanes[W + j] *= cycles

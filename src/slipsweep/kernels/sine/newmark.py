@@ -12,6 +12,7 @@ from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import NEWMARK, Options, cell_of, fill_up, interface_of, whole_lanes
 from slipsweep.kernels.sine.cells import Room
 from slipsweep.kernels.sine.roots import held_motion
+from slipsweep.kernels.sine.shapes import SINE
 from slipsweep.model.equations import STUCK
 
 
@@ -70,7 +71,7 @@ def solve_newmark_under_sine(
         cell = cell_of(cells, j)
         onset, _, _, _, _, mode, _ = interface_of(cell, NEWMARK, options.g)
         # V rises and falls alike on either side of the peak
-        half = held_motion(cell.amplitude, onset, rising_phase(onset, cell.amplitude), 0.0)[0]
+        half = held_motion(SINE, cell.amplitude, onset, rising_phase(onset, cell.amplitude), 0.0)[0]
         at_rest = 0.0 if mode == STUCK else math.nan
         peak[j] = 2.0 * half if mode > STUCK else at_rest
     return 0

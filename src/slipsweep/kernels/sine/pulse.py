@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.jit.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -37,10 +36,11 @@ from slipsweep.kernels.sine.lanes import (
     X,
 )
 from slipsweep.kernels.sine.roots import FALL_STOP, SWITCH, TURN, held_motion, lane_response_and_slope, settle
+from slipsweep.kernels.sine.shapes import fallen, phase_of, steepness
 
 
 @scalar
-def lane_onset(kind: int, g: float, lanes: np.ndarray) -> None:
+def lane_onset(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
     """t1: where each lane begins to slide (ψ in START) and the value it then holds (LEVEL)."""
     for j in range(STRIP):
         lanes[CONVERGED + j] = 1.0
@@ -49,13 +49,13 @@ def lane_onset(kind: int, g: float, lanes: np.ndarray) -> None:
         return
     for j in range(STRIP):
         lanes[CONVERGED + j] = 0.0
-    settle(TURN, LEVEL, CONVERGED, 1.0, g, lanes)
+    settle(TURN, shape, LEVEL, CONVERGED, 1.0, g, lanes)
     for j in range(STRIP):
-        lanes[START + j] = rising_phase(lanes[LEVEL + j], lanes[AMPLITUDE + j])
+        lanes[START + j] = phase_of(shape, lanes[LEVEL + j], lanes[AMPLITUDE + j])
 
 
 @scalar
-def lane_switch(g: float, lanes: np.ndarray) -> None:
+def lane_switch(shape: int, g: float, lanes: np.ndarray) -> None:
     """x at which each lane ceases to hold its level and follows Eq. 4 (X), and b at the peak (HELD)."""
     for j in range(STRIP):
         amplitude, level = lanes[AMPLITUDE + j], lanes[LEVEL + j]
@@ -64,49 +64,51 @@ def lane_switch(g: float, lanes: np.ndarray) -> None:
         lanes[HELD + j] = eq4 if follows else level
         lanes[X + j] = amplitude - (eq4 - level) / slope if follows else amplitude
         lanes[PSI + j] = 0.0 if follows else 1.0
-    settle(SWITCH, X, PSI, 1.0, g, lanes)
+    settle(SWITCH, shape, X, PSI, 1.0, g, lanes)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
 
 
 @scalar
-def lane_rise(kind: int, g: float, lanes: np.ndarray) -> None:
+def lane_rise(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
     """From t1 to the peak: b in HELD, V and W gained from rest in V and W."""
     if kind == YIELD_GOVERNS:
         for j in range(STRIP):
             lanes[X + j], lanes[HELD + j] = lanes[AMPLITUDE + j], lanes[LEVEL + j]
-            lanes[V + j], lanes[W + j] = held_motion(lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[START + j], 0.0)
+            lanes[V + j], lanes[W + j] = held_motion(
+                shape, lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[START + j], 0.0
+            )
         return
-    lane_switch(g, lanes)
+    lane_switch(shape, g, lanes)
     # the hold
     for j in range(STRIP):
         amplitude = lanes[AMPLITUDE + j]
         # no earlier than the start, from which it may differ by the roundings of two roots
-        psi = max(rising_phase(lanes[X + j], amplitude), lanes[START + j])
+        psi = max(phase_of(shape, lanes[X + j], amplitude), lanes[START + j])
         lanes[PSI + j] = psi
-        lanes[V + j], lanes[W + j] = held_motion(amplitude, lanes[LEVEL + j], lanes[START + j], psi)
+        lanes[V + j], lanes[W + j] = held_motion(shape, amplitude, lanes[LEVEL + j], lanes[START + j], psi)
         lanes[RATE + j] = lanes[MOMENT + j] = 0.0
     # Eq. 4: n (μs − μ) at nodes, the rest in closed form
     for node in range(LANE_NODES.size):
         left, weight = 1.0 - LANE_NODES[node], LANE_WEIGHTS[node]
         for j in range(STRIP):
-            x = lanes[AMPLITUDE + j] * (1.0 - versine(lanes[PSI + j] * left))
+            x = lanes[AMPLITUDE + j] * (1.0 - fallen(shape, lanes[PSI + j] * left))
             weighted = weight * lane_loss(lanes, j, x, g)
             lanes[RATE + j] += weighted
             lanes[MOMENT + j] += left * weighted
     for j in range(STRIP):
         width = -lanes[PSI + j]
-        plane, plane_moment = held_motion(lanes[AMPLITUDE + j], 0.0, -width, 0.0)
+        plane, plane_moment = held_motion(shape, lanes[AMPLITUDE + j], 0.0, -width, 0.0)
         lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width - lane_slant(lanes, j, plane_moment)
         lanes[V + j] += lanes[RATE + j] * width - lane_slant(lanes, j, plane)
 
 
 @scalar
-def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
+def lane_fall(shape: int, wants_peak: bool, lanes: np.ndarray) -> None:
     """The hold from the peak to the stop or to Üg = 0 (t5): V left in LEFT, if wanted the largest V in PEAK."""
     unsettled = 0
     for j in range(STRIP):
-        left = lanes[V + j] + held_motion(lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, HALF_PI)[0]
+        left = lanes[V + j] + held_motion(shape, lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, HALF_PI)[0]
         lanes[LEFT + j] = max(left, 0.0)
         lanes[PSI + j] = HALF_PI
         lanes[PEAK + j] = math.nan
@@ -115,16 +117,16 @@ def lane_fall(wants_peak: bool, lanes: np.ndarray) -> None:
         for j in range(STRIP):
             # V is largest where x = b; a parabola from there overestimates the stop
             amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j]
-            top = -rising_phase(held, amplitude)
-            peak = velocity + held_motion(amplitude, held, 0.0, top)[0]
-            onward = math.sqrt(2.0 * peak / (amplitude * (top - angle_minus_sine(top))))
+            top = -phase_of(shape, held, amplitude)
+            peak = velocity + held_motion(shape, amplitude, held, 0.0, top)[0]
+            onward = math.sqrt(2.0 * peak / (amplitude * steepness(shape, top)))
             lanes[PSI + j] = HALF_PI if lanes[LEFT + j] > 0.0 else min(top + onward, HALF_PI)
             lanes[PEAK + j] = peak if wants_peak else math.nan
             lanes[X + j] = 1.0 if lanes[LEFT + j] > 0.0 else 0.0
         if unsettled > 0:
-            settle(FALL_STOP, PSI, X, 1.0, 0.0, lanes)
+            settle(FALL_STOP, shape, PSI, X, 1.0, 0.0, lanes)
         for j in range(STRIP):
             lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
     for j in range(STRIP):
         end = lanes[PSI + j]
-        lanes[W + j] += lanes[V + j] * end + held_motion(lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, end)[1]
+        lanes[W + j] += lanes[V + j] * end + held_motion(shape, lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, end)[1]

@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes
-from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -24,6 +23,7 @@ from slipsweep.kernels.sine.lanes import (
     ONSET,
     V,
 )
+from slipsweep.kernels.sine.shapes import fallen, fallen_integrals, half_wave
 
 #: Relative size of a lane's last step.  A lane that has taken it stays where it is, whatever its neighbours do.
 _LANE_TOLERANCE = 1e-7
@@ -34,26 +34,25 @@ TURN, SWITCH, FALL_STOP, HELD_STOP, RECOUPLING = range(5)
 
 
 @in_lanes
-def held_motion(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+def held_motion(shape: int, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
     """∫ (x − b) dψ and ∫ (end − ψ)(x − b) dψ for a held b, |ψ| ≤ π/2: gains of V and W from rest.
 
     docs/numerics.md#held-block-acceleration
     """
     width = end - start
     excess = amplitude - held
-    sine_part = angle_minus_sine(start)
-    first = excess * width - amplitude * (angle_minus_sine(end) - sine_part)
-    second = 0.5 * excess * width * width - amplitude * (
-        half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * width
-    )
+    before, before_moment = fallen_integrals(shape, start)
+    after, after_moment = fallen_integrals(shape, end)
+    first = excess * width - amplitude * (after - before)
+    second = 0.5 * excess * width * width - amplitude * (after_moment - before_moment - before * width)
     return first, second
 
 
 @in_lanes
-def stopping_step(amplitude: float, held: float, velocity: float, start: float, psi: float) -> float:
+def stopping_step(shape: int, amplitude: float, held: float, velocity: float, start: float, psi: float) -> float:
     """What Newton takes off ψ on the way to the stop of a hold that was entered with V = `velocity` at `start`."""
-    left = velocity + held_motion(amplitude, held, start, psi)[0]
-    return left / (amplitude - held - amplitude * versine(psi))
+    left = velocity + held_motion(shape, amplitude, held, start, psi)[0]
+    return left / (amplitude - held - amplitude * fallen(shape, psi))
 
 
 @in_lanes
@@ -80,56 +79,59 @@ def _switch_step(lanes: np.ndarray, j: int, x: float, side: float, g: float) -> 
 
 
 @in_lanes
-def _fall_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
+def _fall_step(shape: int, lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
     """To the stop after the peak."""
-    step = stopping_step(lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j], 0.0, psi)
+    step = stopping_step(shape, lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j], 0.0, psi)
     return min(max(psi - step, 0.0), HALF_PI), step, psi
 
 
 @in_lanes
-def _held_step(lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
+def _held_step(shape: int, lanes: np.ndarray, j: int, psi: float, side: float, g: float) -> tuple[float, float, float]:
     """To the stop of a pulse entered in motion, from Üy on, where V falls ever more slowly; no further than t1."""
     began, onset = lanes[BEGAN + j], lanes[ONSET + j]
-    step = stopping_step(lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[V + j], began, psi)
+    step = stopping_step(shape, lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[V + j], began, psi)
     onward = min(max(psi - step, began), onset)
     return onward, step, math.inf if onward >= onset else onward - began
 
 
 @in_lanes
-def _recoupling_step(lanes: np.ndarray, j: int, chi: float, side: float, g: float) -> tuple[float, float, float]:
+def _recoupling_step(
+    shape: int, lanes: np.ndarray, j: int, chi: float, side: float, g: float
+) -> tuple[float, float, float]:
     """To the stop after Üg = 0."""
     amplitude, b = lanes[AMPLITUDE + j], lanes[HELD + j]
-    half_sine, half_cosine = 0.5 * chi - angle_minus_sine(0.5 * chi), 1.0 - versine(0.5 * chi)
-    over = lanes[LEFT + j] - b * chi - 2.0 * amplitude * half_sine * half_sine
-    step = over / (b + 2.0 * amplitude * half_sine * half_cosine)
+    wave, integral, _ = half_wave(shape, chi)
+    step = (lanes[LEFT + j] - b * chi - amplitude * integral) / (b + amplitude * wave)
     return min(max(chi + step, 0.0), math.pi), step, chi
 
 
 @in_lanes
-def _step_to(root: int, lanes: np.ndarray, j: int, at: float, side: float, g: float) -> tuple[float, float, float]:
+def _step_to(
+    root: int, shape: int, lanes: np.ndarray, j: int, at: float, side: float, g: float
+) -> tuple[float, float, float]:
     """The next place on the way to a root, the length of the step to it, and against what that has to be small."""
     if root == TURN:
         return _turn_step(lanes, j, at, side, g)
     if root == SWITCH:
         return _switch_step(lanes, j, at, side, g)
     if root == FALL_STOP:
-        return _fall_step(lanes, j, at, side, g)
+        return _fall_step(shape, lanes, j, at, side, g)
     if root == HELD_STOP:
-        return _held_step(lanes, j, at, side, g)
-    return _recoupling_step(lanes, j, at, side, g)
+        return _held_step(shape, lanes, j, at, side, g)
+    return _recoupling_step(shape, lanes, j, at, side, g)
 
 
 @in_lanes
-def settle(root: int, row: int, settled: int, side: float, g: float, lanes: np.ndarray) -> None:
+def settle(root: int, shape: int, row: int, settled: int, side: float, g: float, lanes: np.ndarray) -> None:
     """Take the lanes of a strip to a root, in row `row`; row `settled` says which are there.
 
-    Inlined wherever it is called, so that LLVM knows root and rows, but compiled by numba once for all of them.
+    Inlined wherever it is called, so that LLVM knows root, shape and rows, but compiled by numba once for all of them.
     """
     for _ in range(_MOST_LANE_STEPS):
         unsettled = 0
         for j in range(STRIP):
             at = lanes[row + j]
-            onward, step, scale = _step_to(root, lanes, j, at, side, g)
+            onward, step, scale = _step_to(root, shape, lanes, j, at, side, g)
             there = lanes[settled + j] > 0.0
             lanes[row + j] = at if there else onward
             there |= abs(step) <= _LANE_TOLERANCE * scale

@@ -3,10 +3,11 @@
 Blocks are a flat array, (BLOCKS_SIZE,), in which row + j is cell j.  docs/numerics.md#lanes-of-the-sine
 """
 
+import math
+
 import numpy as np
 
 from slipsweep.jit.decorators import in_lanes, scalar
-from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -28,6 +29,7 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.sine.continuous import SHORT_SINE
 from slipsweep.kernels.sine.lanes import FOLLOWS_EQ4, LANE_E_FOLDINGS, OTHER, SLIDES_ON, STAYS, STICKS, YIELD_GOVERNS
+from slipsweep.kernels.sine.shapes import SQUARE, phase_of
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
@@ -67,7 +69,7 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
 
 
 @scalar
-def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
+def sort_strip(shape: int, cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
     """Blocks of a strip of a tile in lanes, with their codes and the kind of each.
 
     Neighbours are mostly alike, and what none of them needs is left out: λ and t1 of those that stay,
@@ -90,10 +92,12 @@ def sort_strip(cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
         least = blocks[_LEAST_FRICTION + j]
         blocks[DECAY + j] = decay_rate_of(cell_of(cells, j), blocks[DELTA_MU + j], least, g) / g
     for j in range(STRIP):
-        blocks[BEGAN + j] = rising_phase(blocks[YIELD + j], blocks[AMPLITUDE + j])
+        blocks[BEGAN + j] = phase_of(shape, blocks[YIELD + j], blocks[AMPLITUDE + j])
     if sticks > 0:
         for j in range(STRIP):
-            blocks[_AT_START + j] = lane_response(blocks, j, blocks[YIELD + j], g)
+            # the square jumps past Üy
+            at_start = -math.inf if shape == SQUARE else lane_response(blocks, j, blocks[YIELD + j], g)
+            blocks[_AT_START + j] = at_start
             blocks[_AT_END + j] = lane_response(blocks, j, blocks[AMPLITUDE + j], g)
     for j in range(STRIP):
         blocks[KIND + j] = kind_of(blocks, j, options)
