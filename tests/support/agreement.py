@@ -333,7 +333,7 @@ def _stepped(group: Group, exact: Exact) -> Iterator[Comparison]:
 def _about_the_largest(times: Array, velocity: Array, moved: Array, spacing: float, rate: float) -> Array:
     """Finer times wherever V, which changes at this rate at most, may be larger than at any of these.
 
-    As long as V is positive at none: where the block has moved most from one to the next, and where it begins to move.
+    As long as V is positive at none: where the block has moved most from one to the next, and where V is just below 0.
     """
     highest = velocity.max()
     if highest > 0.0:
@@ -343,8 +343,9 @@ def _about_the_largest(times: Array, velocity: Array, moved: Array, spacing: flo
         places = places[first[np.argsort(-heights)[:256]]]
     else:
         slid = np.where(np.diff(times) <= 1.5 * spacing, np.diff(moved), 0.0)
-        begins = np.flatnonzero((velocity[:-1] == 0.0) & (velocity[1:] != 0.0))[:16]
-        places = np.union1d(np.argsort(-slid, kind="stable")[:16], begins)
+        below = np.flatnonzero((velocity < 0.0) & (velocity + rate * spacing >= 0.0))
+        below = below[np.argsort(-velocity[below], kind="stable")[:256]]
+        places = np.union1d(np.argsort(-slid, kind="stable")[:16], below)
     about = times[places, np.newaxis] + np.linspace(-spacing, spacing, 65)
     return np.unique(np.clip(about, times[0], times[-1]))
 
