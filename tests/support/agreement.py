@@ -409,6 +409,8 @@ def _as_a_record(group: Group, exact: Exact) -> Iterator[Comparison]:
             # whose mode and whose stiffness a record does not say
             result["sliding_mode"] = own["sliding_mode"]
             result["validity"] |= own["validity"] & np.int16(Validity.FLEXIBLE_BLOCK)
+            if own["validity"] & VALUELESS and result["permanent_displacement"] == 0.0:
+                continue  # of pulses that do not reach Üy a record says nothing
             if result["validity"] & own["validity"] & VALUELESS:
                 result["validity"] = own[
                     "validity"
