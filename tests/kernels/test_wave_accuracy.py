@@ -227,6 +227,9 @@ def test_lanes_side_by_side(waveform: str, onset: float | None, recoupling: str,
     lanes = slipsweep.sweep(**choices(**given))
     assert set(np.unique(lanes.sliding_mode)) >= {1, 2}
     assert_alike(lanes, walked(**given), cycles)
+    if waveform == "cosine":
+        shifted = given | {"waveform": "harmonics", "harmonics": SHIFTED}
+        assert_alike(lanes, slipsweep.sweep(**choices(**shifted)), cycles)
 
 
 @pytest.mark.parametrize("cell", ["coulomb", "measured", "newmark"])

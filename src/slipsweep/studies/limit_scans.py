@@ -196,7 +196,8 @@ def beside_changes(
     row, step = np.nonzero(states[:, 1:] != states[:, :-1])
     higher = np.maximum(scan.moved[row, step + 1], scan.moved[row, step])
     may = scan.before[row, step] & ~(higher < change.least * scan.wanted[row, 0])  # NaN beside a gap
-    row, step = row[may.any(axis=1)], step[may.any(axis=1)]
+    asked = may.any(axis=1)
+    row, step = row[asked], step[asked]
     start, end, known = scan.amplitudes[row, step], scan.amplitudes[row, step + 1], states[row, step]
     low, high = narrow(
         start,

@@ -242,14 +242,13 @@ def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
 
     # what is missing says why in its validity: that of the greatest amplitude
     results = _at(problem, arrays, np.full((1, 1), maximum_amplitude), ("validity",), shape)
-    has_value = ~np.isnan(scanned[:, :, 0]).all(axis=1)
     results |= {
         "limit_amplitude": np.full(shape, math.nan),
         "limit_status": np.full(shape, LimitStatus.NOT_REACHED, np.int8),
         "permanent_displacement": np.full(shape, math.nan),
         **{name: np.full(shape, SlidingMode.MISSING, RESULT_DTYPES[name]) for name in _codes(problem)},
     }
-    results["limit_status"][~has_value] = LimitStatus.INVALID
+    results["limit_status"][np.isnan(scanned[:, :, 0]).all(axis=1)] = LimitStatus.INVALID
     for name in wanted:
         results[name][row, column] = after[name]
     results["limit_amplitude"][row, column] = high

@@ -46,6 +46,8 @@ from slipsweep.kernels.sine.lanes import (
     PEAK,
     PSI,
     RATE,
+    SHORT_NODES,
+    SHORT_WEIGHTS,
     V,
     W,
     X,
@@ -57,7 +59,6 @@ from slipsweep.motion.pieces import Wave
 
 #: On the first 0.6 radians of the cycle 8 nodes are wrong by 4e-14 of that part at most; on the whole quarter by 1e-13,
 #: where friction falls by no more than e.
-SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
 SHORT_SINE, SHORT_E_FOLDINGS = math.sin(0.6), 1.0
 
 #: Rows of lanes that pulses have for something else: what V misses before Üg = Üy, and what it gains from

@@ -29,3 +29,6 @@ LANES_SIZE = (LANE_ROWS + 24) * TILE
 #: 12 nodes reach 1e-14 where friction falls by no more than e^6 (at 8 e-foldings, 2e-14).
 LANE_NODES, LANE_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
 LANE_E_FOLDINGS = 6.0
+
+#: 8 nodes, for the short parts of continuous sliding.
+SHORT_NODES, SHORT_WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))

@@ -11,7 +11,7 @@ import numpy as np
 from slipsweep.jit.decorators import in_lanes
 from slipsweep.jit.elementary import angle_minus_sine, exp, half_square_minus_versine, rising_phase, versine
 from slipsweep.kernels.linear import exponential_moments
-from slipsweep.kernels.sine.lanes import HALF_PI
+from slipsweep.kernels.sine.lanes import HALF_PI, SHORT_NODES, SHORT_WEIGHTS
 
 #: Shapes; and the slope of a triangle of peak 1.
 SINE, TRIANGLE, SQUARE = range(3)
@@ -22,9 +22,8 @@ _SLOPE = 1.0 / HALF_PI
 #: are wrong by 3e-15).  31 terms give 4e-16 for k from 0 to 6; about 4, no digits cancel where k is large.
 _CENTRE = 4.0
 _PANEL_WIDTH = HALF_PI / 8
-_NODES, _WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
-_SINES = np.sin(_PANEL_WIDTH * (np.arange(8)[:, np.newaxis] + _NODES))
-_WEIGHTED = _PANEL_WIDTH * _WEIGHTS * np.exp(-_CENTRE * _SINES)
+_SINES = np.sin(_PANEL_WIDTH * (np.arange(8)[:, np.newaxis] + SHORT_NODES))
+_WEIGHTED = _PANEL_WIDTH * SHORT_WEIGHTS * np.exp(-_CENTRE * _SINES)
 _QUARTER_SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) for n in range(30, -1, -1)])
 
 
