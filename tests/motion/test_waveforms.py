@@ -10,7 +10,20 @@ from mpmath import mp, mpf
 
 from slipsweep import Cosine, Cycle, Harmonics, InputError, Sine, Square, Step, Triangle, sweep
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, END, FINISH, FIRST, JUMPS, LAST, START, TERM, TOP
+from slipsweep.motion.pieces import (
+    BEGIN,
+    COEFFICIENTS,
+    DEGREE,
+    END,
+    FINISH,
+    FIRST,
+    JUMPS,
+    LAST,
+    NODES,
+    START,
+    TERM,
+    TOP,
+)
 from slipsweep.motion.waveforms import MOST_RAMP, WAVEFORMS, Waveform
 
 CYCLES = 4
@@ -85,11 +98,26 @@ def test_pieces_are_the_wave(name: str) -> None:
         phase = wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])
         if wave.repeats and p >= wave.cycle[wave.lead + 1]:
             phase += 2 * pi * (wave.repeats - 1)  # the table has the plain cycle once
-        found = wave.pieces[p, TOP] + sum(c * tau ** (k + 1) for k, c in enumerate(wave.pieces[p, COEFFICIENTS::TERM]))
+        degree, top = int(wave.pieces[p, DEGREE]), wave.pieces[p, TOP]
+        powers = [*wave.pieces[p, COEFFICIENTS : COEFFICIENTS + TERM * degree : TERM][::-1], top]
+        found = np.polyval(powers, tau)
         error = np.abs(found - defined(waveform, phase) / scale).max()
         assert error < 1e-14 + 4e-16 * fastest * 8 * pi, f"piece {p}: off by {error:.1e}"
+        if degree > 1:
+            # from the end that is no anchor
+            nodes = (wave.pieces[p, BEGIN] + wave.pieces[p, FINISH]) * (1.0 - NODES)
+            known = wave.pieces[p, -NODES.size :]
+            np.testing.assert_allclose(known, np.abs(np.polyval(powers, nodes)), rtol=0.0, atol=1e-15)
         assert np.all(np.diff(found) * (wave.pieces[p, LAST] - wave.pieces[p, FIRST]) >= 0), f"piece {p}: not monotone"
         assert np.all(found * (wave.pieces[p, FIRST] + wave.pieces[p, LAST]) > 0), f"piece {p}: changes its sign"
+
+
+def test_stretches_are_the_same_up_to_the_next() -> None:
+    """Of plain cycles; the last before a ramp that begins in its negative half wave differs from them."""
+    assert wave_of(Square(cycles=5, ramp_out=1.25)).same.tolist() == [0, 0, 2, 3]
+    assert wave_of(Sine(cycles=5)).same.tolist() == [0, 0]
+    # the first stretch has begun before the shaking, and the last ends with it
+    assert wave_of(Cosine(cycles=5)).same.tolist() == [0, 1, 1, 1, 4]
 
 
 @each

@@ -220,7 +220,7 @@ def _remaining_grid(
     grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room = room_of(0, longest_cycle(wave))
+    room = room_of(0, longest_cycle(wave), wave.height.size)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
         for begin in range(stretches[stretch, 0], last, TILE):
@@ -234,7 +234,7 @@ def _wave_grid(
     grid: Grid, stretches: np.ndarray, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room = room_of(0, longest_cycle(wave))
+    room = room_of(0, longest_cycle(wave), wave.height.size)
     for stretch in range(stretches.shape[0]):
         last = stretches[stretch, 1]
         for begin in range(stretches[stretch, 0], last, TILE):
@@ -262,7 +262,7 @@ def _record_grid(
     grid: Grid, first: int, last: int, inputs: tuple[np.ndarray, ...], periods: np.ndarray, options: Options,
     wave: Wave, own: newmark.Record, results: Results, tile: Tile,
 ) -> None:  # fmt: skip
-    room = room_of(0, 0)  # pulses only
+    room = room_of(0, 0, 0)  # pulses only
     for begin in range(first, last, TILE):
         count = min(TILE, last - begin)
         runs = gather(grid, begin, count, inputs, tile)

@@ -79,7 +79,7 @@ def history_room(wave: Wave) -> Room:
     longest = 0
     for k in range(wave.height.size):
         longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
-    return room_of(longest * MOST_LEGS + wave.pieces.shape[0] + 2, 0)
+    return room_of(longest * MOST_LEGS + wave.pieces.shape[0] + 2, 0, 0)
 
 
 @scalar

@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     NEWMARK,
@@ -23,7 +25,12 @@ from slipsweep.kernels.block import (
     stays_below_yield,
 )
 from slipsweep.kernels.pulse import Pulse, first_pulse
-from slipsweep.motion.pieces import END, Wave
+from slipsweep.motion.pieces import END, START, Wave
+
+#: What is kept of a pulse from rest to rest: W, the largest V, and the phase at which it stops, from the beginning of
+#: its stretch.
+_MOVED, _HIGHEST, _STOPS = range(3)
+REST_COLUMNS = 3
 
 
 @scalar
@@ -41,6 +48,31 @@ def yield_governs(block: Block, wave: Wave) -> bool:
     return governs
 
 
+@scalar
+def forget(rests: np.ndarray) -> None:
+    """Nothing is known of the pulses of a block yet; `rests` is (stretches, REST_COLUMNS)."""
+    for k in range(rests.shape[0]):
+        rests[k, _MOVED] = math.nan
+
+
+@scalar
+def remember(wave: Wave, k: int, now: Pulse, rests: np.ndarray) -> None:
+    """Keep a pulse that began from rest in stretch k, if it has come to rest before the next."""
+    if now.velocity == 0.0 and now.validity == 0 and now.stopped_at < math.inf:
+        same = wave.same[k]
+        rests[same, _MOVED], rests[same, _HIGHEST] = now.displacement, now.peak
+        rests[same, _STOPS] = now.stopped_at - wave.pieces[wave.stretch[k, 0], START]
+
+
+@scalar
+def remembered(wave: Wave, k: int, rests: np.ndarray) -> Pulse:
+    """The pulse from rest in stretch k; its W is NaN where none is kept, or the shaking ends before the stop."""
+    same, last = wave.same[k], wave.pieces.shape[0] - 1
+    stops = wave.pieces[wave.stretch[k, 0], START] + rests[same, _STOPS]
+    moved = rests[same, _MOVED] if stops <= wave.pieces[last, END] else math.nan
+    return Pulse(0.0, moved, rests[same, _HIGHEST], 0.0, stops, 0)
+
+
 def train_of(
     pulse: Callable[[Block, Options, Wave, Any, int, int, float], Pulse],
 ) -> Callable[[Block, Options, Wave, Any], Motion]:
@@ -48,6 +80,7 @@ def train_of(
 
     A pulse is given block, options, wave, what the solver itself has tabulated, the stretch it begins in,
     the one in which the next begins (past the last, if none does) and the velocity carried into it.
+    In the solver's table, `rests` is room for what is kept of pulses from rest to rest.
     """
 
     @scalar
@@ -58,7 +91,11 @@ def train_of(
         displacement, peak, least, stopped_at, validity = 0.0, velocity, velocity, 0.0, 0
         while k < wave.height.size and wave.stretch[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
-            now = pulse(block, options, wave, table, k, following, velocity)
+            now = remembered(wave, k, table.rests)
+            if velocity > 0.0 or math.isnan(now.displacement):
+                now = pulse(block, options, wave, table, k, following, velocity)
+                if velocity == 0.0:
+                    remember(wave, k, now, table.rests)
             k, velocity, stopped_at = following, now.velocity, now.stopped_at
             displacement += now.displacement
             peak, least = max(peak, now.peak), min(least, now.least)
@@ -83,6 +120,7 @@ def train_of(
         if k == wave.height.size:
             return Motion(0.0, 0.0, 0)
         validity = YIELD_GOVERNS if yield_governs(block, wave) else 0
+        forget(table.rests)
         now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0)
         velocity, displacement, peak = now.velocity, now.displacement, now.peak
         validity |= now.validity
@@ -103,9 +141,6 @@ def train_of(
             left -= 1
             if before == 0.0 and velocity == 0.0:
                 displacement += left * now.displacement
-                # what follows is one more of the same, if the end of the shaking comes too late to matter
-                if wave.alike and now.stopped_at <= wave.pieces[wave.cycle[wave.lead + 1] - 1, END]:
-                    return Motion(displacement + now.displacement, peak, validity)
                 break
             if now.least > 0.0:
                 gain = velocity - before

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.pieces import JUMPS, Wave, pieces_of, stretches_of
+from slipsweep.motion.pieces import END, JUMPS, START, Wave, pieces_of, stretches_of
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
@@ -317,13 +317,22 @@ def wave_of(waveform: Waveform) -> Wave:
         shape=np.array(shape, np.int64),
         stretch=stretch,
         height=height,
+        same=_same(table, stretch),
         rises=_rises(first, last, table[:, JUMPS] > 0.0),
         highest=float(max(first.max(), last.max())),
         lowest=float(min(first.min(), last.min())),
         lead=lead,
         repeats=repeats,
-        alike=repeats > 0 and tail == 1 and not wraps and not ramped[-1],
+        again=1 + int(wraps) if repeats else 0,
     )
+
+
+def _same(pieces: NDArray[np.float64], stretch: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first stretch of the same pieces as each up to the stretch after it, but for when they come."""
+    shapes = np.delete(pieces, [START, END], axis=1)
+    first: dict[bytes, int] = {}
+    ways = itertools.pairwise([*stretch[:, 0], pieces.shape[0]])
+    return np.array([first.setdefault(shapes[p:q].tobytes(), k) for k, (p, q) in enumerate(ways)], np.int64)
 
 
 def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -406,10 +415,11 @@ def _record_cut(record: Record, polarity: float) -> Wave:
         shape=np.zeros(1, np.int64),
         stretch=stretch,
         height=height,
+        same=np.arange(height.size),
         rises=np.empty((0, 2)),  # each pulse has its own
         highest=float(values.max()),
         lowest=float(values.min()),
         lead=0,
         repeats=0,
-        alike=False,
+        again=0,
     )

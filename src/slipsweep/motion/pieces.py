@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 #: (0 on a plateau, 1 on a straight line), 1 where w jumps up at its beginning, and 1 where it is a quarter
 #: of a sine about its peak, whose closed forms are shorter than its series.
 START, END, BEGIN, FINISH, FIRST, LAST, TOP, DEGREE, JUMPS, ARC = range(10)
+#: Gauss-Legendre nodes on [0, 1], two SIMD registers.  The last columns of a table with curves are |w| at the nodes of
+#: whole pieces, from the end that is no anchor.
+NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
+
 #: ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over the whole piece.
 WHOLE, WHOLE_MOMENT = 10, 11
 #: c₁, and the first ones of the sum's first and second integral from the anchor, τ² and τ³; those of the
@@ -42,14 +46,16 @@ class Wave(NamedTuple):
         Runs of pieces with w > 0: the first piece, and the first after it.
     height : ndarray, shape (stretches,)
         Largest w of each.
+    same : ndarray of int, shape (stretches,)
+        The first stretch of the same pieces as each, those up to the stretch after it among them.
     rises : ndarray, shape (ranges, 2)
         Ranges of w > 0 that are passed through, or jumped to, without falling; they do not overlap.
     highest, lowest : float
         Largest and least w.
     lead, repeats : int
         See above.
-    alike : bool
-        Whether what follows the plain cycle is one more of it.
+    again : int
+        How many of the cycles that follow the plain one are like it.
     """
 
     pieces: np.ndarray
@@ -57,12 +63,13 @@ class Wave(NamedTuple):
     shape: np.ndarray
     stretch: np.ndarray
     height: np.ndarray
+    same: np.ndarray
     rises: np.ndarray
     highest: float
     lowest: float
     lead: int
     repeats: int
-    alike: bool
+    again: int
 
 
 def pieces_of(
@@ -90,12 +97,14 @@ def pieces_of(
         JUMPS: first > np.maximum(before, 0.0),
         ARC: arc,
     }
-    pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size))
+    curved = power.size > 1
+    pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size + (NODES.size if curved else 0)))
     for column, values in named.items():
         pieces[:, column] = values
-    pieces[:, COEFFICIENTS::TERM] = coefficients
-    pieces[:, ONCE::TERM] = coefficients / (power + 1)
-    pieces[:, TWICE::TERM] = coefficients / ((power + 1) * (power + 2))
+    series = COEFFICIENTS + TERM * power.size
+    pieces[:, COEFFICIENTS:series:TERM] = coefficients
+    pieces[:, ONCE:series:TERM] = coefficients / (power + 1)
+    pieces[:, TWICE:series:TERM] = coefficients / ((power + 1) * (power + 2))
     # one of the two ends is the anchor
     tau = np.where(at_end, -length, length)
     once, moment = np.zeros(first.size), np.zeros(first.size)
@@ -106,6 +115,11 @@ def pieces_of(
         once, moment = once * tau, moment * tau * tau
         pieces[:, WHOLE] = np.where(at_end, -once, once)
         pieces[:, WHOLE_MOMENT] = np.where(at_end, -moment - once * length, moment)
+        if curved:
+            at_nodes, fallen = np.multiply.outer(tau, 1.0 - NODES), np.zeros((first.size, NODES.size))
+            for k in range(power.size - 1, -1, -1):
+                fallen = (fallen + coefficients[:, k, np.newaxis]) * at_nodes
+            pieces[:, -NODES.size :] = np.abs(pieces[:, TOP, np.newaxis] + fallen)
     return pieces
 
 

@@ -15,13 +15,22 @@ from slipsweep.kernels.block import (
     Block,
     friction,
 )
-from slipsweep.kernels.cycle.legs import AT_NODES, LAGS, NODE_COUNT, STATE_SIZE
+from slipsweep.kernels.cycle.legs import AT_NODES, LAGS, STATE_SIZE
 from slipsweep.kernels.excitation import offset_at, plane
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import ARC, COEFFICIENTS, DEGREE, TERM, TOP
-
-#: Gauss-Legendre nodes and weights on [0, 1]: two SIMD registers.
-NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(NODE_COUNT), (1.0, 0.0), strict=True))
+from slipsweep.motion.pieces import (
+    ARC,
+    BEGIN,
+    COEFFICIENTS,
+    DEGREE,
+    FINISH,
+    FIRST,
+    LAST,
+    NODES,
+    TERM,
+    TOP,
+    WEIGHTS,
+)
 
 #: Where panels of the quadrature end, in e-foldings of the friction from the end where it is larger;
 #: past the third it has decayed to 1e-18.
@@ -93,6 +102,7 @@ def curved_lag(
     least = min(x_start, x_end)
     e_foldings = decay * abs(x_end - x_start)
     near, far = (start, end) if rising else (end, start)
+    whole = start == pieces[p, BEGIN] and end == pieces[p, FINISH] and e_foldings <= PANEL_BOUNDS[0]
     first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
     values = state[AT_NODES:STATE_SIZE]
     for bound in PANEL_BOUNDS:
@@ -100,7 +110,12 @@ def curved_lag(
         if e_foldings > bound:
             until = offset_at(pieces, p, amplitude, math.copysign(least + bound / decay, pieces[p, TOP]))
         width = until - near
-        at_nodes(pieces, p, amplitude, near, width, values)
+        if whole:
+            known = pieces[p, pieces.shape[1] - NODES.size :]
+            for node in range(NODES.size):
+                values[node] = amplitude * known[node]
+        else:
+            at_nodes(pieces, p, amplitude, near, width, values)
         for node in range(NODES.size):
             x = values[node]
             mu = friction(block, x)
@@ -127,8 +142,11 @@ def lag_integrals(
     the side ±1 of Üg = 0 the relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ).
     Apart, because over a symmetric cycle the first must cancel to the last digit.
     """
-    x_start = abs(plane(pieces, p, block.amplitude, start))
-    x_end = abs(plane(pieces, p, block.amplitude, end))
+    amplitude = block.amplitude
+    # most parts begin or end where the piece does
+    x_start = amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else plane(pieces, p, amplitude, start)
+    x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else plane(pieces, p, amplitude, end)
+    x_start, x_end = abs(x_start), abs(x_end)
     if int(pieces[p, DEGREE]) <= 1:
         return straight_lag(block, x_start, x_end - x_start, end - start)
     return curved_lag(block, pieces, p, start, end, x_start, x_end, state)

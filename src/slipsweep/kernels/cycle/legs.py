@@ -21,7 +21,8 @@ from slipsweep.kernels.pulse import (
     STATE_ROWS,
     VELOCITY,
 )
-from slipsweep.motion.pieces import Wave
+from slipsweep.kernels.train import REST_COLUMNS
+from slipsweep.motion.pieces import NODES, Wave
 
 #: Signs at the start of a leg are read this fraction of the leg inside it, but no closer to the start than this
 #: fraction of that: where a leg ends at a turn of E, the sign just behind is known only beyond rounding.
@@ -32,10 +33,10 @@ _SLIVER, _ROUNDING = 1e-10, 4.5e-16
 #: whether b follows Eq. 4 on it, and from there on.
 CREST, ONSET_FROM, ONSET, LEG_AT, LEG_END, LEG_FOLLOWS, NEXT_FOLLOWS = range(STATE_ROWS, STATE_ROWS + 7)
 
-#: From here on Üg at the nodes of a quadrature (`eq4.curved_lag`), and their number: with an array that is made for
-#: each, ramps take 1.1 times as long.
-AT_NODES, NODE_COUNT = STATE_ROWS + 7, 16
-STATE_SIZE = AT_NODES + NODE_COUNT
+#: From here on Üg at the nodes of a quadrature (`eq4.curved_lag`): with an array that is made for each, ramps take 1.1
+#: times as long.
+AT_NODES = STATE_ROWS + 7
+STATE_SIZE = AT_NODES + NODES.size
 
 #: More legs than any rise has: five breaks, and a stop and an onset between each.
 MOST_LEGS = 32
@@ -50,7 +51,8 @@ PULSE_ROWS = 13
 
 
 class Room(NamedTuple):
-    """Where a block is followed: its state, a log of its legs, room for continuous sliding (`continuous`), and lanes.
+    """Where a block is followed: its state, a log of its legs, room for continuous sliding (`continuous`), lanes, and
+    what `train` keeps of pulses.
 
     No field is called `zeros` or `empty`: a function with such a name in it would count references (`jit.inner.parts`).
 
@@ -63,6 +65,7 @@ class Room(NamedTuple):
     gains: np.ndarray
     straight: np.ndarray
     pulses: np.ndarray
+    rests: np.ndarray
 
 
 @scalar
@@ -82,8 +85,8 @@ LEG_COLUMNS = 8
 
 
 @scalar
-def room_of(legs: int, pieces: int) -> Room:
-    """Room, with a log of so many legs and for cycles of so many pieces.
+def room_of(legs: int, pieces: int, stretches: int) -> Room:
+    """Room, with a log of so many legs, for cycles of so many pieces and a train of so many stretches.
 
     It is made in kernels, where the compiler knows that nothing else lies there.
     """
@@ -94,6 +97,7 @@ def room_of(legs: int, pieces: int) -> Room:
         np.empty((pieces, 5)),
         np.empty(6 * LAGS),
         np.empty(PULSE_ROWS * PULSES),
+        np.empty((stretches, REST_COLUMNS)),
     )
 
 

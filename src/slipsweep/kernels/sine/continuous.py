@@ -32,7 +32,7 @@ from slipsweep.kernels.block import (
     relative_acceleration_root,
 )
 from slipsweep.kernels.cycle.continuous import continuous as continuous_of_any_wave
-from slipsweep.kernels.cycle.eq4 import NODES, PANEL_BOUNDS, WEIGHTS
+from slipsweep.kernels.cycle.eq4 import PANEL_BOUNDS
 from slipsweep.kernels.cycle.legs import MOST_LEGS, Room, inside, next_break
 from slipsweep.kernels.events import STRIP
 from slipsweep.kernels.sine.lanes import (
@@ -55,7 +55,7 @@ from slipsweep.kernels.sine.lanes import (
 from slipsweep.kernels.sine.roots import TURN, settle
 from slipsweep.kernels.sine.shapes import phase_of, quarter_integrals, risen, risen_integrals
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import Wave
+from slipsweep.motion.pieces import NODES, WEIGHTS, Wave
 
 #: On the first 0.6 radians of the cycle 8 nodes are wrong by 4e-14 of that part at most; on the whole quarter by 1e-13,
 #: where friction falls by no more than e.

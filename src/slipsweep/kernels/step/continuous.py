@@ -201,10 +201,12 @@ def continuous(block: Block, wants_peak: bool, room: Room) -> Motion:
     reset_state(block, state)
     total, begun = Gain(0.0, 0.0, 0.0, 0.0), False
     for c in range(steps.wave.shape.size):
+        if begun and steps.wave.lead < c <= steps.wave.lead + steps.wave.again:
+            continue
         first, last = steps.wave.cycle[c], steps.wave.cycle[c + 1] - 1
         times = 0.0
         if c == steps.wave.lead and steps.wave.repeats > 0:
-            times = steps.wave.repeats - 1.0 + (1.0 if steps.wave.alike else 0.0)
+            times = steps.wave.repeats - 1.0 + steps.wave.again
         whole = Gain(0.0, 0.0, 0.0, 0.0)
         if begun:
             whole = part_of_cycle(block, first, 0, last, steps.counts[last], wants_peak, room)
@@ -231,6 +233,4 @@ def continuous(block: Block, wants_peak: bool, room: Room) -> Motion:
                 max(total.peak, peak),
                 0.0,
             )
-        if c == steps.wave.lead and steps.wave.repeats > 0 and steps.wave.alike:
-            break
     return Motion(total.displacement, total.peak if wants_peak else math.nan, 0)

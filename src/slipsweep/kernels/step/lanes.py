@@ -14,6 +14,7 @@ from slipsweep.kernels.pulse import DISPLACEMENT, LEAST, PEAK, VELOCITY
 from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON
 from slipsweep.kernels.step.slides import STATE_SIZE
 from slipsweep.kernels.step.table import AHEAD, Steps
+from slipsweep.kernels.train import REST_COLUMNS
 from slipsweep.model import equations as eq
 
 #: Rows of the lanes: the rate of V at the nodes and in the middles of steps (0 but for Simpson's rule), that by
@@ -26,17 +27,22 @@ _INDEX = np.arange(AHEAD) * 1.0
 
 
 class Room(NamedTuple):
-    """Where a block is followed step by step: the table of steps, its state (rows as in `slides`), and the lanes."""
+    """Where a block is followed step by step.
+
+    The table of steps, the block's state (rows as in `slides`), the lanes, and what `train` keeps of pulses.
+    """
 
     steps: Steps
     state: np.ndarray
     lanes: np.ndarray
+    rests: np.ndarray
 
 
 @scalar
 def room_of(steps: Steps) -> Room:
     """Room for one block after the other."""
-    return Room(steps, np.zeros(STATE_SIZE), np.zeros(_LANES_SIZE))
+    rests = np.empty((steps.wave.height.size, REST_COLUMNS))
+    return Room(steps, np.zeros(STATE_SIZE), np.zeros(_LANES_SIZE), rests)
 
 
 @in_lanes
