@@ -554,16 +554,22 @@ def test_peak_memory_is_that_of_the_result(call: str) -> None:
     assert float(done.stdout) < 1.2
 
 
-def test_the_design_chart_takes_one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("waveform", [slipsweep.Sine(10), slipsweep.Triangle(10), slipsweep.Square(10)])
+@pytest.mark.parametrize("given", [{}, {"decay_rate": 2.7}, {"decay_rate": 1.0}, {"yield_acceleration": 0.59}])
+def test_the_design_chart_takes_one_kernel(
+    given: dict[str, float], waveform: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Lanes solve all its cells: what solves those they leave takes as long to compile as they do."""
     monkeypatch.setattr(engine, "REMAINING_KERNEL", None)
+    monkeypatch.setattr(engine, "WAVE_KERNEL", None)
     with (Path(__file__).parents[2] / "sweeps" / "design_chart.toml").open("rb") as file:
         axes = tomllib.load(file)["axes"]
     grid = {name: np.linspace(axes[name]["start"], axes[name]["stop"], axes[name]["num"]) for name in ("theta", "mu_s")}
     amplitude = 9.81 * np.linspace(axes["amplitude"]["start"], axes["amplitude"]["stop"], axes["amplitude"]["num"])
     inputs = [values.ravel() for values in np.meshgrid(*grid.values(), amplitude)]
     arrays = dict(zip((*grid, "amplitude"), inputs, strict=True)) | {"frequency": np.ones(1)}
-    problem = engine.Problem(slipsweep.Mendez(), slipsweep.Sine(10), slipsweep.Cycle())
+    arrays |= {name: np.full(1, value) for name, value in given.items()}
+    problem = engine.Problem(slipsweep.Mendez(), waveform, slipsweep.Cycle())
     found = engine.solve(engine.Request(problem, inputs[0].shape, arrays, engine.MOTION_RESULTS))
     assert np.isfinite(found["permanent_displacement"]).mean() > 0.9
 

@@ -210,9 +210,13 @@ def test_lanes_are_the_walk_over_pieces(cell: dict[str, Any], options: dict[str,
 
 @pytest.mark.parametrize("cycles", [1, 2, 3, 20])
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
-@pytest.mark.parametrize("onset", [None, 0.3, 2.0])
-@pytest.mark.parametrize("waveform", ["cosine", "triangle", "square"])
-def test_lanes_side_by_side(waveform: str, onset: float | None, recoupling: str, cycles: int) -> None:
+@pytest.mark.parametrize(
+    "measured",
+    [{}, {"yield_acceleration": 0.3}, {"yield_acceleration": 2.0}, {"decay_rate": 1.0}],
+    ids=["estimated", "low", "high", "slow"],
+)
+@pytest.mark.parametrize("waveform", ["sine", "cosine", "triangle", "square"])
+def test_lanes_side_by_side(waveform: str, measured: dict[str, float], recoupling: str, cycles: int) -> None:
     """Cells of all kinds in one tile, those that lanes leave among them."""
     axes: dict[str, Any] = {
         "theta": [0.0, 3.0, 12.0, 25.0],
@@ -223,7 +227,7 @@ def test_lanes_side_by_side(waveform: str, onset: float | None, recoupling: str,
         "cycles": cycles,
         "waveform": waveform,
     }
-    given = axes if onset is None else axes | {"yield_acceleration": onset}
+    given = axes | measured
     lanes = slipsweep.sweep(**choices(**given))
     assert set(np.unique(lanes.sliding_mode)) >= {1, 2}
     assert_alike(lanes, walked(**given), cycles)

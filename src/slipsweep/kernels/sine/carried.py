@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import scalar, summed
-from slipsweep.jit.elementary import angle_minus_sine, rising_phase, versine
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -54,7 +53,7 @@ from slipsweep.kernels.sine.pulse import (
     lane_rise,
 )
 from slipsweep.kernels.sine.roots import HELD_STOP, held_motion, lane_response_and_slope, settle
-from slipsweep.kernels.sine.shapes import SINE
+from slipsweep.kernels.sine.shapes import fallen, phase_of, steepness
 from slipsweep.model import equations as eq
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
@@ -62,7 +61,7 @@ _MOST_PULSES = 64
 
 
 @scalar
-def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
+def lane_carried(shape: int, count: int, options: Options, lanes: np.ndarray) -> None:
     """All cycles of `count` lanes that stick at Üg = Üy when at rest, but come to the second pulse in motion.
 
     Then they hold E(Üy) ≥ Üg from Üy on and slide through, and each pulse is entered with V greater by
@@ -75,18 +74,18 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
         lanes[START + j], lanes[CONVERGED + j] = lanes[BEGAN + j], 1.0
     # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
-    lane_rise(FOLLOWS_EQ4, SINE, options.g, lanes)
+    lane_rise(FOLLOWS_EQ4, shape, options.g, lanes)
     for j in range(STRIP):
         amplitude, held, began, carried = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j], lanes[CARRIED + j]
-        slowest = rising_phase(min(held, lanes[X + j]), amplitude)
-        lanes[SLOWEST + j] = carried + held_motion(SINE, amplitude, held, began, slowest)[0]
+        slowest = phase_of(shape, min(held, lanes[X + j]), amplitude)
+        lanes[SLOWEST + j] = carried + held_motion(shape, amplitude, held, began, slowest)[0]
         # held until past its slowest, or else Eq. 4 itself slows it
         through = (held >= amplitude) | (lanes[X + j] >= held)
         lanes[THROUGH + j] = lanes[CONVERGED + j] if through else 0.0
         lanes[W + j] += -carried * began
         lanes[V + j] += carried
         lanes[AT_PEAK + j], lanes[TO_PEAK + j] = lanes[V + j], lanes[W + j]
-    lane_fall(SINE, options.wants_peak, lanes)
+    lane_fall(shape, options.wants_peak, lanes)
     for j in range(STRIP):
         # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
         carried, slowest = lanes[CARRIED + j], lanes[SLOWEST + j]
@@ -101,16 +100,16 @@ def lane_carried(count: int, options: Options, lanes: np.ndarray) -> None:
         lanes[V + j] = carried + (most * gain if most > 0.0 else 0.0)
         lanes[PSI + j] = lanes[BEGAN + j]
         lanes[X + j] = 0.0 if stops else 1.0
-    settle(HELD_STOP, SINE, PSI, X, 1.0, options.g, lanes)
-    lane_repeated(later, lanes)
+    settle(HELD_STOP, shape, PSI, X, 1.0, options.g, lanes)
+    lane_repeated(shape, later, lanes)
     if later <= _MOST_PULSES:
         for j in range(count):
             if lanes[CONVERGED + j] < 0.0:
-                follow_pulses(options, lanes, j)
+                follow_pulses(shape, options, lanes, j)
 
 
 @scalar
-def lane_repeated(later: float, lanes: np.ndarray) -> None:
+def lane_repeated(shape: int, later: float, lanes: np.ndarray) -> None:
     """W and the largest V of `later` more cycles: whole periods, and what remains.  CONVERGED is −1 without a period.
 
     docs/numerics.md#pulses-entered-in-motion
@@ -123,7 +122,7 @@ def lane_repeated(later: float, lanes: np.ndarray) -> None:
             lanes[GAIN + j],
             lanes[MOST + j],
         )
-        held_on = held_motion(SINE, lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
+        held_on = held_motion(shape, lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
         again = lanes[V + j] * (psi - began) + held_on if psi > began else 0.0
         stops = psi > began
         braked = eq.attenuated_displacement(left, lanes[HELD + j], pause_of(began))
@@ -146,35 +145,35 @@ def lane_repeated(later: float, lanes: np.ndarray) -> None:
 
 
 @scalar
-def _lost_and_rate(where: tuple[float, float, float, float], psi: float) -> tuple[float, float]:
+def _lost_and_rate(where: tuple[int, float, float, float, float], psi: float) -> tuple[float, float]:
     """−V at ψ of a hold that was entered with `velocity` at `start`, and its rate."""
-    amplitude, held, velocity, start = where
-    left = velocity + held_motion(SINE, amplitude, held, start, psi)[0]
-    return -left, held - amplitude * (1.0 - versine(psi))
+    shape, amplitude, held, velocity, start = where
+    left = velocity + held_motion(shape, amplitude, held, start, psi)[0]
+    return -left, held - amplitude * (1.0 - fallen(shape, psi))
 
 
 _stop_root = root_of(_lost_and_rate)
 
 
 @scalar
-def held_stop(lanes: np.ndarray, j: int, velocity: float) -> float:
+def held_stop(shape: int, lanes: np.ndarray, j: int, velocity: float) -> float:
     """ψ at which the hold from Üy on, entered with `velocity`, stops before its slowest; NaN if not found."""
     amplitude, held, began = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j]
-    slowest = rising_phase(min(held, amplitude), amplitude)
-    return _stop_root((amplitude, held, velocity, began), began, slowest, began, began)
+    slowest = phase_of(shape, min(held, amplitude), amplitude)
+    return _stop_root((shape, amplitude, held, velocity, began), began, slowest, began, began)
 
 
 @summed
-def followed_to_peak(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float]:
+def followed_to_peak(shape: int, lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float]:
     """V and W gained from rest at ψ = `start` to the peak by Eq. 4."""
     rate, moment = 0.0, 0.0
     for node in range(LANE_NODES.size):
         left = 1.0 - LANE_NODES[node]
-        x = lanes[AMPLITUDE + j] * (1.0 - versine(start * left))
+        x = lanes[AMPLITUDE + j] * (1.0 - fallen(shape, start * left))
         weighted = LANE_WEIGHTS[node] * lane_loss(lanes, j, x, g)
         rate += weighted
         moment += left * weighted
-    plane, plane_moment = held_motion(SINE, lanes[AMPLITUDE + j], 0.0, start, 0.0)
+    plane, plane_moment = held_motion(shape, lanes[AMPLITUDE + j], 0.0, start, 0.0)
     return -start * rate - lane_slant(lanes, j, plane), start * start * moment - lane_slant(lanes, j, plane_moment)
 
 
@@ -189,36 +188,36 @@ _switch_root = root_of(_lane_response_above)
 
 
 @scalar
-def restart(lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float, float]:
+def restart(shape: int, lanes: np.ndarray, j: int, start: float, g: float) -> tuple[float, float, float]:
     """b at the peak, and V and W gained there, of a lane that starts to slide at ψ = `start`, beyond t1; or NaN."""
     amplitude = lanes[AMPLITUDE + j]
-    x_start = amplitude * (1.0 - versine(start))
+    x_start = amplitude * (1.0 - fallen(shape, start))
     eq4, slope = lane_response_and_slope(lanes, j, x_start, g)
     level = max(lanes[YIELD + j], eq4)
     at_peak, slope_at_peak = lane_response_and_slope(lanes, j, amplitude, g)
     if at_peak <= level:
-        return level, *held_motion(SINE, amplitude, level, start, 0.0)
+        return level, *held_motion(shape, amplitude, level, start, 0.0)
     psi = start
     if slope <= 0.0 or eq4 < level:  # as in `lane_switch`
         x = amplitude - (at_peak - level) / slope_at_peak
         x = _switch_root((lanes, j, level, g), x_start, amplitude, x, amplitude)
         if math.isnan(x):
             return math.nan, math.nan, math.nan
-        psi = max(rising_phase(x, amplitude), start)
-    held_on = held_motion(SINE, amplitude, level, start, psi)
-    followed = followed_to_peak(lanes, j, psi, g)
+        psi = max(phase_of(shape, x, amplitude), start)
+    held_on = held_motion(shape, amplitude, level, start, psi)
+    followed = followed_to_peak(shape, lanes, j, psi, g)
     return at_peak, held_on[0] + followed[0], held_on[1] - held_on[0] * psi + followed[1]
 
 
 @scalar
-def fall_stop(amplitude: float, held: float, at_peak: float, highest: float, top: float) -> float:
+def fall_stop(shape: int, amplitude: float, held: float, at_peak: float, highest: float, top: float) -> float:
     """ψ after the peak at which V = `at_peak` there, largest at ψ = `top`, is used up by the hold; NaN if not found."""
-    beyond = top + math.sqrt(2.0 * highest / (amplitude * (top - angle_minus_sine(top))))
-    return _stop_root((amplitude, held, at_peak, 0.0), top, min(beyond, HALF_PI), min(beyond, HALF_PI), 0.0)
+    beyond = top + math.sqrt(2.0 * highest / (amplitude * steepness(shape, top)))
+    return _stop_root((shape, amplitude, held, at_peak, 0.0), top, min(beyond, HALF_PI), min(beyond, HALF_PI), 0.0)
 
 
 @scalar
-def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
+def follow_pulses(shape: int, options: Options, lanes: np.ndarray, j: int) -> None:
     """All cycles of a lane of `lane_carried` that stops between t1 and Üg = b, so that no pulse is like another.
 
     It restarts at once; the other pulses are those that `lane_carried` knows.
@@ -234,19 +233,19 @@ def follow_pulses(options: Options, lanes: np.ndarray, j: int) -> None:
         else:
             stop = began
             if velocity > 0.0:
-                stop = held_stop(lanes, j, velocity)
-                moved += velocity * (stop - began) + held_motion(SINE, amplitude, lanes[LEVEL + j], began, stop)[1]
+                stop = held_stop(shape, lanes, j, velocity)
+                moved += velocity * (stop - began) + held_motion(shape, amplitude, lanes[LEVEL + j], began, stop)[1]
             if stop <= lanes[ONSET + j]:
                 moved += lanes[MOVED + j] if later > 0 else lanes[LAST + j]
                 velocity = carried
                 continue
-            held, at_peak, gained = restart(lanes, j, stop, options.g)
+            held, at_peak, gained = restart(shape, lanes, j, stop, options.g)
             moved += gained
-        top = -rising_phase(held, amplitude)
-        peak = at_peak + held_motion(SINE, amplitude, held, 0.0, top)[0]
-        left = at_peak + held_motion(SINE, amplitude, held, 0.0, HALF_PI)[0]
-        end = HALF_PI if left > 0.0 else fall_stop(amplitude, held, at_peak, peak, top)
-        moved += at_peak * end + held_motion(SINE, amplitude, held, 0.0, end)[1]
+        top = -phase_of(shape, held, amplitude)
+        peak = at_peak + held_motion(shape, amplitude, held, 0.0, top)[0]
+        left = at_peak + held_motion(shape, amplitude, held, 0.0, HALF_PI)[0]
+        end = HALF_PI if left > 0.0 else fall_stop(shape, amplitude, held, at_peak, peak, top)
+        moved += at_peak * end + held_motion(shape, amplitude, held, 0.0, end)[1]
         left, pause = max(left, 0.0), pause_of(began) if later > 0 else math.inf
         velocity = eq.attenuated_velocity(left, held, pause)
         moved += eq.attenuated_displacement(left, held, pause)

@@ -33,6 +33,7 @@ from slipsweep.kernels.sine.lanes import (
     LANES_SIZE,
     OTHER,
     PEAK,
+    RESTS,
     SLIDES_ON,
     STICKS,
     YIELD_GOVERNS,
@@ -122,7 +123,7 @@ def store_lane(
 
 
 @scalar
-def carry(count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+def carry(shape: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
     """Bring those of `count` lanes that stick at Üg = Üy and do not recouple to the front, and go on with them."""
     lanes, where = room.lanes, room.where
     used = 0
@@ -134,20 +135,20 @@ def carry(count: int, options: Options, room: Room, motion: np.ndarray, codes: n
             used += 1
     fill_up(used, LANES_SIZE // TILE, lanes)
     for first in range(0, used, STRIP):
-        lane_carried(min(used - first, STRIP), options, lanes[first:])
+        lane_carried(shape, min(used - first, STRIP), options, lanes[first:])
     for lane in range(used):
         store_lane(lanes, lane, STICKS, options, room.blocks, motion[0], motion[1], codes[1], where[lane])
 
 
 @scalar
-def leave(count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+def leave(shape: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
     """Leave lanes in motion to go from event to event."""
 
 
 def lanes_of(
     shape: int,
     solve_strip: Callable[[int, Options, np.ndarray], None],
-    carry: Callable[[int, Options, Room, np.ndarray, np.ndarray], None],
+    carry: Callable[[int, int, Options, Room, np.ndarray, np.ndarray], None],
 ) -> Solver:
     """The jitted solver of a tile's cells in lanes under a shape of wave.
 
@@ -181,7 +182,7 @@ def lanes_of(
                         where[lane + j] = first + j
                 lane += last - first
         if kind == STICKS:
-            carry(used, options, room, motion, codes)
+            carry(shape, used, options, room, motion, codes)
 
     @scalar
     def solve_cells(
@@ -197,7 +198,7 @@ def lanes_of(
             sort_strip(shape, cells[first:], options, blocks[first:])
         for j in range(count):
             codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])
-            motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK else math.nan
+            motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK or blocks[KIND + j] == RESTS else math.nan
         number = runs_of(blocks, count, room.runs)
         for kind in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
             solve_kind(kind, number, options, room, motion, codes)
@@ -211,7 +212,7 @@ def lanes_of(
 
 
 _solve_cells = lanes_of(SINE, strip_of(SINE), carry)
-_solve_under_triangle = lanes_of(TRIANGLE, strip_of(TRIANGLE), leave)
+_solve_under_triangle = lanes_of(TRIANGLE, strip_of(TRIANGLE), carry)
 _solve_under_square = lanes_of(SQUARE, strip_of(SQUARE), leave)
 
 

@@ -41,6 +41,8 @@ from slipsweep.kernels.sine.lanes import (
     CONVERGED,
     GAIN,
     HALF_PI,
+    LANE_NODES,
+    LANE_WEIGHTS,
     MOMENT,
     MOVED,
     PEAK,
@@ -57,9 +59,8 @@ from slipsweep.kernels.sine.shapes import phase_of, quarter_integrals, risen, ri
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import NODES, WEIGHTS, Wave
 
-#: On the first 0.6 radians of the cycle 8 nodes are wrong by 4e-14 of that part at most; on the whole quarter by 1e-13,
-#: where friction falls by no more than e.
-SHORT_SINE, SHORT_E_FOLDINGS = math.sin(0.6), 1.0
+#: On the first 0.6 radians of the cycle 8 nodes are wrong by 4e-14 of that part at most.
+SHORT_SINE = math.sin(0.6)
 
 #: Rows of lanes that pulses have for something else: what V misses before Üg = Üy, and what it gains from
 #: Üg = 0 up to where its rate changes sign on the rise of the positive half cycle.
@@ -225,12 +226,11 @@ def lane_turns(shape: int, g: float, lanes: np.ndarray) -> None:
         settle(TURN, shape, X, PSI, side, g, lanes)
         for j in range(STRIP):
             amplitude = lanes[AMPLITUDE + j]
-            short = (lanes[X + j] <= SHORT_SINE * amplitude) | (lanes[DECAY + j] * amplitude <= SHORT_E_FOLDINGS)
-            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j]) if short else 0.0
+            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
             lanes[PSI + j] = HALF_PI + phase_of(shape, lanes[X + j], amplitude)
             lanes[RATE + j] = 0.0
-        for node in range(SHORT_NODES.size):
-            at, weight = SHORT_NODES[node], SHORT_WEIGHTS[node]
+        for node in range(LANE_NODES.size):
+            at, weight = LANE_NODES[node], LANE_WEIGHTS[node]
             for j in range(STRIP):
                 phi = lanes[PSI + j] * at
                 x = lanes[AMPLITUDE + j] * risen(shape, phi)

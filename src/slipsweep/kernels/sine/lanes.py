@@ -8,10 +8,10 @@ from slipsweep.kernels.block import LANE_ROWS, TILE
 
 HALF_PI = 0.5 * math.pi
 
-#: Kinds of motion: none, stuck or without a value; held at the yield value to the peak;
-#: held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any other,
-#: event by event.
-STAYS, YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON, OTHER = range(6)
+#: Kinds of motion: none, stuck or without a value; none, as Eq. 4 does not fall below Üg up to the peak; held at the
+#: yield value to the peak; held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any
+#: other, event by event.
+STAYS, RESTS, YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON, OTHER = range(7)
 
 #: Rows of the lanes beside the block's.
 X, LEVEL, START, V, W, HELD, RATE, MOMENT, PSI, LEFT, PEAK, CONVERGED, CODE = range(

@@ -36,7 +36,7 @@ from slipsweep.kernels.sine.lanes import (
     X,
 )
 from slipsweep.kernels.sine.roots import FALL_STOP, SWITCH, TURN, held_motion, lane_response_and_slope, settle
-from slipsweep.kernels.sine.shapes import fallen, phase_of, steepness
+from slipsweep.kernels.sine.shapes import SQUARE, fallen, phase_of, steepness
 
 
 @scalar
@@ -63,7 +63,8 @@ def lane_switch(shape: int, g: float, lanes: np.ndarray) -> None:
         follows = eq4 > level
         lanes[HELD + j] = eq4 if follows else level
         lanes[X + j] = amplitude - (eq4 - level) / slope if follows else amplitude
-        lanes[PSI + j] = 0.0 if follows else 1.0
+        # the square jumps past it
+        lanes[PSI + j] = 0.0 if follows & (shape != SQUARE) else 1.0
     settle(SWITCH, shape, X, PSI, 1.0, g, lanes)
     for j in range(STRIP):
         lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])

@@ -25,10 +25,20 @@ from slipsweep.kernels.block import (
     cell_of,
     decay_rate_of,
     interface_of,
+    lane_rate_and_slope,
     lane_response,
 )
 from slipsweep.kernels.sine.continuous import SHORT_SINE
-from slipsweep.kernels.sine.lanes import FOLLOWS_EQ4, LANE_E_FOLDINGS, OTHER, SLIDES_ON, STAYS, STICKS, YIELD_GOVERNS
+from slipsweep.kernels.sine.lanes import (
+    FOLLOWS_EQ4,
+    LANE_E_FOLDINGS,
+    OTHER,
+    RESTS,
+    SLIDES_ON,
+    STAYS,
+    STICKS,
+    YIELD_GOVERNS,
+)
 from slipsweep.kernels.sine.shapes import SQUARE, phase_of
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
@@ -68,6 +78,17 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
     return kind if mode > STUCK else STAYS
 
 
+@in_lanes
+def rests(blocks: np.ndarray, j: int, g: float) -> bool:
+    """Whether Eq. 4 keeps a block with the plane: D, concave from Üy on, stays below its tangent at the peak, and that
+    below 0.
+    """
+    tan_theta, start, peak = blocks[TAN_THETA + j], blocks[YIELD + j], blocks[AMPLITUDE + j]
+    rate, slope = lane_rate_and_slope(blocks, j, peak, g)
+    convex = blocks[DECAY + j] * (g + start * tan_theta) >= 2.0 * tan_theta
+    return (blocks[MODE + j] == STICK_SLIP) & convex & (rate - min(slope, 0.0) * (peak - start) <= 0.0)
+
+
 @scalar
 def sort_strip(shape: int, cells: np.ndarray, options: Options, blocks: np.ndarray) -> None:
     """Blocks of a strip of a tile in lanes, with their codes and the kind of each.
@@ -99,8 +120,13 @@ def sort_strip(shape: int, cells: np.ndarray, options: Options, blocks: np.ndarr
             at_start = -math.inf if shape == SQUARE else lane_response(blocks, j, blocks[YIELD + j], g)
             blocks[_AT_START + j] = at_start
             blocks[_AT_END + j] = lane_response(blocks, j, blocks[AMPLITUDE + j], g)
+    lagging = 0
     for j in range(STRIP):
         blocks[KIND + j] = kind_of(blocks, j, options)
+        lagging += 1 if (blocks[MODE + j] == STICK_SLIP) & (blocks[_AT_END + j] >= blocks[AMPLITUDE + j]) else 0
+    if lagging > 0 and options.rise != NEWMARK:
+        for j in range(STRIP):
+            blocks[KIND + j] = RESTS if rests(blocks, j, g) else blocks[KIND + j]
 
 
 @scalar
