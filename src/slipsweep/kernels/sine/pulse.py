@@ -11,6 +11,8 @@ from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
+    DECAY,
+    TAN_THETA,
     YIELD,
     lane_loss,
     lane_slant,
@@ -38,6 +40,9 @@ from slipsweep.kernels.sine.lanes import (
 from slipsweep.kernels.sine.roots import FALL_STOP, SWITCH, TURN, held_motion, lane_response_and_slope, settle
 from slipsweep.kernels.sine.shapes import SQUARE, fallen, phase_of, steepness
 
+#: No λ or tan θ is divided by that is smaller.
+_LEAST = 1e-150
+
 
 @scalar
 def lane_onset(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
@@ -48,6 +53,10 @@ def lane_onset(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
     if kind != STICKS:
         return
     for j in range(STRIP):
+        # from where D ceases to be convex: beyond the root before it, and before the root beyond it
+        decay, tan_theta = max(lanes[DECAY + j], _LEAST), max(lanes[TAN_THETA + j], _LEAST)
+        bend = (2.0 * tan_theta / decay - g) / tan_theta
+        lanes[LEVEL + j] = min(max(bend, lanes[YIELD + j]), lanes[AMPLITUDE + j])
         lanes[CONVERGED + j] = 0.0
     settle(TURN, shape, LEVEL, CONVERGED, 1.0, g, lanes)
     for j in range(STRIP):

@@ -27,7 +27,7 @@ from slipsweep.kernels.sine.shapes import fallen, fallen_integrals, half_wave
 
 #: Relative size of a lane's last step.  A lane that has taken it stays where it is, whatever its neighbours do.
 _LANE_TOLERANCE = 1e-7
-_MOST_LANE_STEPS = 16
+_MOST_LANE_STEPS = 32
 
 #: The roots: D = 0, E = b, the stop after the peak, that of a pulse entered in motion, and that after Üg = 0.
 TURN, SWITCH, FALL_STOP, HELD_STOP, RECOUPLING = range(5)

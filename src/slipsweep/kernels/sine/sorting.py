@@ -56,19 +56,22 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
     decay = blocks[DECAY + j]
     start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
     gentle = decay * end <= LANE_E_FOLDINGS
+    sticks = at_start >= start
     # as D > 0 at the peak, it stays positive once it is: either E is convex from where sliding may begin, hence D
-    # concave; or dD/dx ≥ 0 at Üg = 0, so that D rises first and turns once at most, and dE/dx > 0, by a bound with
-    # the largest friction and normal acceleration
+    # concave; or D, convex first, is negative at Üy or rises there, and dE/dx > 0, both by bounds with the largest
+    # friction
     tan_theta, mu_s = blocks[TAN_THETA + j], blocks[MU_S + j]
     most = mu_s + blocks[DELTA_MU + j]
     least = start if mode == STICK_SLIP else 0.0
-    convex = decay * (options.g + least * tan_theta) >= 2.0 * tan_theta
-    rises = most * (decay * (options.g + end * tan_theta) - tan_theta) < eq.limit_denominator(mu_s, tan_theta)
-    lags = most * (tan_theta - decay * options.g) <= tan_theta * (mu_s - tan_theta)
+    bends = decay * (options.g + least * tan_theta)
+    convex = bends >= 2.0 * tan_theta
+    steepest = min(decay * (options.g + end * tan_theta) - tan_theta, tan_theta)
+    rises = (mu_s if sticks else most) * steepest < eq.limit_denominator(mu_s, tan_theta)
+    lags = sticks | (most * (tan_theta - bends) <= tan_theta * (mu_s - tan_theta))
     smooth = (options.rise == MONOTONE) & (at_end < end) & (convex | (rises & lags))
-    sticks_or_follows = STICKS if at_start >= start else FOLLOWS_EQ4
+    sticks_or_follows = STICKS if sticks else FOLLOWS_EQ4
     kind = sticks_or_follows if gentle else OTHER
-    kind = YIELD_GOVERNS if (at_start < start) & (at_end <= start) else kind
+    kind = YIELD_GOVERNS if (not sticks) & (at_end <= start) else kind
     kind = kind if smooth else OTHER
     kind = YIELD_GOVERNS if options.rise == NEWMARK else kind
     kind = kind if mode == STICK_SLIP else OTHER
@@ -79,14 +82,16 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
 
 
 @in_lanes
-def rests(blocks: np.ndarray, j: int, g: float) -> bool:
-    """Whether Eq. 4 keeps a block with the plane: D, concave from Üy on, stays below its tangent at the peak, and that
-    below 0.
+def rests(shape: int, blocks: np.ndarray, j: int, g: float) -> bool:
+    """Whether Eq. 4 keeps a block with the plane up to the peak: D is nowhere above 0 from Üy on.
+
+    D is convex, then concave: nowhere larger than at Üy or than its tangent at the peak.
     """
-    tan_theta, start, peak = blocks[TAN_THETA + j], blocks[YIELD + j], blocks[AMPLITUDE + j]
+    start, peak = blocks[YIELD + j], blocks[AMPLITUDE + j]
     rate, slope = lane_rate_and_slope(blocks, j, peak, g)
-    convex = blocks[DECAY + j] * (g + start * tan_theta) >= 2.0 * tan_theta
-    return (blocks[MODE + j] == STICK_SLIP) & convex & (rate - min(slope, 0.0) * (peak - start) <= 0.0)
+    highest = rate if shape == SQUARE else rate - min(slope, 0.0) * (peak - start)
+    stays = (shape == SQUARE) | (blocks[_AT_START + j] >= start)
+    return (blocks[MODE + j] == STICK_SLIP) & stays & (highest <= 0.0)
 
 
 @scalar
@@ -126,7 +131,7 @@ def sort_strip(shape: int, cells: np.ndarray, options: Options, blocks: np.ndarr
         lagging += 1 if (blocks[MODE + j] == STICK_SLIP) & (blocks[_AT_END + j] >= blocks[AMPLITUDE + j]) else 0
     if lagging > 0 and options.rise != NEWMARK:
         for j in range(STRIP):
-            blocks[KIND + j] = RESTS if rests(blocks, j, g) else blocks[KIND + j]
+            blocks[KIND + j] = RESTS if rests(shape, blocks, j, g) else blocks[KIND + j]
 
 
 @scalar
