@@ -375,3 +375,26 @@ def test_a_grid_is_its_cells() -> None:
     terms = {"amplitudes": (1.0, 0.6, 0.35), "multiples": (1, 2, 5), "phases": (0.0, 40.0, 100.0)}
     assert {name: grid.attrs[name] for name in terms} == terms
     assert grid.attrs["ramp_in"] == 2
+
+
+def test_a_block_outlasts_a_stretch_that_begins_no_pulse() -> None:
+    """It comes to rest behind one below Üy, where in a later cycle a ramp has begun: that pulse is another."""
+    wave = slipsweep.Harmonics(
+        [0.4483889281248371, 0.3964501428370584],
+        [1, 4],
+        [11.025413290195758, 270.0],
+        cycles=6,
+        ramp_in=1,
+        ramp_out=3.31,
+    )
+    cell: dict[str, Any] = {
+        "theta": 3.4,
+        "mu_s": 0.62,
+        "amplitude": 14.26,
+        "yield_acceleration": 1.92,
+        "frequency": 1.8,
+    }
+    options: dict[str, Any] = {"model": slipsweep.Newmark(), "excitation": wave}
+    history = slipsweep.simulate(**cell, **options, times=[0.0, 100.0])
+    found = slipsweep.sweep(**cell, **options).permanent_displacement
+    assert found.item() == pytest.approx(history.relative_displacement.values[-1], rel=1e-12)

@@ -27,10 +27,9 @@ from slipsweep.kernels.block import (
 from slipsweep.kernels.pulse import Pulse, first_pulse
 from slipsweep.motion.pieces import END, START, Wave
 
-#: What is kept of a pulse from rest to rest: W, the largest V, and the phase at which it stops, from the beginning of
-#: its stretch.
-_MOVED, _HIGHEST, _STOPS = range(3)
-REST_COLUMNS = 3
+#: What is kept of a pulse from rest to rest: W, and the largest V.
+_MOVED, _HIGHEST = range(2)
+REST_COLUMNS = 2
 
 
 @scalar
@@ -57,20 +56,22 @@ def forget(rests: np.ndarray) -> None:
 
 @scalar
 def remember(wave: Wave, k: int, now: Pulse, rests: np.ndarray) -> None:
-    """Keep a pulse that began from rest in stretch k, if it has come to rest before the next."""
-    if now.velocity == 0.0 and now.validity == 0 and now.stopped_at < math.inf:
-        same = wave.same[k]
-        rests[same, _MOVED], rests[same, _HIGHEST] = now.displacement, now.peak
-        rests[same, _STOPS] = now.stopped_at - wave.pieces[wave.stretch[k, 0], START]
+    """Keep a pulse that began from rest in stretch k, if it came to rest before the next stretch.
+
+    Up to there all stretches that are the `same` have the same pieces; its next pulse may come later, and did not
+    matter.
+    """
+    last = wave.pieces.shape[0] - 1
+    until = wave.pieces[wave.stretch[k + 1, 0], START] if k + 1 < wave.height.size else wave.pieces[last, END]
+    if now.velocity == 0.0 and now.validity == 0 and now.stopped_at <= until:
+        rests[wave.same[k], _MOVED], rests[wave.same[k], _HIGHEST] = now.displacement, now.peak
 
 
 @scalar
 def remembered(wave: Wave, k: int, rests: np.ndarray) -> Pulse:
-    """The pulse from rest in stretch k; its W is NaN where none is kept, or the shaking ends before the stop."""
-    same, last = wave.same[k], wave.pieces.shape[0] - 1
-    stops = wave.pieces[wave.stretch[k, 0], START] + rests[same, _STOPS]
-    moved = rests[same, _MOVED] if stops <= wave.pieces[last, END] else math.nan
-    return Pulse(0.0, moved, rests[same, _HIGHEST], 0.0, stops, 0)
+    """The pulse from rest to rest in stretch k; its W is NaN where none is kept."""
+    same = wave.same[k]
+    return Pulse(0.0, rests[same, _MOVED], rests[same, _HIGHEST], 0.0, 0.0, 0)
 
 
 def train_of(
@@ -88,7 +89,7 @@ def train_of(
         block: Block, options: Options, wave: Wave, table: Any, k: int, until: int, velocity: float
     ) -> tuple[Pulse, int]:
         """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
-        displacement, peak, least, stopped_at, validity = 0.0, velocity, velocity, 0.0, 0
+        displacement, peak, least, validity = 0.0, velocity, velocity, 0
         while k < wave.height.size and wave.stretch[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
             now = remembered(wave, k, table.rests)
@@ -96,7 +97,7 @@ def train_of(
                 now = pulse(block, options, wave, table, k, following, velocity)
                 if velocity == 0.0:
                     remember(wave, k, now, table.rests)
-            k, velocity, stopped_at = following, now.velocity, now.stopped_at
+            k, velocity = following, now.velocity
             displacement += now.displacement
             peak, least = max(peak, now.peak), min(least, now.least)
             validity |= now.validity
@@ -106,7 +107,7 @@ def train_of(
                 validity |= UNSOLVED
             if validity & NO_VALUE:
                 break
-        return Pulse(velocity, displacement, peak, least, stopped_at, validity), k
+        return Pulse(velocity, displacement, peak, least, 0.0, validity), k
 
     @scalar
     def train(block: Block, options: Options, wave: Wave, table: Any) -> Motion:

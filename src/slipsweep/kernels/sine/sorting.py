@@ -50,12 +50,13 @@ BLOCKS_SIZE = (LANE_ROWS + 6) * TILE
 
 
 @in_lanes
-def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
+def kind_of(shape: int, blocks: np.ndarray, j: int, options: Options) -> int:
     """The kind of a cell's motion (docs/numerics.md#lanes-of-the-sine)."""
     at_start, at_end, mode = blocks[_AT_START + j], blocks[_AT_END + j], blocks[MODE + j]
     decay = blocks[DECAY + j]
     start, end = blocks[YIELD + j], blocks[AMPLITUDE + j]
-    gentle = decay * end <= LANE_E_FOLDINGS
+    jumps = shape == SQUARE  # to the peak, and friction is of one value
+    gentle = jumps | (decay * end <= LANE_E_FOLDINGS)
     sticks = at_start >= start
     # as D > 0 at the peak, it stays positive once it is: either E is convex from where sliding may begin, hence D
     # concave; or D, convex first, is negative at Üy or rises there, and dE/dx > 0, both by bounds with the largest
@@ -68,7 +69,7 @@ def kind_of(blocks: np.ndarray, j: int, options: Options) -> int:
     steepest = min(decay * (options.g + end * tan_theta) - tan_theta, tan_theta)
     rises = (mu_s if sticks else most) * steepest < eq.limit_denominator(mu_s, tan_theta)
     lags = sticks | (most * (tan_theta - bends) <= tan_theta * (mu_s - tan_theta))
-    smooth = (options.rise == MONOTONE) & (at_end < end) & (convex | (rises & lags))
+    smooth = (options.rise == MONOTONE) & (at_end < end) & (jumps | convex | (rises & lags))
     sticks_or_follows = STICKS if sticks else FOLLOWS_EQ4
     kind = sticks_or_follows if gentle else OTHER
     kind = YIELD_GOVERNS if (not sticks) & (at_end <= start) else kind
@@ -127,7 +128,7 @@ def sort_strip(shape: int, cells: np.ndarray, options: Options, blocks: np.ndarr
             blocks[_AT_END + j] = lane_response(blocks, j, blocks[AMPLITUDE + j], g)
     lagging = 0
     for j in range(STRIP):
-        blocks[KIND + j] = kind_of(blocks, j, options)
+        blocks[KIND + j] = kind_of(shape, blocks, j, options)
         lagging += 1 if (blocks[MODE + j] == STICK_SLIP) & (blocks[_AT_END + j] >= blocks[AMPLITUDE + j]) else 0
     if lagging > 0 and options.rise != NEWMARK:
         for j in range(STRIP):
