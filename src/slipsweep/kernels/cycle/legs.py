@@ -51,8 +51,9 @@ PULSE_ROWS = 13
 
 
 class Room(NamedTuple):
-    """Where a block is followed: its state, a log of its legs, room for continuous sliding (`continuous`), lanes, and
-    what `train` keeps of pulses.
+    """Where a block is followed: its state, a log of its legs, room for continuous sliding (`continuous`), and lanes.
+
+    `rests` is what `train` keeps of pulses.
 
     No field is called `zeros` or `empty`: a function with such a name in it would count references (`jit.inner.parts`).
 

@@ -36,6 +36,7 @@ from slipsweep.kernels.sine.lanes import (
     RESTS,
     SLIDES_ON,
     STICKS,
+    TURNS_LATE,
     YIELD_GOVERNS,
     W,
 )
@@ -77,8 +78,8 @@ def strip_of(shape: int) -> Callable[[int, Options, np.ndarray], None]:
     @scalar
     def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
         """Lanes of one kind, from the onset to the end of all cycles."""
-        if kind == SLIDES_ON:
-            lane_continuous(shape, options, lanes)
+        if kind >= SLIDES_ON:  # or TURNS_LATE
+            lane_continuous(kind, shape, options, lanes)
             return
         lane_onset(kind, shape, options.g, lanes)
         lane_rise(kind, shape, options.g, lanes)
@@ -200,7 +201,7 @@ def lanes_of(
             codes[0, j], codes[1, j] = int(blocks[MODE + j]), int(blocks[VALIDITY + j])
             motion[0, j] = motion[1, j] = 0.0 if blocks[MODE + j] == STUCK or blocks[KIND + j] == RESTS else math.nan
         number = runs_of(blocks, count, room.runs)
-        for kind in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON):
+        for kind in (YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON, TURNS_LATE):
             solve_kind(kind, number, options, room, motion, codes)
         remaining = 0
         for j in range(count):

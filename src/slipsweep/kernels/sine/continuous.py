@@ -50,6 +50,7 @@ from slipsweep.kernels.sine.lanes import (
     RATE,
     SHORT_NODES,
     SHORT_WEIGHTS,
+    TURNS_LATE,
     V,
     W,
     X,
@@ -204,7 +205,7 @@ def lane_turn_start(lanes: np.ndarray, j: int) -> float:
 
 
 @scalar
-def lane_turns(shape: int, g: float, lanes: np.ndarray) -> None:
+def lane_turns(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
     """What the peak velocity needs of both half cycles: rows DIP and X.
 
     DIP is ∫ D dψ on the rise of the positive one, from Üg = 0 up to where D changes sign, 0 where it does not; X the
@@ -213,6 +214,7 @@ def lane_turns(shape: int, g: float, lanes: np.ndarray) -> None:
     Where μ = μs it is −tan² θ |Üg|: before the zero on the positive half, behind it on the negative one, from where
     Newton passes it once, and not again.
     """
+    late = kind == TURNS_LATE
     for side in (1.0, -1.0):
         for j in range(STRIP):
             lanes[DIP + j] = lanes[RATE + j]  # of the side before
@@ -226,11 +228,13 @@ def lane_turns(shape: int, g: float, lanes: np.ndarray) -> None:
         settle(TURN, shape, X, PSI, side, g, lanes)
         for j in range(STRIP):
             amplitude = lanes[AMPLITUDE + j]
-            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
+            short = late | (lanes[X + j] <= SHORT_SINE * amplitude)
+            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j]) if short else 0.0
             lanes[PSI + j] = HALF_PI + phase_of(shape, lanes[X + j], amplitude)
             lanes[RATE + j] = 0.0
-        for node in range(LANE_NODES.size):
-            at, weight = LANE_NODES[node], LANE_WEIGHTS[node]
+        for node in range(LANE_NODES.size if late else SHORT_NODES.size):
+            at = LANE_NODES[node] if late else SHORT_NODES[node]
+            weight = LANE_WEIGHTS[node] if late else SHORT_WEIGHTS[node]
             for j in range(STRIP):
                 phi = lanes[PSI + j] * at
                 x = lanes[AMPLITUDE + j] * risen(shape, phi)
@@ -257,7 +261,7 @@ def lane_quarters(shape: int, g: float, lanes: np.ndarray) -> None:
 
 
 @scalar
-def lane_continuous(shape: int, options: Options, lanes: np.ndarray) -> None:
+def lane_continuous(kind: int, shape: int, options: Options, lanes: np.ndarray) -> None:
     """Continuous sliding, all cycles: W in row W, the largest V in PEAK."""
     g = options.g
     lane_quarters(shape, g, lanes)
@@ -281,7 +285,7 @@ def lane_continuous(shape: int, options: Options, lanes: np.ndarray) -> None:
         lanes[W + j] = continuous_displacement(lanes[V + j], missed, missed_moment, drift, began, options.cycles)
         lanes[_MISSED + j] = missed
     if options.wants_peak:
-        lane_turns(shape, g, lanes)
+        lane_turns(kind, shape, g, lanes)
         for j in range(STRIP):
             half, dip = 2.0 * lanes[V + j], lanes[DIP + j]
             first = max(half, half - dip)

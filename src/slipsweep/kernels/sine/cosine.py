@@ -92,7 +92,7 @@ def lane_pulses(kind: int, options: Options, lanes: np.ndarray) -> None:
 
 
 @scalar
-def lane_continuous(options: Options, lanes: np.ndarray) -> None:
+def lane_continuous(kind: int, options: Options, lanes: np.ndarray) -> None:
     """Continuous sliding from the first peak on: W in W, the largest V in PEAK.
 
     docs/numerics.md#lanes-of-the-cosine
@@ -101,7 +101,7 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
     for j in range(STRIP):
         lanes[W + j] = math.pi * lanes[GAIN + j] * options.cycles * options.cycles
     if options.wants_peak:
-        lane_turns(SINE, options.g, lanes)
+        lane_turns(kind, SINE, options.g, lanes)
         for j in range(STRIP):
             up, dip, drift = lanes[V + j], lanes[DIP + j], lanes[GAIN + j]
             fall, rise = max(up, up - dip), max(max(0.0, dip), up)
@@ -112,8 +112,8 @@ def lane_continuous(options: Options, lanes: np.ndarray) -> None:
 @scalar
 def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
     """Lanes of one kind, from the first peak to the end of all cycles."""
-    if kind == SLIDES_ON:
-        lane_continuous(options, lanes)
+    if kind >= SLIDES_ON:  # or TURNS_LATE
+        lane_continuous(kind, options, lanes)
     else:
         lane_pulses(kind, options, lanes)
 

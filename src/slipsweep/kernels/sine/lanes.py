@@ -9,9 +9,9 @@ from slipsweep.kernels.block import LANE_ROWS, TILE
 HALF_PI = 0.5 * math.pi
 
 #: Kinds of motion: none, stuck or without a value; none, as Eq. 4 does not fall below Üg up to the peak; held at the
-#: yield value to the peak; held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; any
-#: other, event by event.
-STAYS, RESTS, YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON, OTHER = range(7)
+#: yield value to the peak; held, then by Eq. 4; stuck at Üg = Üy until Eq. 4 falls below Üg; sliding continuously; the
+#: same, where the largest V is wanted and D changes its sign late on the rise; any other, event by event.
+STAYS, RESTS, YIELD_GOVERNS, FOLLOWS_EQ4, STICKS, SLIDES_ON, TURNS_LATE, OTHER = range(8)
 
 #: Rows of the lanes beside the block's.
 X, LEVEL, START, V, W, HELD, RATE, MOMENT, PSI, LEFT, PEAK, CONVERGED, CODE = range(

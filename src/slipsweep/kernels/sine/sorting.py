@@ -28,7 +28,7 @@ from slipsweep.kernels.block import (
     lane_rate_and_slope,
     lane_response,
 )
-from slipsweep.kernels.sine.continuous import SHORT_SINE
+from slipsweep.kernels.sine.continuous import SHORT_SINE, lane_turn_start
 from slipsweep.kernels.sine.lanes import (
     FOLLOWS_EQ4,
     LANE_E_FOLDINGS,
@@ -37,6 +37,7 @@ from slipsweep.kernels.sine.lanes import (
     SLIDES_ON,
     STAYS,
     STICKS,
+    TURNS_LATE,
     YIELD_GOVERNS,
 )
 from slipsweep.kernels.sine.shapes import SQUARE, phase_of
@@ -78,7 +79,9 @@ def kind_of(shape: int, blocks: np.ndarray, j: int, options: Options) -> int:
     kind = kind if mode == STICK_SLIP else OTHER
     # where the peak velocity is wanted, D has to be concave (`lane_turns`)
     early = gentle & (start <= SHORT_SINE * end) & (convex | (not options.wants_peak))
-    kind = SLIDES_ON if (mode == CONTINUOUS) & early else kind
+    late = options.wants_peak & (lane_turn_start(blocks, j) > 0.7 * SHORT_SINE * end)
+    slides = TURNS_LATE if late else SLIDES_ON
+    kind = slides if (mode == CONTINUOUS) & early else kind
     return kind if mode > STUCK else STAYS
 
 
