@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 #: (0 on a plateau, 1 on a straight line), 1 where w jumps up at its beginning, and 1 where it is a quarter
 #: of a sine about its peak, whose closed forms are shorter than its series.
 START, END, BEGIN, FINISH, FIRST, LAST, TOP, DEGREE, JUMPS, ARC = range(10)
-#: Gauss-Legendre nodes on [0, 1], two SIMD registers.  The last columns of a table with curves are |w| at the nodes of
-#: whole pieces, from the end that is no anchor.
-NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
-
 #: ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over the whole piece.
 WHOLE, WHOLE_MOMENT = 10, 11
 #: c₁, and the first ones of the sum's first and second integral from the anchor, τ² and τ³; those of the
 #: next power follow `TERM` columns on, as many as the longest series in a table has terms.
 COEFFICIENTS, ONCE, TWICE = 12, 13, 14
 TERM = 3
+
+#: Gauss-Legendre nodes on [0, 1], two SIMD registers.  The last columns of a table with curves are |w| at the nodes of
+#: whole pieces, from the end that is no anchor.
+NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
 
 
 class Wave(NamedTuple):
