@@ -555,7 +555,9 @@ def test_peak_memory_is_that_of_the_result(call: str) -> None:
     assert float(done.stdout) < 1.2
 
 
-@pytest.mark.parametrize("waveform", [slipsweep.Sine(10), slipsweep.Triangle(10), slipsweep.Square(10)])
+@pytest.mark.parametrize(
+    "waveform", [slipsweep.Sine(10), slipsweep.Cosine(10), slipsweep.Triangle(10), slipsweep.Square(10)]
+)
 @pytest.mark.parametrize(
     ("chart", "given"),
     [

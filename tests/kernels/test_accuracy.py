@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import groupby
 from math import ceil, isnan, log, pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -299,17 +300,15 @@ def test_pulses_that_stop_anew() -> None:
         assert np.ptp(np.diff(grown)) > 0.1 * grown[0], f"cycles of {cell} are alike"
 
 
-def test_pulses_that_stop_anew_as_event_by_event() -> None:
+@pytest.mark.parametrize("excitation", [slipsweep.Sine(cycles=20), slipsweep.Cosine(cycles=20)])
+def test_pulses_that_stop_anew_as_event_by_event(excitation: Any) -> None:
     """A sweep follows them by what its lanes know of a pulse, a time history from event to event."""
-    theta, mu_s = 10.508, 0.2
+    block: dict[str, Any] = {"theta": 10.508, "mu_s": 0.2, "frequency": 1.0}
     amplitude = np.linspace(0.055, 0.12, 131) * strategies.G
-    swept = slipsweep.sweep(
-        theta=theta, mu_s=mu_s, amplitude=amplitude, frequency=1.0, excitation=slipsweep.Sine(cycles=20)
-    )
+    swept = slipsweep.sweep(**block, amplitude=amplitude, excitation=excitation)
+    assert (swept.validity.values & Validity.NOT_RECOUPLED).any()
     for value, u in zip(amplitude, swept.permanent_displacement.values.ravel(), strict=True):
-        history = slipsweep.simulate(
-            theta=theta, mu_s=mu_s, amplitude=value, frequency=1.0, excitation=slipsweep.Sine(cycles=20)
-        )
+        history = slipsweep.simulate(**block, amplitude=value, excitation=excitation)
         assert abs(u / float(history.relative_displacement[-1]) - 1) <= 1e-11
 
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.decorators import in_lanes, scalar, summed
 from slipsweep.kernels.block import (
     AMPLITUDE,
     BEGAN,
@@ -21,7 +21,6 @@ from slipsweep.kernels.block import (
 from slipsweep.kernels.events import STRIP, root_of
 from slipsweep.kernels.sine.cycles import lane_series, pause_of
 from slipsweep.kernels.sine.lanes import (
-    AT_PEAK,
     CARRIED,
     CODE,
     CONVERGED,
@@ -43,7 +42,6 @@ from slipsweep.kernels.sine.lanes import (
     SLOWEST,
     START,
     THROUGH,
-    TO_PEAK,
     V,
     W,
     X,
@@ -57,7 +55,15 @@ from slipsweep.kernels.sine.shapes import fallen, phase_of, steepness
 from slipsweep.model import equations as eq
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
-_MOST_PULSES = 64
+MOST_PULSES = 64
+
+
+@in_lanes
+def moved_to_stop(shape: int, lanes: np.ndarray, j: int, velocity: float, psi: float) -> float:
+    """W of the hold from Üg = Üy, entered with `velocity`, to its stop at ψ."""
+    began = lanes[BEGAN + j]
+    held_on = held_motion(shape, lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
+    return 0.0 if psi <= began else velocity * (psi - began) + held_on
 
 
 @scalar
@@ -84,7 +90,6 @@ def lane_carried(shape: int, count: int, options: Options, lanes: np.ndarray) ->
         lanes[THROUGH + j] = lanes[CONVERGED + j] if through else 0.0
         lanes[W + j] += -carried * began
         lanes[V + j] += carried
-        lanes[AT_PEAK + j], lanes[TO_PEAK + j] = lanes[V + j], lanes[W + j]
     lane_fall(shape, options.wants_peak, lanes)
     for j in range(STRIP):
         # pulses that slide through without a stop, and those of them that do not recouple, until it repeats
@@ -102,10 +107,11 @@ def lane_carried(shape: int, count: int, options: Options, lanes: np.ndarray) ->
         lanes[X + j] = 0.0 if stops else 1.0
     settle(HELD_STOP, shape, PSI, X, 1.0, options.g, lanes)
     lane_repeated(shape, later, lanes)
-    if later <= _MOST_PULSES:
+    if later <= MOST_PULSES:
         for j in range(count):
             if lanes[CONVERGED + j] < 0.0:
-                follow_pulses(shape, options, lanes, j)
+                rest = lanes[CARRIED + j], lanes[MOVED + j], lanes[HIGHEST + j]
+                follow_pulses(shape, options, options.cycles - 1, False, rest, lanes, j)
 
 
 @scalar
@@ -122,8 +128,7 @@ def lane_repeated(shape: int, later: float, lanes: np.ndarray) -> None:
             lanes[GAIN + j],
             lanes[MOST + j],
         )
-        held_on = held_motion(shape, lanes[AMPLITUDE + j], lanes[LEVEL + j], began, psi)[1]
-        again = lanes[V + j] * (psi - began) + held_on if psi > began else 0.0
+        again = moved_to_stop(shape, lanes, j, lanes[V + j], psi)
         stops = psi > began
         braked = eq.attenuated_displacement(left, lanes[HELD + j], pause_of(began))
         periods = np.floor(later / (most + 1.0))
@@ -217,38 +222,74 @@ def fall_stop(shape: int, amplitude: float, held: float, at_peak: float, highest
 
 
 @scalar
-def follow_pulses(shape: int, options: Options, lanes: np.ndarray, j: int) -> None:
-    """All cycles of a lane of `lane_carried` that stops between t1 and Üg = b, so that no pulse is like another.
+def slide_through(shape: int, lanes: np.ndarray, j: int, g: float) -> tuple[float, float, float, float]:
+    """The gain of V from Üg = Üy to where it is least, if not to 0; b and the gains of V and W at the peak, or NaN."""
+    amplitude, level, began = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j]
+    least = held_motion(shape, amplitude, level, began, phase_of(shape, min(level, amplitude), amplitude))[0]
+    held, gained, moved = restart(shape, lanes, j, began, g)
+    if level < amplitude and lane_response(lanes, j, level, g) > level:  # Eq. 4 itself slows it
+        held = math.nan
+    return least, held, gained, moved
 
-    It restarts at once; the other pulses are those that `lane_carried` knows.
+
+@scalar
+def after_stop(shape: int, lanes: np.ndarray, j: int, velocity: float, g: float) -> tuple[float, float, float]:
+    """b, V and W at the peak of a pulse entered with `velocity` that stops, and restarts at once or at t1; or NaN."""
+    stop = held_stop(shape, lanes, j, velocity) if velocity > 0.0 else lanes[BEGAN + j]
+    held, at_peak, moved = restart(shape, lanes, j, max(stop, lanes[ONSET + j]), g)
+    return held, at_peak, moved + moved_to_stop(shape, lanes, j, velocity, stop)
+
+
+@scalar
+def from_peak(
+    shape: int, lanes: np.ndarray, j: int, held: float, at_peak: float, pause: float
+) -> tuple[float, float, float]:
+    """V left of that at the peak when `pause` is over after Üg = 0 (t5), W gained, and the largest V."""
+    amplitude = lanes[AMPLITUDE + j]
+    top = -phase_of(shape, held, amplitude)
+    peak = at_peak + held_motion(shape, amplitude, held, 0.0, top)[0]
+    left = at_peak + held_motion(shape, amplitude, held, 0.0, HALF_PI)[0]
+    end = HALF_PI if left > 0.0 else fall_stop(shape, amplitude, held, at_peak, peak, top)
+    moved = at_peak * end + held_motion(shape, amplitude, held, 0.0, end)[1]
+    left = max(left, 0.0)
+    moved += eq.attenuated_displacement(left, held, pause)
+    return eq.attenuated_velocity(left, held, pause), moved, peak
+
+
+@scalar
+def follow_pulses(
+    shape: int, options: Options, pulses: int, to_last_peak: bool, rest: tuple[float, float, float],
+    lanes: np.ndarray, j: int,
+) -> None:  # fmt: skip
+    """So many pulses of a lane, after the W in MOVED and entered with the V in CARRIED, whether or not they repeat.
+
+    `rest` is what a pulse from rest comes to: V left at the next Üg = Üy, W and the largest V.  The shaking ends at
+    the peak of the last pulse, or with its negative half wave.
     """
-    amplitude, began, carried = lanes[AMPLITUDE + j], lanes[BEGAN + j], lanes[CARRIED + j]
-    moved, highest, velocity = lanes[MOVED + j], lanes[HIGHEST + j], carried
-    for later in range(options.cycles - 2, -1, -1):
-        if velocity > 0.0 and lanes[SLOWEST + j] + velocity - carried > 0.0:
-            if lanes[THROUGH + j] == 0.0:
-                return
-            held, at_peak = lanes[HELD + j], lanes[AT_PEAK + j] + (velocity - carried)
-            moved += lanes[TO_PEAK + j] - (velocity - carried) * began
+    moved, highest, velocity, began = lanes[MOVED + j], lanes[HIGHEST + j], lanes[CARRIED + j], lanes[BEGAN + j]
+    least, held_through, gained_through, moved_through = slide_through(shape, lanes, j, options.g)
+    entered, gain, slid, crest = math.nan, math.nan, math.nan, math.nan  # of a pulse that slides through
+    for left in range(pulses, 0, -1):
+        through, more = velocity + least > 0.0, velocity - entered
+        if velocity == 0.0 and left > 1:
+            velocity, further, peak = rest
+        elif through and velocity + gain > 0.0 and left > 1:
+            velocity, further, peak = velocity + gain, slid + 2.0 * math.pi * more, crest + more
         else:
-            stop = began
-            if velocity > 0.0:
-                stop = held_stop(shape, lanes, j, velocity)
-                moved += velocity * (stop - began) + held_motion(shape, amplitude, lanes[LEVEL + j], began, stop)[1]
-            if stop <= lanes[ONSET + j]:
-                moved += lanes[MOVED + j] if later > 0 else lanes[LAST + j]
-                velocity = carried
-                continue
-            held, at_peak, gained = restart(shape, lanes, j, stop, options.g)
-            moved += gained
-        top = -phase_of(shape, held, amplitude)
-        peak = at_peak + held_motion(shape, amplitude, held, 0.0, top)[0]
-        left = at_peak + held_motion(shape, amplitude, held, 0.0, HALF_PI)[0]
-        end = HALF_PI if left > 0.0 else fall_stop(shape, amplitude, held, at_peak, peak, top)
-        moved += at_peak * end + held_motion(shape, amplitude, held, 0.0, end)[1]
-        left, pause = max(left, 0.0), pause_of(began) if later > 0 else math.inf
-        velocity = eq.attenuated_velocity(left, held, pause)
-        moved += eq.attenuated_displacement(left, held, pause)
+            if through:
+                held, peak, further = held_through, velocity + gained_through, moved_through - velocity * began
+            else:
+                held, peak, further = after_stop(shape, lanes, j, velocity, options.g)
+            if left == 1 and to_last_peak:
+                further += eq.attenuated_displacement(peak, held, math.inf)
+            else:
+                pause = pause_of(began) if left > 1 else math.inf
+                after, falling, peak = from_peak(shape, lanes, j, held, peak, pause)
+                further += falling
+                if through and after > 0.0:
+                    entered, gain, slid, crest = velocity, after - velocity, further, peak
+                velocity = after
+        moved += further
         highest = max(highest, peak)
     # NaN where an iteration has not converged
     if moved >= 0.0:

@@ -123,22 +123,29 @@ def store_lane(
     blocks[KIND + j] = kind if solved else OTHER
 
 
-@scalar
-def carry(shape: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
-    """Bring those of `count` lanes that stick at Üg = Üy and do not recouple to the front, and go on with them."""
-    lanes, where = room.lanes, room.where
-    used = 0
-    for lane in range(count):
-        if lanes[CONVERGED + lane] < 0.0:
-            where[used] = where[lane]
-            for row in range(0, LANES_SIZE, TILE):
-                lanes[row + used] = lanes[row + lane]
-            used += 1
-    fill_up(used, LANES_SIZE // TILE, lanes)
-    for first in range(0, used, STRIP):
-        lane_carried(shape, min(used - first, STRIP), options, lanes[first:])
-    for lane in range(used):
-        store_lane(lanes, lane, STICKS, options, room.blocks, motion[0], motion[1], codes[1], where[lane])
+def carry_of(
+    go_on: Callable[[int, int, Options, np.ndarray], None],
+) -> Callable[[int, int, Options, Room, np.ndarray, np.ndarray], None]:
+    """The jitted way on for lanes in motion; `go_on` is given the shape, how many they are, options and lanes."""
+
+    @scalar
+    def carry(shape: int, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray) -> None:
+        """Bring those of `count` lanes that stick at Üg = Üy and do not recouple to the front, and go on with them."""
+        lanes, where = room.lanes, room.where
+        used = 0
+        for lane in range(count):
+            if lanes[CONVERGED + lane] < 0.0:
+                where[used] = where[lane]
+                for row in range(0, LANES_SIZE, TILE):
+                    lanes[row + used] = lanes[row + lane]
+                used += 1
+        fill_up(used, LANES_SIZE // TILE, lanes)
+        for first in range(0, used, STRIP):
+            go_on(shape, min(used - first, STRIP), options, lanes[first:])
+        for lane in range(used):
+            store_lane(lanes, lane, STICKS, options, room.blocks, motion[0], motion[1], codes[1], where[lane])
+
+    return carry
 
 
 @scalar
@@ -212,8 +219,9 @@ def lanes_of(
     return solve_cells
 
 
-_solve_cells = lanes_of(SINE, strip_of(SINE), carry)
-_solve_under_triangle = lanes_of(TRIANGLE, strip_of(TRIANGLE), carry)
+_carry = carry_of(lane_carried)
+_solve_cells = lanes_of(SINE, strip_of(SINE), _carry)
+_solve_under_triangle = lanes_of(TRIANGLE, strip_of(TRIANGLE), _carry)
 _solve_under_square = lanes_of(SQUARE, strip_of(SQUARE), leave)
 
 

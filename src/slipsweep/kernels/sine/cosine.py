@@ -10,7 +10,8 @@ import numpy as np
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import AMPLITUDE, BEGAN, INTEGRATE, NOT_RECOUPLED, YIELD, Options, lane_response
 from slipsweep.kernels.events import STRIP
-from slipsweep.kernels.sine.cells import Room, lanes_of, leave
+from slipsweep.kernels.sine.carried import MOST_PULSES, follow_pulses
+from slipsweep.kernels.sine.cells import Room, carry_of, lanes_of
 from slipsweep.kernels.sine.continuous import DIP, lane_quarters, lane_turns
 from slipsweep.kernels.sine.cycles import lane_attenuation, lane_recoupling
 from slipsweep.kernels.sine.lanes import (
@@ -20,6 +21,8 @@ from slipsweep.kernels.sine.lanes import (
     CONVERGED,
     GAIN,
     HELD,
+    HIGHEST,
+    LEVEL,
     MOST,
     MOVED,
     PEAK,
@@ -74,9 +77,11 @@ def lane_pulses(kind: int, options: Options, lanes: np.ndarray) -> None:
         if kind == STICKS:  # a whole pulse may hold more, which it has taken up on the way to the peak
             lanes[HELD + j] = max(lanes[YIELD + j], lane_response(lanes, j, lanes[AMPLITUDE + j], options.g))
     lane_to_next(kind, options, lanes)
-    whole = options.cycles - 1.0
+    # a block that sticks at Üg = Üy when at rest goes on otherwise when it comes there in motion (`go_on`)
+    goes_on, whole = 0.0 if kind == STICKS else 1.0, options.cycles - 1.0
     for j in range(STRIP):
-        first, gain = lanes[CARRIED + j], lanes[GAIN + j]
+        moves = (lanes[CARRIED + j] > 0.0) | ((lanes[GAIN + j] > 0.0) & (whole > 0.0))
+        first, gain = goes_on * lanes[CARRIED + j], goes_on * lanes[GAIN + j]
         entered = first + whole * gain
         at_end = lanes[AT_PEAK + j] + entered
         last = lanes[TO_PEAK + j] - entered * lanes[BEGAN + j]
@@ -84,11 +89,20 @@ def lane_pulses(kind: int, options: Options, lanes: np.ndarray) -> None:
         pulses = whole * (lanes[_WHOLE + j] + math.pi * (2.0 * first + gain * (whole - 1.0)))
         lanes[W + j] = lanes[MOVED + j] + pulses + last
         highest = lanes[_WHOLE_PEAK + j] + (entered - gain) if whole > 0.0 else 0.0
+        lanes[HIGHEST + j] = lanes[PEAK + j]
         lanes[PEAK + j] = max(max(lanes[PEAK + j], highest), at_end)
-        moves = (first > 0.0) | ((gain > 0.0) & (whole > 0.0))
         lanes[CODE + j] = NOT_RECOUPLED if moves else 0.0
-        # a later pulse of a block that sticks at Üg = Üy when at rest is another one when it moves there
-        lanes[CONVERGED + j] = 0.0 if moves & (kind == STICKS) else lanes[CONVERGED + j]
+        # -1: right but for what it does in motion (`carry_of`)
+        lanes[CONVERGED + j] *= -1.0 if moves & (kind == STICKS) else 1.0
+
+
+@scalar
+def go_on(shape: int, count: int, options: Options, lanes: np.ndarray) -> None:
+    """The pulses after the first half of `count` lanes that stick at Üg = Üy when at rest, but come there in motion."""
+    for j in range(count if options.cycles <= MOST_PULSES else 0):
+        lanes[LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
+        rest = lanes[GAIN + j], lanes[_WHOLE + j], lanes[_WHOLE_PEAK + j]
+        follow_pulses(shape, options, options.cycles, True, rest, lanes, j)
 
 
 @scalar
@@ -118,7 +132,7 @@ def solve_strip(kind: int, options: Options, lanes: np.ndarray) -> None:
         lane_pulses(kind, options, lanes)
 
 
-_solve_cells = lanes_of(SINE, solve_strip, leave)
+_solve_cells = lanes_of(SINE, solve_strip, carry_of(go_on))
 
 
 def solve_under_cosine(

@@ -18,10 +18,9 @@ X, LEVEL, START, V, W, HELD, RATE, MOMENT, PSI, LEFT, PEAK, CONVERGED, CODE = ra
     LANE_ROWS * TILE, (LANE_ROWS + 13) * TILE, TILE
 )
 #: What a first pulse leaves to the pulses after it: V carried on, W up to then, W if it were the
-#: last, t1 and the largest V; and, of a pulse
-#: entered in motion, whether a hold brings it through, V as that is slowest, V and W at the peak, what V
-#: gains, and how many such pulses follow each other.
-CARRIED, MOVED, LAST, ONSET, HIGHEST, THROUGH, SLOWEST, AT_PEAK, TO_PEAK, GAIN, MOST = range(
+#: last, t1 and the largest V; of a pulse entered in motion, whether a hold brings it through, V as that is slowest,
+#: what V gains, and how many such pulses follow each other; and, under a cosine, V and W at the peak.
+CARRIED, MOVED, LAST, ONSET, HIGHEST, THROUGH, SLOWEST, GAIN, MOST, AT_PEAK, TO_PEAK = range(
     (LANE_ROWS + 13) * TILE, (LANE_ROWS + 24) * TILE, TILE
 )
 LANES_SIZE = (LANE_ROWS + 24) * TILE
