@@ -212,8 +212,15 @@ def test_lanes_are_the_walk_over_pieces(cell: dict[str, Any], options: dict[str,
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 @pytest.mark.parametrize(
     "measured",
-    [{}, {"yield_acceleration": 0.3}, {"yield_acceleration": 2.0}, {"decay_rate": 1.0}],
-    ids=["estimated", "low", "high", "slow"],
+    [
+        {},
+        {"yield_acceleration": 0.3},
+        {"yield_acceleration": 2.0},
+        {"decay_rate": 1.0},
+        # Eq. 4 rises from Üy on: a block that comes there in motion does not hold E(Üy)
+        {"yield_acceleration": 0.01, "decay_rate": 1.15, "delta_mu": 0.03},
+    ],
+    ids=["estimated", "low", "high", "slow", "rising"],
 )
 @pytest.mark.parametrize("waveform", ["sine", "cosine", "triangle", "square"])
 def test_lanes_side_by_side(waveform: str, measured: dict[str, float], recoupling: str, cycles: int) -> None:

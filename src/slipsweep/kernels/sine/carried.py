@@ -77,8 +77,9 @@ def lane_carried(shape: int, count: int, options: Options, lanes: np.ndarray) ->
     """
     later = options.cycles - 1.0
     for j in range(STRIP):
-        lanes[LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
-        lanes[START + j], lanes[CONVERGED + j] = lanes[BEGAN + j], 1.0
+        lanes[LEVEL + j], slope = lane_response_and_slope(lanes, j, lanes[YIELD + j], options.g)
+        lanes[START + j] = lanes[BEGAN + j]
+        lanes[CONVERGED + j] = 1.0 if slope <= 0.0 else 0.0  # else b goes on with Eq. 4 from Üy on
     # the slide through: the pulse from rest, held at E(Üy) and started at Üy, with V carried added
     lane_rise(FOLLOWS_EQ4, shape, options.g, lanes)
     for j in range(STRIP):
@@ -86,8 +87,7 @@ def lane_carried(shape: int, count: int, options: Options, lanes: np.ndarray) ->
         slowest = phase_of(shape, min(held, lanes[X + j]), amplitude)
         lanes[SLOWEST + j] = carried + held_motion(shape, amplitude, held, began, slowest)[0]
         # held until past its slowest, or else Eq. 4 itself slows it
-        through = (held >= amplitude) | (lanes[X + j] >= held)
-        lanes[THROUGH + j] = lanes[CONVERGED + j] if through else 0.0
+        lanes[THROUGH + j] = lanes[CONVERGED + j] if (held >= amplitude) | (lanes[X + j] >= held) else 0.0
         lanes[W + j] += -carried * began
         lanes[V + j] += carried
     lane_fall(shape, options.wants_peak, lanes)
@@ -138,9 +138,10 @@ def lane_repeated(shape: int, later: float, lanes: np.ndarray) -> None:
         period = lanes[MOVED + j] + again + (slides if most > 0.0 else 0.0)
         tail = lanes[MOVED + j] + lane_series(lanes, j, braked, gain, remaining - 1.0)
         # the slides through all reach t5, as the first does
-        gets_over = (lanes[LEVEL + j] < lanes[AMPLITUDE + j]) & (lanes[CONVERGED + j] * lanes[THROUGH + j] > 0.0)
-        alike = gets_over & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0))
-        repeats = ((most == 0.0) | alike) & (lanes[X + j] > 0.0) & ((not stops) | (psi < lanes[ONSET + j]))
+        gets_over = (lanes[LEVEL + j] < lanes[AMPLITUDE + j]) & (lanes[CONVERGED + j] > 0.0)
+        alike = (most == 0.0) | (gets_over & ((most <= 1.0) | (left + (most - 1.0) * gain > 0.0)))
+        settled = (lanes[THROUGH + j] > 0.0) & (lanes[X + j] > 0.0)
+        repeats = alike & settled & ((not stops) | (psi < lanes[ONSET + j]))
         lanes[W + j] = (periods * period if periods > 0.0 else 0.0) + (tail if remaining > 0.0 else lanes[LAST + j])
         highest = lanes[PEAK + j] + max(gain, 0.0) * max(remaining - 1.0, 0.0)
         lanes[PEAK + j] = max(lanes[HIGHEST + j], highest if most > 0.0 else 0.0)
@@ -223,11 +224,15 @@ def fall_stop(shape: int, amplitude: float, held: float, at_peak: float, highest
 
 @scalar
 def slide_through(shape: int, lanes: np.ndarray, j: int, g: float) -> tuple[float, float, float, float]:
-    """The gain of V from Üg = Üy to where it is least, if not to 0; b and the gains of V and W at the peak, or NaN."""
-    amplitude, level, began = lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[BEGAN + j]
+    """The gain of V from Üg = Üy to where it is least, if not to 0; b and the gains of V and W at the peak.
+
+    b is NaN where it does not stay E(Üy) up to there.
+    """
+    amplitude, began = lanes[AMPLITUDE + j], lanes[BEGAN + j]
+    level, slope = lane_response_and_slope(lanes, j, lanes[YIELD + j], g)
     least = held_motion(shape, amplitude, level, began, phase_of(shape, min(level, amplitude), amplitude))[0]
     held, gained, moved = restart(shape, lanes, j, began, g)
-    if level < amplitude and lane_response(lanes, j, level, g) > level:  # Eq. 4 itself slows it
+    if slope > 0.0 or (level < amplitude and lane_response(lanes, j, level, g) > level):
         held = math.nan
     return least, held, gained, moved
 
@@ -268,6 +273,8 @@ def follow_pulses(
     """
     moved, highest, velocity, began = lanes[MOVED + j], lanes[HIGHEST + j], lanes[CARRIED + j], lanes[BEGAN + j]
     least, held_through, gained_through, moved_through = slide_through(shape, lanes, j, options.g)
+    if math.isnan(held_through):
+        return
     entered, gain, slid, crest = math.nan, math.nan, math.nan, math.nan  # of a pulse that slides through
     for left in range(pulses, 0, -1):
         through, more = velocity + least > 0.0, velocity - entered
