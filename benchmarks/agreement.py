@@ -1,7 +1,8 @@
 """The solvers held to each other: ``python -m benchmarks.agreement`` writes agreement.md.
 
 Draws cells as tests/support/agreement.py does, under all options and waveforms, and solves each in every way
-that there is; and records as tests/support/made_up_records.py does.  ``.ci/include-report`` puts the table into
+that there is; records as tests/support/made_up_records.py does; and many more cells under plain waves, in lanes and
+from event to event, as tests/support/plain_waves.py does.  ``.ci/include-report`` puts the table into
 docs/waveforms.md.  Nothing is timed; it ends with an error where two ways disagree.
 """
 
@@ -14,9 +15,10 @@ from statistics import median
 from benchmarks.machine import arguments, measured_on, number, table
 from tests.support.agreement import FLOORS, Comparison, compare, group_of
 from tests.support.made_up_records import SEEN, difference, made
+from tests.support.plain_waves import drawn, times_bound
 
-#: Cells drawn, and in a group; and made-up records for each group.
-CELLS, SIZE, RECORDS = 10_000, 32, 4
+#: Cells drawn, and in a group; and for each group made-up records, and cells under a plain wave.
+CELLS, SIZE, RECORDS, PLAIN = 10_000, 32, 4, 5_000
 
 #: What the made-up records are held to.
 BY_RECORD = "SciPy under a record"
@@ -54,20 +56,27 @@ def main() -> None:
     kinds: dict[str, list[Comparison]] = {kind: [] for kind in (*FLOORS, BY_RECORD)}
     regimes: dict[str, list[Comparison]] = defaultdict(list)
     modes: Counter[int] = Counter()
-    wrong = []
-    for drawn in range(0, cells, SIZE):
-        number_of_group = drawn // SIZE
-        group = group_of(seed + number_of_group, min(SIZE, cells - drawn))
+    wrong: list[str] = []
+    in_lanes: list[float] = []
+    for first in range(0, cells, SIZE):
+        number_of_group = first // SIZE
+        group = group_of(seed + number_of_group, min(SIZE, cells - first))
+        plain = drawn(seed + number_of_group, PLAIN)
+        times = times_bound(plain)
+        in_lanes.append(float(times.max()))
+        if not times.max() <= 1.0:
+            wrong.append(plain.cell(int(times.argmax())))
+            print(f"lanes: {wrong[-1]}", flush=True)
         for comparison in chain(compare(group), compare_records(seed + RECORDS * number_of_group)):
             kinds[comparison.kind].append(comparison)
             if comparison.kind.startswith("step"):
                 regimes[comparison.regime].append(comparison)
                 modes[comparison.mode] += 1
             if not comparison.times_bound <= 1.0:
-                wrong.append(comparison)
+                wrong.append(comparison.text)
                 print(f"{comparison.kind}: {comparison.text}", flush=True)
-        if drawn % (50 * SIZE) == 0:
-            print(f"{drawn} cells, {len(wrong)} disagreements", flush=True)
+        if first % (50 * SIZE) == 0:
+            print(f"{first} cells, {len(wrong)} disagreements", flush=True)
     by_kind = table(HEADER, rows_of({kind: found for kind, found in kinds.items() if found}))
     by_regime = table([HEADER[0].replace("the cycle", "the step"), *HEADER[1:]], rows_of(dict(sorted(regimes.items()))))
     print(by_kind, by_regime, sep="\n")
@@ -76,7 +85,12 @@ def main() -> None:
         f"{modes[-1]:,} without a value. {measured_on(('numpy', 'numba'))} Written by `python -m benchmarks.agreement"
         f" --cells {cells} --seed {seed}`."
     )
-    (given.folder / "agreement.md").write_text(f"{head}\n\n{by_kind}\n{by_regime}", encoding="utf-8")
+    lanes = (
+        f"{PLAIN * len(in_lanes):,} cells under plain waves, solved in lanes and from event to event, differ by "
+        f"{number(max(in_lanes), 2)} of their bound at most."
+    )
+    page = f"{head}\n\n{by_kind}\n{by_regime}\n{lanes}\n"
+    (given.folder / "agreement.md").write_text(page, encoding="utf-8")
     if wrong:
         raise SystemExit(f"{len(wrong)} disagreements")
 

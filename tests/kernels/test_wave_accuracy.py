@@ -14,8 +14,8 @@ from scipy.special import iv, modstruve
 
 import slipsweep
 from slipsweep import Validity
-from slipsweep.grid import engine
 from tests.support.cases import choices
+from tests.support.plain_waves import drawn, event_by_event, times_bound
 from tests.support.strategies import anything, model_options, reproducible, sliding_cells
 from tests.support.wave_cases import REGIMES, WaveCase, read_wave_cases
 from tests.support.wave_cases import solve as reference
@@ -193,10 +193,17 @@ def test_a_cosine_is_the_harmonic_with_its_phase(cell: dict[str, Any], options: 
 
 
 def walked(**given: Any) -> xr.Dataset:
-    """A sweep whose cells all go from event to event, as under a wave without lanes."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(engine, "_is_plain", lambda motion: False)
+    """A sweep whose cells all go from event to event."""
+    with event_by_event():
         return slipsweep.sweep(**choices(**given))
+
+
+def test_lanes_are_the_walk_over_pieces_in_two_million_cells() -> None:
+    """Rare kinds of motion, of which some hundred cells have none, and neighbours of every kind."""
+    for seed in range(120):
+        one = drawn(seed, 20_000)
+        times = times_bound(one)
+        assert times.max() <= 1.0, f"{times.max()} at {one.cell(int(times.argmax()))}"
 
 
 @reproducible
