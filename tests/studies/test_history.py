@@ -1,14 +1,19 @@
 """Time histories of slides that last long after the shaking: few points, and all of the slide."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 import slipsweep
 from slipsweep import Cosine, Harmonics, Sine
 from slipsweep.errors import InputError
+from slipsweep.grid.plans import Plan
+from slipsweep.studies import history as studied
 from tests.support.commands import command
 
 #: Shaking that leaves Newmark's block with a velocity.
@@ -121,3 +126,45 @@ def test_velocity_has_no_gaps_where_pieces_meet(shaken: str, model: Any) -> None
     velocity = slipsweep.simulate(excitation=excitation, **given, times=np.unique(about.clip(0))).relative_velocity
     assert np.abs(np.diff(velocity)[np.diff(velocity.time) < 1e-12]).max() < 1e-10
     assert velocity.max() > 0.01
+
+
+class Noted:
+    """A kernel that notes the types of what it is to be compiled for, and of what it is called with."""
+
+    def __init__(self, kernel: Any, done: list[Any]) -> None:
+        self.kernel, self.done = kernel, done
+
+    @contextmanager
+    def compiled_elsewhere(self, arguments: tuple[Any, ...]) -> Iterator[None]:
+        self.done.append([numba.typeof(one) for one in arguments])
+        yield
+        self.done.append("waited for")
+
+    def __call__(self, *arguments: Any) -> None:
+        self.done.append([numba.typeof(one) for one in arguments])
+        self.kernel(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("kernel", "motion"),
+    [
+        ("history", {"amplitude": 3.0, "frequency": 1.0}),
+        ("record_history", {"excitation": slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)}),
+    ],
+)
+def test_the_kernel_of_a_history_is_made_while_its_sweep_is_solved(
+    kernel: str, motion: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[Any] = []
+
+    def solve(plan: Plan) -> Any:
+        done.append("swept")
+        return solved(plan)
+
+    solved = Plan.solve
+    monkeypatch.setattr(Plan, "solve", solve)
+    monkeypatch.setattr(studied, kernel, Noted(getattr(studied, kernel), done))
+    slipsweep.simulate(5.0, 0.4, **motion)
+    types, *then = done
+    assert then == ["swept", "waited for", *[types] * (len(then) - 2)]
+    assert types in then

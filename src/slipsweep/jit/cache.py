@@ -18,7 +18,7 @@ import functools
 import os
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -109,7 +109,7 @@ class Kernel:
         return ToMake(form.compiled, self._function, _types(args))
 
     @contextlib.contextmanager
-    def compiled_elsewhere(self, args: tuple[Any, ...], others: list[ToMake]) -> Iterator[None]:
+    def compiled_elsewhere(self, args: tuple[Any, ...], others: Sequence[ToMake] = ()) -> Iterator[None]:
         """Have another process compile it for such arguments, and others, while the block runs, unless it is kept."""
         folder = cache_folder()
         if self._dispatcher is not None or folder is None or _is_kept(self._function):

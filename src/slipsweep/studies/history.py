@@ -59,8 +59,12 @@ def history_table(
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    summary = plan.solve()
-    one = _History(problem, {name: variable.values for name, variable in summary.coords.items()}, summary)
+    inputs = {name: variable.values for name, variable in plan.coords.items()}
+    kernel = record_history if isinstance(problem.excitation, Record) else history
+    # the first history of all waits for two kernels: where there are two processors, not for one after the other
+    with kernel.compiled_elsewhere(_arguments(problem, inputs, np.empty(0))):
+        summary = plan.solve()
+    one = _History(problem, inputs, summary)
     if times is None:
         points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
         points = check_whole("points_per_cycle", points, 4, MOST_POINTS)
@@ -90,6 +94,14 @@ def _checked(times: Any, least: float) -> Floats:
     return grid
 
 
+def _arguments(problem: Problem, inputs: Mapping[str, Floats], phases: Floats) -> tuple[Any, ...]:
+    """Those of the kernel that samples one case at phases; it fills the last, (phase, column of `HISTORY`)."""
+    motion, values = problem.excitation, engine.kernel_inputs(Request(problem, (), inputs, ()))[0]
+    wave = wave_of_record(motion, float(inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
+    table = np.empty((phases.size, len(HISTORY)))
+    return np.repeat([float(value) for value in values], TILE), problem.options(True), wave, phases, table
+
+
 @dataclass(frozen=True)
 class _History:
     """One case, and its results as a sweep gives them.
@@ -116,14 +128,9 @@ class _History:
 
     def sampled(self, phases: Floats) -> Floats:
         """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
-        motion, options = self.problem.excitation, self.problem.options(True)
-        cells = np.repeat([float(values) for values in engine.kernel_inputs(self._asked)[0]], TILE)
-        table = np.empty((phases.size, len(HISTORY)))
-        if isinstance(motion, Record):
-            wave = wave_of_record(motion, float(self.inputs["polarity"]))
-            record_history(cells, options, wave, phases, table)
-        else:
-            history(cells, options, wave_of(motion), phases, table)
+        arguments = _arguments(self.problem, self.inputs, phases)
+        (record_history if isinstance(self.problem.excitation, Record) else history)(*arguments)
+        table: Floats = arguments[-1]
         if self._valueless:  # from the beginning on, also where the flag is raised later
             table[:, 1:] = math.nan
         return table
