@@ -61,7 +61,7 @@ from slipsweep.kernels.step.slides import (
     resolve_fall,
     resolve_slide,
 )
-from slipsweep.kernels.step.table import AHEAD, Steps, node, tau_within
+from slipsweep.kernels.step.table import AHEAD, Steps, node
 from slipsweep.kernels.train import train_of
 from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, LAST, TOP, Wave
 
@@ -223,7 +223,7 @@ def rise_step(block: Block, steps: Steps, p: int, k: int, tau: float, x: float, 
                 x = held = relative_acceleration_root(block, x, top)  # where Eq. 4 meets Üg
                 located = False
             if not located:
-                tau, located = tau_within(steps, p, k, amplitude, x), True
+                tau, located = min(max(offset_at(wave.pieces, p, amplitude, x), begin), end), True
             follows = literal or (held > block.yield_acceleration and response_and_slope(block, x)[1] > 0.0)
             state[FOLLOWS] = 1.0 if follows else 0.0
             turn = wave.pieces[p, FINISH]
@@ -255,7 +255,7 @@ def rise_step(block: Block, steps: Steps, p: int, k: int, tau: float, x: float, 
                     else:
                         state[FOLLOWS] = 0.0
         if switches:
-            cut = tau_within(steps, p, k, amplitude, x_cut)
+            cut = min(max(offset_at(wave.pieces, p, amplitude, x_cut), tau), end)
         follows, held, h = state[FOLLOWS] == 1.0, state[HELD], cut - tau
         rate, middle = x - (eq4 if follows else held), 0.0
         if rule == SIMPSON:

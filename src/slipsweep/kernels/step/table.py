@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.excitation import offset_root
 from slipsweep.kernels.step.rates import coefficients_of, displacement_gain_of, velocity_gain_of
 from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, LAST, TERM, TOP, Wave
 
@@ -136,17 +135,3 @@ def _mirrored(wave: Wave, table: list[np.ndarray], offset: np.ndarray, count: np
 def node(steps: Steps, p: int, i: int) -> float:
     """τ on piece p at which step i begins."""
     return (i if steps.wave.pieces[p, BEGIN] == 0.0 else i - steps.counts[p]) * steps.length[p]
-
-
-@scalar
-def tau_within(steps: Steps, p: int, k: int, amplitude: float, x: float) -> float:
-    """τ at which Üg = x within step k of piece p: as `offset_at`, but from the ends of the step, which are known."""
-    wave, at = steps.wave, steps.offset[p] + k
-    low, high, w_low, w_high = node(steps, p, k), node(steps, p, k + 1), steps.nodes[at], steps.nodes[at + 1]
-    if w_low == w_high:
-        return low
-    wanted = (x - amplitude * wave.pieces[p, TOP]) / amplitude
-    tau = low + (high - low) * min(max((x / amplitude - w_low) / (w_high - w_low), 0.0), 1.0)
-    if w_high > w_low:
-        return offset_root((wave.pieces, p, wanted), low, high, tau, 0.0)
-    return offset_root((wave.pieces, p, wanted), high, low, tau, 0.0)
