@@ -124,13 +124,13 @@ def lay_out(commit: str, folder: Path) -> None:
         tar.extractall(folder, filter="data")
 
 
-def started(folder: Path, many: float) -> subprocess.Popen[str]:
+def started(folder: Path, many: float, code: str = CHILD) -> subprocess.Popen[str]:
     """A process that solves with the sources in a folder."""
     record = ROOT / "sweeps" / "data" / "synthetic.csv"
     # a folder of its own for compiled code: in a common one only that of the latest four versions is kept
     own = {"PYTHONPATH": str(folder / "src"), "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_NUM_THREADS": "1"}
     return subprocess.Popen(
-        [sys.executable, "-c", CHILD, str(record), str(many)],
+        [sys.executable, "-c", code, str(record), str(many)],
         cwd=folder, env=os.environ | own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
 

@@ -27,12 +27,13 @@ WRITES = {
     "writers": ["writers.md"],
     "calibration": ["calibration.md"],
     "commits": ["commits.csv", "commits.png"],
+    "steps": ["steps.md"],
     "model_choices": ["model_choices.md", "model_choices.png"],
     "speed_vs_error": [f"speed_vs_error.{kind}" for kind in ("csv", "nc", "md", "png")],
 }
 
 #: Half a minute of processes, clusters and compilation.
-SLOW = ("large_sweeps", "writers", "commits")
+SLOW = ("large_sweeps", "writers", "commits", "steps")
 
 
 @pytest.fixture(autouse=True)
