@@ -43,7 +43,7 @@ for line in sys.stdin:
 def row_of(regime: str, rule: str, found: dict[int, list[list[float]]], cells: int) -> list[object]:
     """A line of the table: of all rounds the median of the ratios, and of the time that one step more takes."""
     ratios = [statistics.median(b / a for a, b in zip(*seconds, strict=True)) for seconds in found.values()]
-    (few, *_), (many, *_) = COUNTS, COUNTS[::-1]
+    few, many = COUNTS[0], COUNTS[-1]
     before, now = (
         [(b - a) / (many - few) for a, b in zip(found[few][of], found[many][of], strict=True)] for of in (0, 1)
     )
