@@ -4,6 +4,7 @@ docs/numerics.md#pulses-entered-in-motion
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,7 +56,7 @@ from slipsweep.kernels.sine.shapes import fallen, phase_of, steepness
 from slipsweep.model import equations as eq
 
 #: Cells that stop anew in every pulse are followed that far; `train` finds where more of them repeat.
-MOST_PULSES = 64
+_MOST_PULSES = 64
 
 
 @in_lanes
@@ -107,11 +108,10 @@ def lane_carried(shape: int, count: int, options: Options, lanes: np.ndarray) ->
         lanes[X + j] = 0.0 if stops else 1.0
     settle(HELD_STOP, shape, PSI, X, 1.0, options.g, lanes)
     lane_repeated(shape, later, lanes)
-    if later <= MOST_PULSES:
-        for j in range(count):
-            if lanes[CONVERGED + j] < 0.0:
-                rest = lanes[CARRIED + j], lanes[MOVED + j], lanes[HIGHEST + j]
-                follow_pulses(shape, options, options.cycles - 1, False, rest, lanes, j)
+    for j in range(count):
+        if lanes[CONVERGED + j] < 0.0:
+            rest = lanes[CARRIED + j], lanes[MOVED + j], lanes[HIGHEST + j]
+            follow_pulses(shape, options, options.cycles - 1, False, rest, lanes, j)
 
 
 @scalar
@@ -222,25 +222,40 @@ def fall_stop(shape: int, amplitude: float, held: float, at_peak: float, highest
     return _stop_root((shape, amplitude, held, at_peak, 0.0), top, min(beyond, HALF_PI), min(beyond, HALF_PI), 0.0)
 
 
-@scalar
-def slide_through(shape: int, lanes: np.ndarray, j: int, g: float) -> tuple[float, float, float, float]:
-    """The gain of V from Üg = Üy to where it is least, if not to 0; b and the gains of V and W at the peak.
+class Through(NamedTuple):
+    """A pulse that slides through: what V gains to where it is least; b and the gains of V and W at the peak."""
 
-    b is NaN where it does not stay E(Üy) up to there.
-    """
+    least: float
+    held: float
+    gained: float
+    moved: float
+
+
+@scalar
+def slide_through(shape: int, lanes: np.ndarray, j: int, g: float) -> Through:
+    """A pulse that holds E(Üy), in LEVEL from now on, to where V is least; b is NaN where it does not hold so long."""
     amplitude, began = lanes[AMPLITUDE + j], lanes[BEGAN + j]
     level, slope = lane_response_and_slope(lanes, j, lanes[YIELD + j], g)
+    lanes[LEVEL + j] = level
     least = held_motion(shape, amplitude, level, began, phase_of(shape, min(level, amplitude), amplitude))[0]
     held, gained, moved = restart(shape, lanes, j, began, g)
     if slope > 0.0 or (level < amplitude and lane_response(lanes, j, level, g) > level):
         held = math.nan
-    return least, held, gained, moved
+    return Through(least, held, gained, moved)
 
 
 @scalar
-def after_stop(shape: int, lanes: np.ndarray, j: int, velocity: float, g: float) -> tuple[float, float, float]:
-    """b, V and W at the peak of a pulse entered with `velocity` that stops, and restarts at once or at t1; or NaN."""
-    stop = held_stop(shape, lanes, j, velocity) if velocity > 0.0 else lanes[BEGAN + j]
+def to_peak(
+    shape: int, lanes: np.ndarray, j: int, through: Through, velocity: float, g: float
+) -> tuple[float, float, float]:
+    """b, V and W at the peak of a pulse entered with `velocity`; or NaN.
+
+    One that stops restarts at once, or at t1 if that is later.
+    """
+    began = lanes[BEGAN + j]
+    if velocity + through.least > 0.0:
+        return through.held, velocity + through.gained, through.moved - velocity * began
+    stop = held_stop(shape, lanes, j, velocity) if velocity > 0.0 else began
     held, at_peak, moved = restart(shape, lanes, j, max(stop, lanes[ONSET + j]), g)
     return held, at_peak, moved + moved_to_stop(shape, lanes, j, velocity, stop)
 
@@ -266,38 +281,40 @@ def follow_pulses(
     shape: int, options: Options, pulses: int, to_last_peak: bool, rest: tuple[float, float, float],
     lanes: np.ndarray, j: int,
 ) -> None:  # fmt: skip
-    """So many pulses of a lane, after the W in MOVED and entered with the V in CARRIED, whether or not they repeat.
+    """So many pulses of a lane, if not too many, after the W in MOVED and entered with the V in CARRIED.
 
     `rest` is what a pulse from rest comes to: V left at the next Üg = Üy, W and the largest V.  The shaking ends at
     the peak of the last pulse, or with its negative half wave.
     """
-    moved, highest, velocity, began = lanes[MOVED + j], lanes[HIGHEST + j], lanes[CARRIED + j], lanes[BEGAN + j]
-    least, held_through, gained_through, moved_through = slide_through(shape, lanes, j, options.g)
-    if math.isnan(held_through):
+    if pulses > _MOST_PULSES:
         return
+    through = slide_through(shape, lanes, j, options.g)
+    if math.isnan(through.held):
+        return
+    moved, highest, velocity, began = lanes[MOVED + j], lanes[HIGHEST + j], lanes[CARRIED + j], lanes[BEGAN + j]
     entered, gain, slid, crest = math.nan, math.nan, math.nan, math.nan  # of a pulse that slides through
-    for left in range(pulses, 0, -1):
-        through, more = velocity + least > 0.0, velocity - entered
-        if velocity == 0.0 and left > 1:
+    for _ in range(pulses - 1):
+        slides_through, more = velocity + through.least > 0.0, velocity - entered
+        if velocity == 0.0:
             velocity, further, peak = rest
-        elif through and velocity + gain > 0.0 and left > 1:
+        elif slides_through and velocity + gain > 0.0:
             velocity, further, peak = velocity + gain, slid + 2.0 * math.pi * more, crest + more
         else:
-            if through:
-                held, peak, further = held_through, velocity + gained_through, moved_through - velocity * began
-            else:
-                held, peak, further = after_stop(shape, lanes, j, velocity, options.g)
-            if left == 1 and to_last_peak:
-                further += eq.attenuated_displacement(peak, held, math.inf)
-            else:
-                pause = pause_of(began) if left > 1 else math.inf
-                after, falling, peak = from_peak(shape, lanes, j, held, peak, pause)
-                further += falling
-                if through and after > 0.0:
-                    entered, gain, slid, crest = velocity, after - velocity, further, peak
-                velocity = after
+            held, at_peak, rising = to_peak(shape, lanes, j, through, velocity, options.g)
+            after, falling, peak = from_peak(shape, lanes, j, held, at_peak, pause_of(began))
+            further = rising + falling
+            if slides_through and after > 0.0:
+                entered, gain, slid, crest = velocity, after - velocity, further, peak
+            velocity = after
         moved += further
         highest = max(highest, peak)
+    held, peak, rising = to_peak(shape, lanes, j, through, velocity, options.g)
+    if to_last_peak:
+        falling = eq.attenuated_displacement(peak, held, math.inf)
+    else:
+        _, falling, peak = from_peak(shape, lanes, j, held, peak, math.inf)
+    moved += rising + falling
+    highest = max(highest, peak)
     # NaN where an iteration has not converged
     if moved >= 0.0:
         lanes[W + j], lanes[PEAK + j], lanes[CONVERGED + j] = moved, highest, 1.0

@@ -10,7 +10,7 @@ import numpy as np
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import AMPLITUDE, BEGAN, INTEGRATE, NOT_RECOUPLED, YIELD, Options, lane_response
 from slipsweep.kernels.events import STRIP
-from slipsweep.kernels.sine.carried import MOST_PULSES, follow_pulses
+from slipsweep.kernels.sine.carried import follow_pulses
 from slipsweep.kernels.sine.cells import Room, carry_of, lanes_of
 from slipsweep.kernels.sine.continuous import DIP, lane_quarters, lane_turns
 from slipsweep.kernels.sine.cycles import lane_attenuation, lane_recoupling
@@ -22,7 +22,6 @@ from slipsweep.kernels.sine.lanes import (
     GAIN,
     HELD,
     HIGHEST,
-    LEVEL,
     MOST,
     MOVED,
     PEAK,
@@ -99,8 +98,7 @@ def lane_pulses(kind: int, options: Options, lanes: np.ndarray) -> None:
 @scalar
 def go_on(shape: int, count: int, options: Options, lanes: np.ndarray) -> None:
     """The pulses after the first half of `count` lanes that stick at Üg = Üy when at rest, but come there in motion."""
-    for j in range(count if options.cycles <= MOST_PULSES else 0):
-        lanes[LEVEL + j] = lane_response(lanes, j, lanes[YIELD + j], options.g)
+    for j in range(count):
         rest = lanes[GAIN + j], lanes[_WHOLE + j], lanes[_WHOLE_PEAK + j]
         follow_pulses(shape, options, options.cycles, True, rest, lanes, j)
 
