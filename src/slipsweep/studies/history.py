@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.engine import Problem, Request
-from slipsweep.grid.plans import check_problem, plan_sweep
+from slipsweep.grid.plans import Plan, check_problem, plan_sweep
 from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
 from slipsweep.grid.tables import Table, Variable
@@ -59,12 +60,8 @@ def history_table(
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    inputs = {name: variable.values for name, variable in plan.coords.items()}
-    kernel = record_history if isinstance(problem.excitation, Record) else history
-    # the first history of all waits for two kernels: where there are two processors, not for one after the other
-    with kernel.compiled_elsewhere(_arguments(problem, inputs, np.empty(0))):
-        summary = plan.solve()
-    one = _History(problem, inputs, summary)
+    one = _History(problem, plan)
+    summary = one.summary
     if times is None:
         points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
         points = check_whole("points_per_cycle", points, 4, MOST_POINTS)
@@ -94,24 +91,29 @@ def _checked(times: Any, least: float) -> Floats:
     return grid
 
 
-def _arguments(problem: Problem, inputs: Mapping[str, Floats], phases: Floats) -> tuple[Any, ...]:
-    """Those of the kernel that samples one case at phases; it fills the last, (phase, column of `HISTORY`)."""
-    motion, values = problem.excitation, engine.kernel_inputs(Request(problem, (), inputs, ()))[0]
-    wave = wave_of_record(motion, float(inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
-    table = np.empty((phases.size, len(HISTORY)))
-    return np.repeat([float(value) for value in values], TILE), problem.options(True), wave, phases, table
-
-
 @dataclass(frozen=True)
 class _History:
-    """One case, and its results as a sweep gives them.
+    """One case, its results as a sweep gives them, and its history.
 
     Phases are ωt; under a record the times at time scale 1 stand in their place.
     """
 
     problem: Problem
-    inputs: Mapping[str, Floats]
-    summary: Table
+    plan: Plan
+
+    @cached_property
+    def inputs(self) -> Mapping[str, Floats]:
+        """The case."""
+        return {name: variable.values for name, variable in self.plan.coords.items()}
+
+    @cached_property
+    def summary(self) -> Table:
+        """Its results as a sweep gives them.
+
+        The first history of all waits for two kernels: where there are two processors, not for one after the other.
+        """
+        with self._kernel.compiled_elsewhere(self._arguments(np.empty(0))):
+            return self.plan.solve()
 
     @property
     def unit(self) -> float:
@@ -126,10 +128,22 @@ class _History:
     def _valueless(self) -> int:
         return int(self.summary["validity"].item()) & VALUELESS
 
+    @property
+    def _kernel(self) -> Any:
+        """What samples the case."""
+        return record_history if isinstance(self.problem.excitation, Record) else history
+
+    def _arguments(self, phases: Floats) -> tuple[Any, ...]:
+        """Of that kernel; it fills the last, (phase, column of `HISTORY`)."""
+        motion = self.problem.excitation
+        wave = wave_of_record(motion, float(self.inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
+        cells = np.repeat([float(values) for values in engine.kernel_inputs(self._asked)[0]], TILE)
+        return cells, self.problem.options(True), wave, phases, np.empty((phases.size, len(HISTORY)))
+
     def sampled(self, phases: Floats) -> Floats:
         """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
-        arguments = _arguments(self.problem, self.inputs, phases)
-        (record_history if isinstance(self.problem.excitation, Record) else history)(*arguments)
+        arguments = self._arguments(phases)
+        self._kernel(*arguments)
         table: Floats = arguments[-1]
         if self._valueless:  # from the beginning on, also where the flag is raised later
             table[:, 1:] = math.nan
