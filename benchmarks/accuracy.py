@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 import slipsweep
-from benchmarks.grids import G
+from benchmarks.grids import RULES, G
 from benchmarks.machine import DOCS, RESULTS, measured_on, number, table
 from tests.support.reference import solve
 
 WANTED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
-RULES = ("rectangle", "trapezoid", "simpson")
 REGIMES = ("stick_slip", "continuous", "newmark", "hard")
 
 #: θ (degrees) and μs of the cells brought near yield.

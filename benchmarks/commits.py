@@ -15,7 +15,8 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import matplotlib
@@ -124,15 +125,23 @@ def lay_out(commit: str, folder: Path) -> None:
         tar.extractall(folder, filter="data")
 
 
-def started(folder: Path, many: float, code: str = CHILD) -> subprocess.Popen[str]:
-    """A process that solves with the sources in a folder."""
+@contextmanager
+def running(commits: list[str], many: float, code: str = CHILD) -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """A process for each of some commits that solves with its sources."""
     record = ROOT / "sweeps" / "data" / "synthetic.csv"
-    # a folder of its own for compiled code: in a common one only that of the latest four versions is kept
-    own = {"PYTHONPATH": str(folder / "src"), "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_NUM_THREADS": "1"}
-    return subprocess.Popen(
-        [sys.executable, "-c", code, str(record), str(many)],
-        cwd=folder, env=os.environ | own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        children = {}
+        for commit in commits:
+            folder = Path(name) / commit
+            lay_out(commit, folder)
+            # a folder of its own for compiled code: in a common one only that of the latest four versions is kept
+            own = {"PYTHONPATH": f"{folder}/src", "NUMBA_CACHE_DIR": f"{folder}/cache", "NUMBA_NUM_THREADS": "1"}
+            child = subprocess.Popen(
+                [sys.executable, "-c", code, str(record), str(many)],
+                cwd=folder, env=os.environ | own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            )  # fmt: skip
+            children[commit] = stack.enter_context(child)
+        yield children  # each ends when its input does
 
 
 def ask(child: subprocess.Popen[str], task: str) -> None:
@@ -151,11 +160,7 @@ def answer(child: subprocess.Popen[str]) -> float:
 def measured(commits: list[str], rounds: int, many: float) -> dict[str, dict[str, list[float]]]:
     """Seconds of every round by task and commit; a round before the others compiles, all commits at the same time."""
     found: dict[str, dict[str, list[float]]] = {task: {} for task in TASKS}
-    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
-        children = {}
-        for commit in commits:
-            lay_out(commit, Path(name) / commit)
-            children[commit] = stack.enter_context(started(Path(name) / commit, many))
+    with running(commits, many) as children:
         for task, taken in found.items():
             for child in children.values():
                 ask(child, task)
@@ -164,9 +169,6 @@ def measured(commits: list[str], rounds: int, many: float) -> dict[str, dict[str
                 for commit, seconds in taken.items():
                     ask(children[commit], task)
                     seconds.append(answer(children[commit]))
-        for child in children.values():
-            assert child.stdin
-            child.stdin.close()
     return found
 
 

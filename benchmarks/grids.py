@@ -7,11 +7,15 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import SlidingMode, Validity
+from slipsweep.model.options import Rule
 
 G = 9.81
 
 #: Regimes, and the options that go with them.
 REGIMES: dict[str, dict[str, Any]] = {"stuck": {}, "stick_slip": {}, "continuous": {}, "newmark": {"model": "newmark"}}
+
+#: The rules of the stepping solver.
+RULES: tuple[Rule, ...] = ("rectangle", "trapezoid", "simpson")
 
 #: A stick-slip slide closer to yield than this is stepped by finer steps of its own.
 _CLEAR_OF_YIELD = 1.01

@@ -18,12 +18,11 @@ import xarray as xr
 
 import slipsweep
 from benchmarks import model, sample
-from benchmarks.grids import REGIMES, design_grid, regime_box, regime_cells
+from benchmarks.grids import REGIMES, RULES, design_grid, regime_box, regime_cells
 from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
 from slipsweep.model.options import Rule
 
 STEPS = 1024
-RULES: tuple[Rule, ...] = ("rectangle", "trapezoid", "simpson")
 _ONLY: dict[str, Any] = {"variables": ["permanent_displacement"]}
 
 

@@ -17,11 +17,10 @@ import numpy as np
 
 import slipsweep
 from benchmarks import outside, sample
+from benchmarks.grids import RULES
 from benchmarks.machine import arguments, measured_on, number, table
 from benchmarks.sample import Array, Group
-from slipsweep.model.options import Rule
 
-RULES: tuple[Rule, ...] = ("rectangle", "trapezoid", "simpson")
 STEPS = tuple(2**k for k in range(5, 15))
 
 #: Cells at a time: enough to fill lanes and hide a call, few enough for small steps.

@@ -1,19 +1,15 @@
 """What a cell takes by few steps and by many, and one step more, over the time of the first version of `commits`.
 
-``python -m benchmarks.steps`` writes steps.md.  Two versions are laid out and run as `benchmarks.commits` does, a
-process of one thread for each, in turn.
+``python -m benchmarks.steps`` writes steps.md.  Two versions run in turn as those of `benchmarks.commits` do, a
+process of one thread for each.
 """
 
 import statistics
-import tempfile
-from contextlib import ExitStack
-from pathlib import Path
 
-from benchmarks.commits import BASE, answer, ask, git, lay_out, started
-from benchmarks.grids import BOXES, REGIMES, G
+from benchmarks.commits import BASE, answer, ask, git, running
+from benchmarks.grids import BOXES, REGIMES, RULES, G
 from benchmarks.machine import arguments, measured_on, number, table
 
-RULES = ("rectangle", "trapezoid", "simpson")
 COUNTS = (64, 1024, 4096)
 
 #: Cells along θ and μs; eight times as many along the amplitude.
@@ -58,25 +54,18 @@ def main() -> None:
     rounds, rules, many = (1, RULES[:1], 0.2) if given.tiny else (given.rounds, RULES, 1.0)
     versions = [BASE, git("rev-parse", "HEAD")]
     cells, rows = 8 * max(2, int(SIDE * many)) ** 3, []
-    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
-        children = []
-        for version in versions:
-            lay_out(version, Path(name) / version)
-            children.append(stack.enter_context(started(Path(name) / version, many, CHILD)))
-        for regime in (name for name in REGIMES if name != "stuck"):
+    with running(versions, many, CHILD) as children:
+        for regime in (regime for regime in REGIMES if regime != "stuck"):
             for rule in rules:
                 found: dict[int, list[list[float]]] = {}
                 for count in COUNTS:
                     seconds: list[list[float]] = [[], []]
                     for _ in range(rounds + 1):
-                        for child, taken in zip(children, seconds, strict=True):
+                        for child, taken in zip(children.values(), seconds, strict=True):
                             ask(child, f"{regime} {rule} {count}")
                             taken.append(answer(child))
                     found[count] = [taken[1:] for taken in seconds]  # the first may have compiled
                 rows.append(row_of(regime, rule, found, cells))
-        for child in children:
-            assert child.stdin
-            child.stdin.close()
     header = ["regime", "rule", *(f"{count} steps" for count in COUNTS), "a step more", "ns"]
     about = (
         f"Processor time of version {versions[1][:7]} over that of {versions[0]}: of a cell by so many steps a cycle, "

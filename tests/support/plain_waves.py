@@ -19,8 +19,8 @@ from tests.support.strategies import G
 
 Array = NDArray[np.float64]
 
-#: The largest relative difference, some ten times what 30 million well-conditioned cells have shown, and the largest in
-#: parts of what moves the block, over which D is a difference.
+#: The largest relative difference, and the largest in parts of what moves the block, of which D is a difference: a
+#: dozen times what five million cells have shown (benchmarks/results/agreement.md).
 FLOOR, ROUNDING = 1e-9, 1e-14
 
 #: Relative moves of friction and amplitude, of some roundings, and how much more than by these two ways may differ:
