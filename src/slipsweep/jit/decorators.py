@@ -5,17 +5,12 @@ from typing import Any, TypeVar
 
 import numba
 
-from slipsweep.jit import form
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def _part(**options: Any) -> Callable[[_Function], _Function]:
     """Decorator of functions that kernels are made of, with options of `numba.njit`."""
-
-    def decorate(function: Any) -> Any:
-        return function if numba.config.DISABLE_JIT else form.part(function, **options)
-
+    decorate: Callable[[_Function], _Function] = numba.njit(nogil=True, error_model="numpy", **options)
     return decorate
 
 
@@ -28,7 +23,7 @@ summed = _part(fastmath={"contract", "arcp", "reassoc", "nsz"})
 
 #: The same for what stands in loops over cells: LLVM vectorises a loop only if everything
 #: in it is inlined, which it does not do by itself with functions as long as these.
-in_lanes = _part(fastmath={"contract", "arcp"}, forceinline=True)
+inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
 
 #: The same for elementary functions, which have no division to share.
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)

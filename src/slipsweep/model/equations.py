@@ -9,7 +9,7 @@ were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 
 import math
 
-from slipsweep.jit.decorators import in_lanes
+from slipsweep.jit.decorators import inlined
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model.variables import SlidingMode
 
@@ -21,19 +21,19 @@ CONTINUOUS = int(SlidingMode.CONTINUOUS)
 CONTINUOUS_MINIMUM_FRICTION = 0.01
 
 
-@in_lanes
+@inlined
 def coulomb_yield_acceleration(mu_s: float, tan_theta: float, g: float) -> float:
     """Üy of a Coulomb interface, g tan(φs − θ), m/s²."""
     return g * (mu_s - tan_theta) / (1.0 + mu_s * tan_theta)
 
 
-@in_lanes
+@inlined
 def normal_acceleration(ground_acceleration: float, tan_theta: float, g: float) -> float:
     """Eqs. 2 and 3: normal force over m cos θ, n(t) = g + Üg tan θ, m/s²."""
     return g + ground_acceleration * tan_theta
 
 
-@in_lanes
+@inlined
 def mobilised_friction(
     ground_acceleration: float, block_acceleration: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -42,9 +42,9 @@ def mobilised_friction(
     return mu_s - tan_theta - (abs(ground_acceleration) - abs(block_acceleration) - g * tan_theta) / n
 
 
-@in_lanes
+@inlined
 def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
-    """Eq. 4 as what the block falls short of the plane's acceleration, |Üg| − |Ü|, m/s².
+    """Eq. 4 as what the block falls short of the base's acceleration, |Üg| − |Ü|, m/s².
 
     n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
     failure Üg is small against g tan θ, which would take its digits (docs/numerics.md#eq-4-as-a-lag).
@@ -52,7 +52,7 @@ def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: flo
     return g * (mu_s - friction) + drift(ground_acceleration, friction, mu_s, tan_theta)
 
 
-@in_lanes
+@inlined
 def drift(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float) -> float:
     """The part of `lag` that turns its sign with Üg, Üg tan θ (μs − tan θ − μ), m/s².
 
@@ -62,7 +62,7 @@ def drift(ground_acceleration: float, friction: float, mu_s: float, tan_theta: f
     return ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
 
 
-@in_lanes
+@inlined
 def relative_acceleration(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -70,38 +70,37 @@ def relative_acceleration(
     return math.copysign(1.0, ground_acceleration) * lag(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
-@in_lanes
+@inlined
 def relative_acceleration_slope(
-    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, decay: float, g: float
+    ground_acceleration: float, friction: float, friction_slope: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
-    """dD/dÜg of Eq. 4 with the friction of Eq. 6, `decay` = λ/g; the slope of Ü is 1 − dD/dÜg."""
+    """dD/dÜg of Eq. 4, `friction_slope` = dμ/d|Üg|; the slope of Ü is 1 − dD/dÜg."""
     n = normal_acceleration(ground_acceleration, tan_theta, g)
-    return math.copysign(tan_theta, ground_acceleration) * (mu_s - tan_theta - friction) + n * friction * decay
+    return math.copysign(tan_theta, ground_acceleration) * (mu_s - tan_theta - friction) - n * friction_slope
 
 
-@in_lanes
+@inlined
 def relative_acceleration_curvature(
-    ground_acceleration: float, friction: float, tan_theta: float, decay: float, g: float
+    ground_acceleration: float, friction_slope: float, friction_curvature: float, tan_theta: float, g: float
 ) -> float:
-    """d²D/dÜg² of Eq. 4 with Eq. 6, as `relative_acceleration_slope`."""
+    """d²D/dÜg² of Eq. 4, from dμ/d|Üg| and d²μ/d|Üg|²."""
     n = normal_acceleration(ground_acceleration, tan_theta, g)
-    turned = math.copysign(decay, ground_acceleration)
-    return friction * turned * (math.copysign(2.0 * tan_theta, ground_acceleration) - n * decay)
+    return -2.0 * tan_theta * friction_slope - math.copysign(n * friction_curvature, ground_acceleration)
 
 
-@in_lanes
+@inlined
 def block_acceleration(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
-    """Eq. 4: response of the sliding block to the plane's acceleration, m/s²."""
+    """Eq. 4: response of the sliding block to the base's acceleration, m/s²."""
     return ground_acceleration - relative_acceleration(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
-@in_lanes
+@inlined
 def original_friction_coefficient(ground_acceleration: float, mu_s: float, decay_rate: float, g: float) -> float:
     """Eq. 5: the original friction law, which starts from the static coefficient."""
     return friction_coefficient(ground_acceleration, mu_s, 0.0, decay_rate, g)
 
 
-@in_lanes
+@inlined
 def friction_coefficient(
     ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> float:
@@ -109,56 +108,56 @@ def friction_coefficient(
     return (mu_s + delta_mu) * exp(-decay_rate * abs(ground_acceleration) / g)
 
 
-@in_lanes
+@inlined
 def limit_denominator(mu_s: float, tan_theta: float) -> float:
     """Denominator of Eq. 7; where it is not positive the interface has no limit."""
     return 1.0 - tan_theta * (mu_s - tan_theta)
 
 
-@in_lanes
+@inlined
 def limiting_acceleration(yield_acceleration: float, mu_s: float, tan_theta: float, g: float) -> float:
     """Eq. 7: the largest acceleration the interface transmits (Eq. 4 with μ = 0, Ü = Üy), m/s²."""
     return (yield_acceleration + g * mu_s) / limit_denominator(mu_s, tan_theta)
 
 
-@in_lanes
+@inlined
 def acceleration_ratio(amplitude: float, limiting_acceleration: float) -> float:
-    """Eq. 8: ξ, the plane's peak acceleration over the limiting one."""
+    """Eq. 8: ξ, the base's peak acceleration over the limiting one."""
     return amplitude / limiting_acceleration
 
 
-@in_lanes
+@inlined
 def minimum_friction(mu_s: float, ratio: float) -> float:
     """Eq. 9: friction that remains at the peak, μs² ξ in stick-slip, 0.01 in continuous sliding."""
     return mu_s * mu_s * ratio if ratio <= 1.0 else CONTINUOUS_MINIMUM_FRICTION
 
 
-@in_lanes
+@inlined
 def delta_mu(mu_s: float, ratio: float) -> float:
     """Eqs. 10 (continuous, ξ > 1) and 11 (stick-slip, ξ ≤ 1): friction above static."""
     # without a branch, which would keep loops over cells from becoming SIMD
     return mu_s * (max(ratio, 1.0 / ratio) - 1.0)
 
 
-@in_lanes
+@inlined
 def decay_rate(amplitude: float, mu_s: float, delta_mu: float, minimum_friction: float, g: float) -> float:
     """Eq. 6 solved for λ with μ = μmin at the peak of the motion."""
     return g / amplitude * log((mu_s + delta_mu) / minimum_friction)
 
 
-@in_lanes
+@inlined
 def attenuation_coefficient(peak_block_acceleration: float, g: float) -> float:
     """Eq. 12: Kd = Ümax / g."""
     return peak_block_acceleration / g
 
 
-@in_lanes
+@inlined
 def attenuated_velocity(velocity: float, peak_block_acceleration: float, duration: float) -> float:
     """Eq. 12: relative velocity after `duration`, g Kd = Ümax, not below zero; as the rate is constant, in one step."""
     return max(velocity - peak_block_acceleration * duration, 0.0)
 
 
-@in_lanes
+@inlined
 def attenuated_displacement(velocity: float, peak_block_acceleration: float, duration: float) -> float:
     """Eq. 12: relative displacement in `duration`, which may be infinite, or up to the stop."""
     stops = velocity <= peak_block_acceleration * duration
@@ -166,7 +165,7 @@ def attenuated_displacement(velocity: float, peak_block_acceleration: float, dur
     return to_the_stop if stops else (velocity - 0.5 * peak_block_acceleration * duration) * duration
 
 
-@in_lanes
+@inlined
 def sliding_mode(amplitude: float, yield_acceleration: float, limiting_acceleration: float) -> int:
     """Mode of the motion: stuck up to the yield acceleration, continuous beyond Eq. 7, else stick-slip."""
     slides = CONTINUOUS if amplitude > limiting_acceleration else STICK_SLIP

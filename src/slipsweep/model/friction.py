@@ -1,0 +1,133 @@
+"""Friction laws: the friction coefficient as a function of the base's acceleration.
+
+A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone and takes any law; the exact
+kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of the paper is `EXPONENTIAL`, Eq. 6;
+its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.decorators import inlined
+from slipsweep.jit.elementary import exp, log
+from slipsweep.model import equations as eq
+
+
+class FrictionLaw(NamedTuple):
+    """What the kernels need of a friction law: jitted functions of numbers.
+
+    μs, Δμ and λ are the parameters of every law (`mu_s`, `delta_mu`, `decay_rate`); what λ means is the law's own.
+
+    Attributes
+    ----------
+    friction : callable
+        ``friction(ground_acceleration, mu_s, delta_mu, decay_rate, g)``: μ at Üg of either sign.
+    derivatives : callable, optional
+        ``derivatives(friction, decay_rate, g)``: dμ/d|Üg| and d²μ/d|Üg|², where the law gives `friction`.
+    inflection : callable, optional
+        ``inflection(tan_theta, decay_rate, g)``: Üg up to which Ü of Eq. 4 is concave; it is convex beyond.
+    static_acceleration : callable, optional
+        ``static_acceleration(mu_s, delta_mu, decay_rate, g)``: |Üg| at which μ is μs.
+    moments : callable, optional
+        ``moments(start, change, mu_s, delta_mu, decay_rate, g)``: ∫ μ times 1, 1 − w, w and w (1 − w) over w from
+        0 to 1, where |Üg| = start + w change.
+    decay_length : callable, optional
+        ``decay_length(decay_rate, g)``: the change of |Üg| over which μ falls to a part 1/e, or less.
+    """
+
+    friction: Callable[..., float]
+    derivatives: Callable[..., tuple[float, float]] | None = None
+    inflection: Callable[..., float] | None = None
+    static_acceleration: Callable[..., float] | None = None
+    moments: Callable[..., tuple[float, float, float, float]] | None = None
+    decay_length: Callable[..., float] | None = None
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the functions that the exact kernel needs and the law does not give."""
+        return tuple(name for name, function in self._asdict().items() if function is None)
+
+
+@inlined
+def exponential_derivatives(friction: float, decay_rate: float, g: float) -> tuple[float, float]:
+    """Derivatives of Eq. 6 by |Üg|: −(λ/g) μ and (λ/g)² μ."""
+    rate = decay_rate / g
+    return -rate * friction, rate * rate * friction
+
+
+@inlined
+def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> float:
+    """Where d²Ü/dÜg² of Eqs. 4 and 6 turns positive: (2 tan θ / λ − 1) g / tan θ; not positive where λ ≥ 2 tan θ.
+
+    docs/numerics.md#slope-and-inflection
+    """
+    return (2.0 * tan_theta / decay_rate - 1.0) * g / tan_theta
+
+
+@inlined
+def exponential_static_acceleration(mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
+    """|Üg| at which Eq. 6 gives μs: (g/λ) ln((μs + Δμ)/μs)."""
+    return g / decay_rate * log((mu_s + delta_mu) / mu_s)
+
+
+@inlined
+def exponential_decay_length(decay_rate: float, g: float) -> float:
+    """g/λ, over which μ of Eq. 6 falls to a part 1/e."""
+    return g / decay_rate
+
+
+#: From here on the moments' closed forms lose less than a digit; below, φ₃'s power series Σ (−z)^k / (k + 3)! is
+#: summed.  From `_DECAYED` on e^(−z) is 0.
+_SERIES_END, _DECAYED = 2.0, 708.0
+_SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
+
+
+@inlined
+def moments_of_decay(z: float) -> tuple[float, float, float, float]:
+    """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
+
+    The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z = 2 that is
+    summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
+    """
+    # both without a branch, so that a loop over pieces becomes SIMD
+    small, large = min(z, _SERIES_END), max(z, _SERIES_END)
+    third = 0.0
+    for k in range(_SERIES.size - 1, -1, -1):
+        third = _SERIES[k] - small * third
+    early = 0.5 - small * third
+    whole = 1.0 - small * early
+    decayed = exp(-large) if large < _DECAYED else 0.0
+    all_over = (1.0 - decayed) / large
+    before, after = (1.0 - all_over) / large, (all_over - decayed) / large
+    if z < _SERIES_END:
+        return whole, early, whole - early, early - 2.0 * third
+    return all_over, before, after, (before - after) / large
+
+
+@inlined
+def exponential_moments(
+    start: float, change: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
+) -> tuple[float, float, float, float]:
+    """Moments of Eq. 6 where |Üg| goes along a straight line from `start` by `change` (docs/numerics.md#straight-pieces).
+
+    The exponential is taken from the end where the friction is larger, so that its argument is never positive:
+    nothing overflows, however large λ is.
+    """
+    largest = eq.friction_coefficient(min(start, start + change), mu_s, delta_mu, decay_rate, g)
+    whole, larger, smaller, both = moments_of_decay(decay_rate / g * abs(change))
+    early, late = (smaller, larger) if change < 0.0 else (larger, smaller)
+    return largest * whole, largest * early, largest * late, largest * both
+
+
+#: Eq. 6, μ = (μs + Δμ) exp(−λ|Üg|/g), and with Δμ = 0 Eq. 5.
+EXPONENTIAL = FrictionLaw(
+    friction=eq.friction_coefficient,
+    derivatives=exponential_derivatives,
+    inflection=exponential_inflection,
+    static_acceleration=exponential_static_acceleration,
+    moments=exponential_moments,
+    decay_length=exponential_decay_length,
+)
