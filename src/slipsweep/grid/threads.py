@@ -1,6 +1,6 @@
 """How threads are shared between slipsweep, dask and numba.
 
-One policy, here (and, how many processors there are to use, in `slipsweep.jit.elsewhere`) and nowhere else:
+One policy, here and nowhere else:
 
 * Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, so
   no numba threading layer is ever started and none can abort.
@@ -13,11 +13,12 @@ One policy, here (and, how many processors there are to use, in `slipsweep.jit.e
   exit.  Ctrl-C is heard between two calls of a kernel, a fraction of a second apart.
 """
 
+import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from slipsweep.jit import elsewhere
+import numba
 
 #: Cells of the cycle solver that one call of a kernel takes: long enough to hide the call
 #: (some 20 µs), short enough that Ctrl-C is heard.
@@ -25,11 +26,23 @@ MOST_CELLS_PER_CALL = 65536
 LEAST_CELLS_PER_CALL = 2048
 
 
+def cores() -> int:
+    """Processors that this process may use: the least of the affinity, `NUMBA_NUM_THREADS` and `OMP_NUM_THREADS`."""
+    affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    # the setting, not numba.get_num_threads(): that call starts a threading layer
+    limits = [numba.config.NUMBA_NUM_THREADS, affinity]
+    # a list has a number for each level of nesting; ours is the first
+    requested = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    if requested.isdigit() and int(requested) > 0:
+        limits.append(int(requested))
+    return int(min(limits))
+
+
 def thread_count() -> int:
     """Number of threads a call from here may use."""
     if threading.current_thread() is not threading.main_thread():
         return 1
-    return elsewhere.cores()
+    return cores()
 
 
 def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1) -> None:

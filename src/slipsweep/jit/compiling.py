@@ -1,59 +1,154 @@
-"""What this process compiles, for whoever shows it or tells it apart from solving."""
+"""Kernels: the functions that Python calls, compiled once and kept on disk for the processes that come after.
 
+* Of several processes that start at once the first compiles, under a lock; the others wait and load what it has kept.
+* What is kept lies in a folder whose name is a digest of all sources that kernels are made of: a changed equation is
+  never served from an old one.
+* Machine code is loaded from a folder of this user only, in which nobody else may write.  Where there is none, kernels
+  are compiled in memory.
+
+`NUMBA_CACHE_DIR` sets the folder, as it does for numba; `NUMBA_DISABLE_JIT` is honoured.
+"""
+
+import contextlib
+import functools
+import hashlib
+import os
+import shutil
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
-#: Called when a kernel begins to be compiled with which it is of how many ("1 of 2", "1 of at most 2"); with None
-#: when it is done.
+import filelock
+import numba
+import platformdirs
+
+#: Versions of the sources whose kernels are kept.
+_KEPT = 4
+
+#: Seconds to wait for another process that compiles.
+_PATIENCE = 300.0
+
+#: Called when this process begins to compile, with the kernel's name, and with None when it is done.
 Watcher = Callable[[str | None], None]
 
-_known: set[object] = set()
-_possible: set[object] = set()
-_begun: set[object] = set()
+_first_call = threading.RLock()
 _watchers: list[Watcher] = []
 _seconds = 0.0
-_since: float | None = None
+
+
+class Kernel:
+    """A function compiled by `numba.njit` when first called, or loaded from disk; it runs without the GIL.
+
+    Its arguments have the same types in every call.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self._function = function
+        self._compiled: Callable[..., Any] | None = function if numba.config.DISABLE_JIT else None
+
+    def __call__(self, *args: Any) -> Any:
+        """Run on `args`."""
+        if self._compiled is None:
+            with _first_call:
+                if self._compiled is None:
+                    return self._call_first(args)
+        return self._compiled(*args)
+
+    def _call_first(self, args: tuple[Any, ...]) -> Any:
+        folder = cache_folder()
+        with warnings.catch_warnings(), contextlib.ExitStack() as stack:
+            # numba's advice is for us, not for those who run a sweep
+            warnings.simplefilter("ignore", numba.NumbaWarning)
+            if folder is not None:
+                # no lock to be had, as on some network folders, or a full disk: each process compiles for itself
+                with contextlib.suppress(OSError, NotImplementedError):
+                    stack.enter_context(filelock.FileLock(folder / "compiling.lock", timeout=_PATIENCE))
+                    compiled = _jitted(self._function, folder)
+                    if not any(folder.glob(f"**/*.{self._function.__name__}-*.nbi")):
+                        stack.enter_context(_noted(self._function.__name__))
+                    result = compiled(*args)
+                    self._compiled = compiled
+                    return result
+            stack.enter_context(_noted(self._function.__name__))
+            compiled = _jitted(self._function, None)
+            result = compiled(*args)
+            self._compiled = compiled
+            return result
+
+
+#: Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
+kernel = Kernel
+
+
+def _jitted(function: Callable[..., Any], folder: Path | None) -> Callable[..., Any]:
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    if folder is None:
+        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+    given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+    try:
+        return numba.njit(cache=True, **options)(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = given
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Folder of the compiled kernels of these sources, or None where there is none that is this user's alone."""
+    given = numba.config.CACHE_DIR
+    base = Path(given) / "slipsweep" if given else platformdirs.user_cache_path("slipsweep")
+    folder = base / _digest_of_sources()
+    try:
+        if not base.is_absolute():  # no home
+            return None
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = base.stat()
+        if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
+            return None
+        folder.mkdir(exist_ok=True)
+        folder.touch()
+    except OSError:
+        return None
+    old = sorted((one for one in base.iterdir() if one.is_dir()), key=lambda one: one.stat().st_mtime)
+    for other in old[:-_KEPT]:
+        shutil.rmtree(other, ignore_errors=True)
+    return folder
+
+
+def _digest_of_sources() -> str:
+    package = Path(__file__).parents[1]
+    sources = [*(path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py"))]
+    digest = hashlib.sha256()
+    for path in sorted([*sources, package / "motion" / "pieces.py"]):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def seconds() -> float:
-    """Seconds that this process has spent compiling, or waiting for another that compiles for it."""
-    since = _since
-    return _seconds + (time.perf_counter() - since if since is not None else 0.0)
+    """Seconds that this process has spent compiling."""
+    return _seconds
 
 
-def expect(kernel: object, perhaps: bool = False) -> None:
-    """Say that a kernel will have to be compiled, or `perhaps`."""
-    (_possible if perhaps else _known).add(kernel)
-
-
-def _count() -> str:
-    """Which kernel is being compiled, of how many."""
-    most = len(_known | _possible)
-    return f"{len(_begun)} of {'at most ' if most > len(_known) else ''}{most}"
-
-
-@contextmanager
-def compiling(kernel: object) -> Iterator[None]:
-    """Say that a kernel is being compiled; one at a time."""
-    global _seconds, _since
-    _known.add(kernel)
-    _begun.add(kernel)
-    _since = started = time.perf_counter()
+@contextlib.contextmanager
+def _noted(name: str) -> Iterator[None]:
+    global _seconds
+    started = time.perf_counter()
     try:
         for watcher in _watchers:
-            watcher(_count())
+            watcher(name)
         yield
     finally:
-        _since = None
         _seconds += time.perf_counter() - started
         for watcher in _watchers:
             watcher(None)
 
 
-@contextmanager
+@contextlib.contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Tell `watcher` of what is compiled in the block, from any thread."""
+    """Call `watcher` when a kernel is compiled within the block, in any thread."""
     _watchers.append(watcher)
     try:
         yield

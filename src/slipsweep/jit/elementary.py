@@ -8,12 +8,8 @@ errors: docs/numerics.md#elementary-functions.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+import numpy as np
 
 from slipsweep.jit.decorators import elementary
 
@@ -32,24 +28,16 @@ _QUARTER_PI = 0.25 * math.pi
 _SQRT_HALF_BITS = 4604544271217802189
 
 
-@intrinsic
-def _float_of(typing_context: Any, bits: Any) -> tuple[Any, Callable[..., Any]]:
+@elementary
+def _float_of(bits: int) -> float:
     """The float64 whose bit pattern is an int64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.DoubleType())
-
-    return types.float64(types.int64), codegen
+    return np.int64(bits).view(np.float64)
 
 
-@intrinsic
-def _bits_of(typing_context: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
+@elementary
+def _bits_of(value: float) -> int:
     """The bit pattern of a float64 as an int64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), codegen
+    return np.float64(value).view(np.int64)
 
 
 @elementary
