@@ -167,12 +167,12 @@ def block_of(law: FrictionLaw, cell: Cell, rise: int, g: float) -> Block:
 
 
 @inlined
-def settled(validity: int, displacement: float, largest: float) -> int:
-    """The flags of a block once its displacement is known: what is said of a value needs one.
+def settled(validity: int, displacement: float, amplitude: float) -> int:
+    """The flags of a block once its W is known: what is said of a value needs one.
 
-    A displacement upslope within rounding of the `largest` that the block had is none.
+    A displacement that is zero to rounding, by the base's peak acceleration A/ω², is none upslope.
     """
-    moved = validity | (UPSLOPE if displacement < -1e-12 * largest else 0)
+    moved = validity | (UPSLOPE if displacement < -1e-12 * amplitude else 0)
     return moved if validity & NO_VALUE == 0 else validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
 
 

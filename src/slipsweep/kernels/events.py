@@ -1,11 +1,8 @@
-"""Events: where something of the motion passes zero.  The one root finder of the kernels, and its form in lanes.
+"""Events: where something of the motion passes zero.  The one root finder of the kernels.
 
-Both are Newton's.  `root_of` keeps it in a bracket, and halves that where Newton's steps would leave it
-or come to no end.  A root that it does not find is NaN, and so is then the displacement: the run ends
-with an error that names the cell (`block.UNSOLVED`).  `sine.roots` takes the lanes of a strip to their
-roots together, each from the side from which Newton's iteration comes there without a bracket, and marks those
-that are not there in the end: they are left to the former.  Why an event's error hardly matters:
-docs/numerics.md#finding-events.  `first_of` finds the first of many places, such as steps, at which something holds.
+It is Newton's iteration, kept in a bracket, which is halved where Newton's steps would leave it or come to no end.  A
+root that is not found is NaN, and so is then the displacement: the run ends with an error that names the cell
+(`block.UNSOLVED`).  Why an event's error hardly matters: docs/numerics.md#finding-events.
 """
 
 import math
@@ -25,17 +22,9 @@ _MOST_STEPS = 200
 #: double one by halves.
 _AT_ORIGIN = 1e-30
 
-#: Lanes that are solved together, until the last of their iterations has settled: neighbours take as many.
-#: Lanes are filled up to a multiple, so that no loop over them has a scalar remainder:
-#: its roundings would differ, and a cell's last digits depend on how many stand beside it.
-STRIP = 32
-
-
 def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Callable[..., float]:
     """The jitted root finder of a function: ``value_and_slope(where, x)`` gives f(x) and df/dx.
 
-    Bound here rather than passed as an argument: numba cannot keep a kernel on disk in which a
-    function is a value.
     """
 
     @scalar
@@ -66,20 +55,3 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
         return x if abs(x - origin) <= _AT_ORIGIN * width else math.nan
 
     return root
-
-
-def first_of(holds: Callable[[Any, int], bool]) -> Callable[..., int]:
-    """The jitted search by halves for the first place at which ``holds(where, k)``, which holds from there on.
-
-    Bound here for the same reason.
-    """
-
-    @scalar
-    def first(where: Any, low: int, high: int) -> int:
-        """The first place from `low` on, before `high`; `high` if there is none."""
-        while low < high:
-            middle = (low + high) // 2
-            low, high = (low, middle) if holds(where, middle) else (middle + 1, high)
-        return low
-
-    return first

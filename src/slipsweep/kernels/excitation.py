@@ -1,4 +1,4 @@
-"""The plane's motion in phase: a wave of peak 1 cut into monotone pieces, each a polynomial.
+"""The motion of the base in phase: a wave of peak 1 cut into monotone pieces, each a polynomial.
 
 On piece p the wave is w = top + c₁τ + c₂τ² + …, where τ is the phase counted from the piece's
 anchor: that end of it at which |w| is larger.  Differences from a peak thus come out of the sum,
@@ -6,7 +6,7 @@ not out of a subtraction of two numbers near 1, and keep their digits however sm
 (near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
 smooth waves are cut so short that the series are exact to rounding (`slipsweep.motion.waveforms`, which
 fills the table): one form for all waveforms.  Only the series of a plain sine has a name, and is
-evaluated by its shorter closed forms.  Times the amplitude A it is the plane's acceleration x.
+evaluated by its shorter closed forms.  Times the amplitude A it is the base's acceleration x.
 """
 
 import math
@@ -89,8 +89,8 @@ def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[flo
 
 
 @scalar
-def plane(pieces: np.ndarray, p: int, amplitude: float, tau: float) -> float:
-    """The plane's acceleration on piece p, τ from its anchor."""
+def base_acceleration(pieces: np.ndarray, p: int, amplitude: float, tau: float) -> float:
+    """The base's acceleration on piece p, τ from its anchor."""
     return amplitude * (pieces[p, TOP] + from_top(pieces, p, tau))
 
 
@@ -124,7 +124,7 @@ offset_root = root_of(_beyond)
 
 @scalar
 def offset_at(pieces: np.ndarray, p: int, amplitude: float, x: float) -> float:
-    """τ at which the plane's acceleration is x on piece p (the nearer end, if x lies beyond)."""
+    """τ at which the base's acceleration is x on piece p (the nearer end, if x lies beyond)."""
     far = pieces[p, BEGIN] + pieces[p, FINISH]  # one of them is 0
     wanted = (x - amplitude * pieces[p, TOP]) / amplitude
     farthest = pieces[p, FIRST] + pieces[p, LAST] - 2.0 * pieces[p, TOP]

@@ -35,7 +35,7 @@ def table_cycle(wave: Wave, n: int) -> int:
 
 @scalar
 def ground_history(block: Block, options: Options, wave: Wave, phases: np.ndarray, history: np.ndarray) -> None:
-    """Fill the plane's acceleration; at a jump, the value after it."""
+    """Fill the base's acceleration; at a jump, the value after it."""
     for at in range(phases.size):
         history[at, GROUND] = 0.0
         if phases[at] < 2.0 * math.pi * options.cycles:
@@ -78,13 +78,13 @@ def history_room(wave: Wave) -> Room:
     """Room with a log of as many legs as a pulse may have."""
     longest = 0
     for k in range(wave.height.size):
-        longest = max(longest, wave.stretch[k, 1] - wave.stretch[k, 0])
+        longest = max(longest, wave.interval[k, 1] - wave.interval[k, 0])
     return room_of(longest * MOST_LEGS + wave.pieces.shape[0] + 2, 0, 0)
 
 
 @scalar
 def begins_at(block: Block, wave: Wave, k: int) -> float:
-    """The table's phase at which the pulse of stretch k begins; infinite past the last."""
+    """The table's phase at which the pulse of interval k begins; infinite past the last."""
     if k >= wave.height.size:
         return math.inf
     p, tau = beginning(block, wave, k)
@@ -122,8 +122,8 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
     room = history_room(wave)
     at, velocity, displacement = 0, 0.0, 0.0
     k, repeat = first_pulse(block, wave, 0), 0
-    stretches = wave.height.size
-    while at < phases.size and k < stretches:
+    intervals = wave.height.size
+    while at < phases.size and k < intervals:
         # the plain cycle of the table comes again and again
         again = first_pulse(block, wave, k + 1)
         offset = 2.0 * math.pi * repeat
@@ -133,10 +133,10 @@ def stick_slip_history(block: Block, options: Options, wave: Wave, phases: np.nd
         at = sample_pulse(block, wave, room, start, until, offset, displacement, now.displacement, phases, at, history)
         velocity = now.velocity
         displacement += now.displacement
-        if again < stretches and repeat < wave.repeats - 1 and wave.stretch[again, 0] >= wave.cycle[wave.lead + 1]:
+        if again < intervals and repeat < wave.repeats - 1 and wave.interval[again, 0] >= wave.cycle[wave.lead + 1]:
             repeat += 1
             again = first_pulse(block, wave, 0)
-            while wave.stretch[again, 0] < wave.cycle[wave.lead]:
+            while wave.interval[again, 0] < wave.cycle[wave.lead]:
                 again = first_pulse(block, wave, again + 1)
         k = again
 
@@ -222,7 +222,7 @@ def sample_continuous_pulse(
 
 @scalar
 def recorded_ground(wave: Wave, scale: float, times: np.ndarray, history: np.ndarray) -> None:
-    """Fill the plane's acceleration under a record; at a jump, the value after it."""
+    """Fill the base's acceleration under a record; at a jump, the value after it."""
     p, pieces = 0, wave.pieces.shape[0]
     for at in range(times.size):
         while p < pieces and wave.pieces[p, END] <= times[at]:

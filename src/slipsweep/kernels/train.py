@@ -1,8 +1,6 @@
 """A train of pulses: what all of the shaking comes to, given how one pulse goes.
 
-A pulse begins where the plane's acceleration comes to Üy, or jumps past it, after it was not positive:
-there b is reset, and the velocity carried over is all that the past has left.  Both solvers bring
-their own `pulse`, a map from the velocity carried into one to the velocity carried into the next;
+Both solvers bring their own `pulse`, a map from the velocity with which one is entered to that with which the next is;
 what follows from that map over many cycles stands here.
 """
 
@@ -14,89 +12,52 @@ import numpy as np
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
-    NEWMARK,
     NO_VALUE,
     NOT_RECOUPLED,
     UNSOLVED,
-    YIELD_GOVERNS,
     Block,
-    Motion,
     Options,
-    stays_below_yield,
 )
 from slipsweep.kernels.pulse import Pulse, first_pulse
 from slipsweep.motion.pieces import END, START, Wave
 
-#: What is kept of a pulse from rest to rest: W, and the largest V.
-_MOVED, _HIGHEST = range(2)
-REST_COLUMNS = 2
-
 
 @scalar
-def yield_governs(block: Block, wave: Wave) -> bool:
-    """Whether Eq. 4 stays at or below the yield value over all that the plane rises through or jumps to.
+def keep(wave: Wave, k: int, now: Pulse, known: np.ndarray) -> None:
+    """Keep a pulse that began from rest in interval k, if it came to rest before the next interval.
 
-    Not said of Newmark's block, which knows no Eq. 4.
-    """
-    governs = block.rise != NEWMARK
-    for i in range(wave.rises.shape[0]):
-        high = block.amplitude * wave.rises[i, 1]
-        if governs and high > block.yield_acceleration:
-            low = max(block.amplitude * wave.rises[i, 0], block.yield_acceleration)
-            governs = stays_below_yield(block, low, high)
-    return governs
-
-
-@scalar
-def forget(rests: np.ndarray) -> None:
-    """Nothing is known of the pulses of a block yet; `rests` is (stretches, REST_COLUMNS)."""
-    for k in range(rests.shape[0]):
-        rests[k, _MOVED] = math.nan
-
-
-@scalar
-def remember(wave: Wave, k: int, now: Pulse, rests: np.ndarray) -> None:
-    """Keep a pulse that began from rest in stretch k, if it came to rest before the next stretch.
-
-    Up to there all stretches that are the `same` have the same pieces; its next pulse may come later, and did not
-    matter.
+    Up to there all intervals that are the `same` have the same pieces; its next pulse may come later, and did not
+    matter.  `known`, (intervals, 2), has W and the largest V of such pulses; W is NaN where none is kept.
     """
     last = wave.pieces.shape[0] - 1
-    until = wave.pieces[wave.stretch[k + 1, 0], START] if k + 1 < wave.height.size else wave.pieces[last, END]
+    until = wave.pieces[wave.interval[k + 1, 0], START] if k + 1 < wave.height.size else wave.pieces[last, END]
     if now.velocity == 0.0 and now.validity == 0 and now.stopped_at <= until:
-        rests[wave.same[k], _MOVED], rests[wave.same[k], _HIGHEST] = now.displacement, now.peak
-
-
-@scalar
-def remembered(wave: Wave, k: int, rests: np.ndarray) -> Pulse:
-    """The pulse from rest to rest in stretch k; its W is NaN where none is kept."""
-    same = wave.same[k]
-    return Pulse(0.0, rests[same, _MOVED], rests[same, _HIGHEST], 0.0, 0.0, 0)
+        known[wave.same[k], 0], known[wave.same[k], 1] = now.displacement, now.peak
 
 
 def train_of(
     pulse: Callable[[Block, Options, Wave, Any, int, int, float], Pulse],
-) -> Callable[[Block, Options, Wave, Any], Motion]:
+) -> Callable[[Block, Options, Wave, Any, np.ndarray], Pulse]:
     """The jitted train of a solver's pulses.
 
-    A pulse is given block, options, wave, what the solver itself has tabulated, the stretch it begins in,
-    the one in which the next begins (past the last, if none does) and the velocity carried into it.
-    In the solver's table, `rests` is room for what is kept of pulses from rest to rest.
+    A pulse is given block, options, wave, what the solver itself has tabulated, the interval it begins in,
+    the one in which the next begins (past the last, if none does) and the velocity with which it is entered.
     """
 
     @scalar
     def pulses(
-        block: Block, options: Options, wave: Wave, table: Any, k: int, until: int, velocity: float
+        block: Block, options: Options, wave: Wave, table: Any, k: int, until: int, velocity: float, known: np.ndarray
     ) -> tuple[Pulse, int]:
-        """Pulses from stretch k on, as long as they begin before piece `until`, as one; the next one's stretch."""
+        """Pulses from interval k on, as long as they begin before piece `until`, as one; the next one's interval."""
         displacement, peak, least, validity = 0.0, velocity, velocity, 0
-        while k < wave.height.size and wave.stretch[k, 0] < until:
+        while k < wave.height.size and wave.interval[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
-            now = remembered(wave, k, table.rests)
+            same = wave.same[k]
+            now = Pulse(0.0, known[same, 0], known[same, 1], 0.0, 0.0, 0.0, 0)
             if velocity > 0.0 or math.isnan(now.displacement):
                 now = pulse(block, options, wave, table, k, following, velocity)
                 if velocity == 0.0:
-                    remember(wave, k, now, table.rests)
+                    keep(wave, k, now, known)
             k, velocity = following, now.velocity
             displacement += now.displacement
             peak, least = max(peak, now.peak), min(least, now.least)
@@ -107,31 +68,27 @@ def train_of(
                 validity |= UNSOLVED
             if validity & NO_VALUE:
                 break
-        return Pulse(velocity, displacement, peak, least, 0.0, validity), k
+        return Pulse(velocity, displacement, peak, least, 0.0, 0.0, validity), k
 
     @scalar
-    def train(block: Block, options: Options, wave: Wave, table: Any) -> Motion:
-        """All pulses of a stick-slip (or Newmark) block.
+    def train(block: Block, options: Options, wave: Wave, table: Any, known: np.ndarray) -> Pulse:
+        """All pulses of a stick-slip (or Newmark) block, as one; `known` is a workspace, (intervals, 2).
 
         Where the map of the repeated cycle returns to a velocity seen before, the cycles in between
         repeat; where the block never rests within it, the velocity changes by the same amount
         each time and W is an arithmetic series.
         """
+        known[:, 0] = math.nan
         k = first_pulse(block, wave, 0)
-        if k == wave.height.size:
-            return Motion(0.0, 0.0, 0)
-        validity = YIELD_GOVERNS if yield_governs(block, wave) else 0
-        forget(table.rests)
-        now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0)
-        velocity, displacement, peak = now.velocity, now.displacement, now.peak
-        validity |= now.validity
+        now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0, known)
+        velocity, displacement, peak, validity = now.velocity, now.displacement, now.peak, now.validity
         # what the cycles before the repeated one (a ramp, say) leave is the first velocity to come back to
         seen_velocity, seen_displacement, seen_at, next_look = velocity, displacement, 0, 1
         done, left = 0, wave.repeats
         after = k
         while left > 0 and validity & NO_VALUE == 0:
             before = velocity
-            now, after = pulses(block, options, wave, table, k, wave.cycle[wave.lead + 1], before)
+            now, after = pulses(block, options, wave, table, k, wave.cycle[wave.lead + 1], before, known)
             validity |= now.validity
             if validity & NO_VALUE:
                 break
@@ -163,12 +120,12 @@ def train_of(
                 seen_velocity, seen_displacement, seen_at = velocity, displacement, done
                 next_look *= 2
         if validity & NO_VALUE == 0:
-            now, after = pulses(block, options, wave, table, after, wave.pieces.shape[0], velocity)
+            now, after = pulses(block, options, wave, table, after, wave.pieces.shape[0], velocity, known)
             validity |= now.validity
             displacement += now.displacement
             peak = max(peak, now.peak)
         if validity & NO_VALUE:
-            return Motion(math.nan, math.nan, validity)
-        return Motion(displacement, peak, validity)
+            displacement = peak = math.nan
+        return Pulse(velocity, displacement, peak, 0.0, 0.0, 0.0, validity)
 
     return train

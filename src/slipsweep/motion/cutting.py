@@ -7,11 +7,11 @@ where a smooth one would be too long for its polynomial).  `kernels.excitation` 
 phase on a piece, runs from `BEGIN` to `FINISH` (columns of ``pieces``), and `START` to `END` is the same
 in the table's phases.  Pieces do not depend on the cell.  What happens between two pieces: w
 goes from `LAST` of the one to `FIRST` of the other, whose `JUMPS` tells a jump upwards.  Before piece 0
-and after the last one the plane is at rest.  Cycle c of the table is the pieces ``cycle[c]`` to
+and after the last one the base is at rest.  Cycle c of the table is the pieces ``cycle[c]`` to
 ``cycle[c + 1] - 1``; cycle number `lead` comes `repeats` times (there is no such cycle where `repeats` is 0),
-all others once.  Cycles of the same number in ``shape`` have equal pieces.  Pulses happen in the `stretch`es
+all others once.  Cycles of the same number in ``shape`` have equal pieces.  Pulses happen in the ``interval``s
 with w > 0 whose ``height`` exceeds Üy/A: in each a slide begins, or goes on with b reset, where x
-first comes to Üy or jumps past it.  From there to the same place of the next such stretch the velocity
+first comes to Üy or jumps past it.  From there to the same place of the next such interval the velocity
 carried over is all that one pulse leaves to the next (`kernels.train`).
 """
 
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.pieces import END, JUMPS, START, Wave, pieces_of, stretches_of
+from slipsweep.motion.pieces import END, JUMPS, START, Wave, intervals_of, pieces_of
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
@@ -284,9 +284,9 @@ def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
     cycles, plain = waveform.cycles, _pieces(waveform.plain, 0)
     wraps = plain[0].first > 0.0 and plain[-1].last > 0.0
-    # a stretch that runs over from one cycle to the next makes the first cycle differ from the others
+    # an interval that runs over from one cycle to the next makes the first cycle differ from the others
     lead = min(math.ceil(waveform.ramp_in) + int(wraps), cycles)
-    # the last plain cycle stands apart, as another does not follow; where stretches run over, so does the one before
+    # the last plain cycle stands apart, as another does not follow; where intervals run over, so does the one before
     tail = min(math.ceil(waveform.ramp_out) + 1 + int(wraps), cycles - lead)
     repeats = cycles - lead - tail
     numbers = [*range(lead), *([lead] if repeats else []), *range(cycles - tail, cycles)]
@@ -308,16 +308,16 @@ def wave_of(waveform: Waveform) -> Wave:
         last=last,
         at_end=np.array([piece.at_end for piece in pieces]),
         coefficients=np.array([piece.coefficients for piece in pieces]),
-        arc=np.repeat([waveform.name in ("sine", "cosine") and not own for own in ramped], [len(row) for row in rows]),
+        arc=np.repeat([_is_sine(waveform) and not own for own in ramped], [len(row) for row in rows]),
     )
-    stretch, height = stretches_of(table)
+    interval, height = intervals_of(table)
     return Wave(
         pieces=table,
         cycle=np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64),
         shape=np.array(shape, np.int64),
-        stretch=stretch,
+        interval=interval,
         height=height,
-        same=_same(table, stretch),
+        same=_same(table, interval),
         rises=_rises(first, last, table[:, JUMPS] > 0.0),
         highest=float(max(first.max(), last.max())),
         lowest=float(min(first.min(), last.min())),
@@ -327,11 +327,19 @@ def wave_of(waveform: Waveform) -> Wave:
     )
 
 
-def _same(pieces: NDArray[np.float64], stretch: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The first stretch of the same pieces as each up to the stretch after it, but for when they come."""
+def _is_sine(waveform: Waveform) -> bool:
+    """Whether a waveform is a sine of whatever phase, whose pieces have closed forms."""
+    single = isinstance(waveform, Harmonics) and sum(a != 0.0 for a in waveform.amplitudes) == 1
+    if single and isinstance(waveform, Harmonics):
+        return waveform.multiples[int(np.argmax(np.abs(waveform.amplitudes)))] == 1
+    return waveform.name in ("sine", "cosine")
+
+
+def _same(pieces: NDArray[np.float64], interval: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first interval of the same pieces as each up to the interval after it, but for when they come."""
     shapes = np.delete(pieces, [START, END], axis=1)
     first: dict[bytes, int] = {}
-    ways = itertools.pairwise([*stretch[:, 0], pieces.shape[0]])
+    ways = itertools.pairwise([*interval[:, 0], pieces.shape[0]])
     return np.array([first.setdefault(shapes[p:q].tobytes(), k) for k, (p, q) in enumerate(ways)], np.int64)
 
 
@@ -367,36 +375,36 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
     if known is not None and known[0]() is record:
         return known[1]
     wave = _record_cut(record, polarity)
-    room = MOST_TABLES - wave.pieces.nbytes
-    while _TABLES and sum(own.pieces.nbytes for _, own in list(_TABLES.values())) > room:
+    left = MOST_TABLES - wave.pieces.nbytes
+    while _TABLES and sum(own.pieces.nbytes for _, own in list(_TABLES.values())) > left:
         _TABLES.pop(next(iter(_TABLES)), None)
     _TABLES[key] = (weakref.ref(record, lambda _: _TABLES.pop(key, None)), wave)
     return wave
 
 
-def _intervals(times: NDArray[np.float64]) -> NDArray[np.float64]:
+def _spacing(times: NDArray[np.float64]) -> NDArray[np.float64]:
     """The intervals between samples: one, where the times are its multiples to rounding.
 
     Differences of times have the rounding of the times, 1e-10 of an interval after a million samples.
     """
-    interval = np.diff(times)
-    even = (times[-1] - times[0]) / interval.size
+    spacing = np.diff(times)
+    even = (times[-1] - times[0]) / spacing.size
     off = np.abs(times - (times[0] + even * np.arange(times.size))).max()
-    return np.full(interval.size, even) if off <= 2.0 * np.spacing(np.abs(times).max()) else interval
+    return np.full(spacing.size, even) if off <= 2.0 * np.spacing(np.abs(times).max()) else spacing
 
 
 def _record_cut(record: Record, polarity: float) -> Wave:
     times, values = record.times, polarity * record.acceleration
     with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
-        interval, change = _intervals(times), np.diff(values)
-        slope = change / interval
+        spacing, change = _spacing(times), np.diff(values)
+        slope = change / spacing
     # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
-    own = np.repeat(np.arange(interval.size), 1 + crosses)
+    own = np.repeat(np.arange(spacing.size), 1 + crosses)
     after = np.concatenate([[False], own[1:] == own[:-1]])
     before = crosses[own] & ~after
     first, last = np.where(after, 0.0, values[own]), np.where(before, 0.0, values[own + 1])
-    length = interval[own]
+    length = spacing[own]
     length[before | after] *= np.abs((last - first)[before | after] / change[own][before | after])
     pieces = pieces_of(
         start=np.where(after, times[own + 1] - length, times[own]),
@@ -406,14 +414,14 @@ def _record_cut(record: Record, polarity: float) -> Wave:
         last=last,
         at_end=np.abs(last) > np.abs(first),
         coefficients=np.where(first == last, 0.0, slope[own])[:, np.newaxis],
-        arc=np.zeros(own.size),
+        arc=np.zeros(own.size, np.bool_),
     )
-    stretch, height = stretches_of(pieces)
+    interval, height = intervals_of(pieces)
     return Wave(
         pieces=pieces,
         cycle=np.array([0, own.size], np.int64),
         shape=np.zeros(1, np.int64),
-        stretch=stretch,
+        interval=interval,
         height=height,
         same=np.arange(height.size),
         rises=np.empty((0, 2)),  # each pulse has its own

@@ -42,12 +42,12 @@ class Wave(NamedTuple):
         First piece of every cycle.
     shape : ndarray of int, shape (cycles in the table,)
         Cycles of one number have the same pieces.
-    stretch : ndarray of int, shape (stretches, 2)
+    interval : ndarray of int, shape (intervals, 2)
         Runs of pieces with w > 0: the first piece, and the first after it.
-    height : ndarray, shape (stretches,)
+    height : ndarray, shape (intervals,)
         Largest w of each.
-    same : ndarray of int, shape (stretches,)
-        The first stretch of the same pieces as each, those up to the stretch after it among them.
+    same : ndarray of int, shape (intervals,)
+        The first interval of the same pieces as each, those up to the interval after it among them.
     rises : ndarray, shape (ranges, 2)
         Ranges of w > 0 that are passed through, or jumped to, without falling; they do not overlap.
     highest, lowest : float
@@ -61,7 +61,7 @@ class Wave(NamedTuple):
     pieces: np.ndarray
     cycle: np.ndarray
     shape: np.ndarray
-    stretch: np.ndarray
+    interval: np.ndarray
     height: np.ndarray
     same: np.ndarray
     rises: np.ndarray
@@ -95,7 +95,7 @@ def pieces_of(
         TOP: np.where(at_end, last, first),
         DEGREE: degree,
         JUMPS: first > np.maximum(before, 0.0),
-        ARC: arc,
+        ARC: arc & (np.abs(np.where(at_end, last, first)) == 1.0) & (coefficients[:, 0] == 0.0),
     }
     curved = power.size > 1
     pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size + (NODES.size if curved else 0)))
@@ -123,14 +123,14 @@ def pieces_of(
     return pieces
 
 
-def stretches_of(pieces: np.ndarray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def intervals_of(pieces: np.ndarray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Runs of pieces above zero, the first and the first after each, and their heights; one that touches zero ends."""
     first, last = pieces[:, FIRST], pieces[:, LAST]
     above = np.concatenate([[False], first + last > 0.0, [False]])
     touches = np.concatenate([[False], (last[:-1] == 0.0) & (first[1:] == 0.0), [False]])
     starts = np.flatnonzero(above[1:-1] & (~above[:-2] | touches[:-1]))
     ends = np.flatnonzero(above[1:-1] & (~above[2:] | touches[1:])) + 1
-    stretch = np.column_stack([starts, ends]).astype(np.int64)
+    interval = np.column_stack([starts, ends]).astype(np.int64)
     top = np.concatenate([np.maximum(first, last), [0.0]])
-    height = np.maximum.reduceat(top, stretch.ravel())[::2].copy() if stretch.size else np.empty(0)
-    return stretch, height
+    height = np.maximum.reduceat(top, interval.ravel())[::2].copy() if interval.size else np.empty(0)
+    return interval, height

@@ -1,0 +1,136 @@
+"""Gains of V and W where the block follows Eq. 4 along a part of a piece: closed forms, or quadrature.
+
+The relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ) on the side ±1 of Üg = 0, x = Üg.
+docs/numerics.md#straight-pieces and docs/numerics.md#curved-pieces
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.elementary import versine
+from slipsweep.kernels.block import Block, friction
+from slipsweep.kernels.excitation import base_acceleration, offset_at
+from slipsweep.motion.pieces import (
+    ARC,
+    BEGIN,
+    COEFFICIENTS,
+    DEGREE,
+    FINISH,
+    FIRST,
+    LAST,
+    NODES,
+    TERM,
+    TOP,
+    WEIGHTS,
+)
+
+#: Where panels of the quadrature end, in e-foldings of the friction from the end where it is larger;
+#: past the third it has decayed to 1e-18.
+PANEL_BOUNDS = (6.0, 18.0, 42.0, math.inf)
+
+
+class Lag(NamedTuple):
+    """∫ (μs − μ) dτ and ∫ |x| (μs − tan θ − μ) dτ, and each with the weight end − τ.
+
+    Apart, because over a symmetric cycle the first must cancel to the last digit.
+    """
+
+    first: float
+    second: float
+    first_x: float
+    second_x: float
+
+
+@scalar
+def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
+    """`Lag` where |Üg| goes along a straight line, by `change`: closed forms of the law's moments."""
+    whole, early, late, both = block.law.moments(x, change, block.mu_s, block.delta_mu, block.decay_rate, block.g)
+    kept = block.mu_s - block.tan_theta
+    return Lag(
+        (block.mu_s - whole) * width,
+        (0.5 * block.mu_s - early) * width * width,
+        (kept * (x + 0.5 * change) - (x * whole + change * late)) * width,
+        (kept * (0.5 * x + change / 6.0) - (x * early + change * both)) * width * width,
+    )
+
+
+@scalar
+def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: float, x: np.ndarray) -> None:
+    """Fill in |Üg| at the nodes of the quadrature from `start` on: power by power, so that LLVM takes nodes together."""
+    top = pieces[p, TOP]
+    if pieces[p, ARC] > 0.0:
+        for node in range(NODES.size):
+            x[node] = amplitude * (1.0 - versine(start + width * NODES[node]))
+        return
+    for node in range(NODES.size):
+        x[node] = 0.0
+    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
+        coefficient = pieces[p, COEFFICIENTS + TERM * k]
+        for node in range(NODES.size):
+            x[node] = x[node] * (start + width * NODES[node]) + coefficient
+    for node in range(NODES.size):
+        x[node] = amplitude * abs(top + x[node] * (start + width * NODES[node]))
+
+
+@summed
+def curved_lag(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float, nodes: np.ndarray
+) -> Lag:
+    """`Lag` where |Üg| goes along a curve: Gauss-Legendre quadrature, panel by panel; `nodes` is a workspace."""
+    amplitude, mu_s, kept = block.amplitude, block.mu_s, block.mu_s - block.tan_theta
+    length = block.law.decay_length(block.decay_rate, block.g)
+    e_foldings = abs(x_end - x_start) / length
+    near, far = (start, end) if x_start <= x_end else (end, start)
+    least = min(x_start, x_end)
+    whole = start == pieces[p, BEGIN] and end == pieces[p, FINISH] and e_foldings <= PANEL_BOUNDS[0]
+    first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
+    for bound in PANEL_BOUNDS:
+        until = far
+        if e_foldings > bound:
+            until = offset_at(pieces, p, amplitude, math.copysign(least + bound * length, pieces[p, TOP]))
+        width = until - near
+        if whole:
+            for node in range(NODES.size):
+                nodes[node] = amplitude * pieces[p, pieces.shape[1] - NODES.size + node]
+        else:
+            at_nodes(pieces, p, amplitude, near, width, nodes)
+        for node in range(NODES.size):
+            x = nodes[node]
+            mu = friction(block, x)
+            weight = abs(width) * WEIGHTS[node]
+            left = end - (near + width * NODES[node])
+            lag, lag_x = weight * (mu_s - mu), weight * x * (kept - mu)
+            first += lag
+            second += left * lag
+            first_x += lag_x
+            second_x += left * lag_x
+        near = until
+        if e_foldings <= bound:
+            break
+    return Lag(first, second, first_x, second_x)
+
+
+@scalar
+def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float, nodes: np.ndarray) -> Lag:
+    """`Lag` over a part of piece p."""
+    amplitude = block.amplitude
+    # most parts begin or end where the piece does
+    x_start = amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
+    x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else base_acceleration(pieces, p, amplitude, end)
+    x_start, x_end = abs(x_start), abs(x_end)
+    if int(pieces[p, DEGREE]) <= 1:
+        return straight_lag(block, x_start, x_end - x_start, end - start)
+    return curved_lag(block, pieces, p, start, end, x_start, x_end, nodes)
+
+
+@scalar
+def eq4_integrals(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, nodes: np.ndarray
+) -> tuple[float, float]:
+    """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest, after Eq. 4."""
+    lag = lag_integrals(block, pieces, p, start, end, nodes)
+    side_g = math.copysign(block.g, pieces[p, TOP])
+    return side_g * lag.first + block.tan_theta * lag.first_x, side_g * lag.second + block.tan_theta * lag.second_x

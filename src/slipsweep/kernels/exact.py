@@ -1,0 +1,559 @@
+"""One pulse from event to event, for waves and records: the exact walk.
+
+While the base's acceleration Üg rises, the block sticks until t1 (`onset`), then slides in phases that end at events
+(`phase_on_rise`): its acceleration b is held, or follows Eq. 4.  While Üg falls b is held (`hold`); from Üg = 0 (t5) on
+Eq. 12 takes V down, or b is held on (`recouple`).  Each phase is integrated in closed form, or by quadrature to
+rounding (`eq4`).  docs/numerics.md#onset-and-switch and docs/numerics.md#stop
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.decorators import scalar
+from slipsweep.kernels import linear
+from slipsweep.kernels.block import (
+    INTEGRATE,
+    KD_NOT_POSITIVE,
+    LITERAL,
+    NEWMARK,
+    Block,
+    Options,
+    inflection,
+    opposite,
+    relative_acceleration,
+    relative_acceleration_root,
+    response,
+    response_root,
+    slope_root,
+    slopes,
+    starting_acceleration,
+    stays_below_yield,
+)
+from slipsweep.kernels.eq4 import eq4_integrals
+from slipsweep.kernels.events import root_of
+from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
+from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
+from slipsweep.model import equations as eq
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, LAST, NODES, START, Wave
+
+#: Signs at the start of a phase are read this fraction of the phase inside it, but no closer to the start than this
+#: fraction of that: where a phase ends at a turn of E, the sign just behind is known only beyond rounding.
+_SLIVER, _ROUNDING = 1e-10, 4.5e-16
+
+#: More phases than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
+MOST_PHASES = 32
+
+#: Kinds of motion in a log of it.
+HOLD, FOLLOW, ATTENUATE = range(3)
+
+#: A log of the motion, for time histories: its kind, the piece, τ and phase where it starts, phase at the end, and b, V
+#: and W at the start.
+LOG = np.dtype(
+    [
+        ("kind", "i8"), ("piece", "i8"), ("tau", "f8"), ("start", "f8"), ("end", "f8"),
+        ("held", "f8"), ("velocity", "f8"), ("displacement", "f8"),
+    ]
+)  # fmt: skip
+
+
+#: What Eq. 4 gains over a piece (`eq4.Lag`), and the most that V gains on it up to a zero of D (−∞, if it has none).
+GAINS = np.dtype([("first", "f8"), ("second", "f8"), ("first_x", "f8"), ("second_x", "f8"), ("highest", "f8")])
+
+
+class Workspace(NamedTuple):
+    """What the exact kernels write into, one for all cells.
+
+    `nodes` is for quadratures; `log` has one row for each part of the motion if a history is requested, else none;
+    `gains` has a row for each piece of a cycle, and `zeros`, (2, MOST_PHASES), is for zeros of D on either side of
+    Üg = 0 (`continuous`); `known` is for pulses that come again (`train`).
+    """
+
+    nodes: np.ndarray
+    log: np.ndarray
+    gains: np.ndarray
+    zeros: np.ndarray
+    known: np.ndarray
+
+
+class State(NamedTuple):
+    """The block in a pulse: V, W since its beginning, the acceleration b, the largest and the least V.
+
+    `sliding` says whether it slides, `follows` whether b follows Eq. 4 as Üg rises, `least_held` is the least b with
+    which it slid at the end of a rise, `slips` counts slides that began from rest, `logged` the rows of the log.
+    """
+
+    velocity: float
+    displacement: float
+    held: float
+    peak: float
+    least: float
+    sliding: bool
+    follows: bool
+    stopped_at: float
+    least_held: float
+    slips: float
+    logged: int
+
+
+class RisePhase(NamedTuple):
+    """A phase of a slide on the rise: Üg at its end, whether b follows Eq. 4 on it, and from there on."""
+
+    end: float
+    follows: bool
+    follows_after: bool
+
+
+def workspace_of(wave: Wave, logged: int = 0) -> Workspace:
+    """A workspace for a wave, with a log of so many rows."""
+    return Workspace(
+        nodes=np.empty(NODES.size),
+        log=np.empty(logged, LOG),
+        gains=np.empty(int(np.diff(wave.cycle).max()), GAINS),
+        zeros=np.empty((2, MOST_PHASES)),
+        known=np.empty((wave.height.size, 2)),
+    )
+
+
+@scalar
+def moved(state: State, velocity: float, displacement: float, peak: float) -> State:
+    """The state after a part of the motion, up to which V was `peak` at most."""
+    return State(
+        velocity, displacement, state.held, max(peak, velocity), min(state.least, velocity), state.sliding,
+        state.follows, state.stopped_at, state.least_held, state.slips, state.logged,
+    )  # fmt: skip
+
+
+@scalar
+def with_held(state: State, held: float, follows: bool) -> State:
+    """The state with another b, which follows Eq. 4 or does not."""
+    return State(
+        state.velocity, state.displacement, held, state.peak, state.least, state.sliding, follows, state.stopped_at,
+        state.least_held, state.slips, state.logged,
+    )  # fmt: skip
+
+
+@scalar
+def at_rest(state: State, phase: float) -> State:
+    """The state of a block that comes to rest."""
+    return State(
+        0.0, state.displacement, state.held, state.peak, min(state.least, 0.0), False, state.follows, phase,
+        state.least_held, state.slips, state.logged,
+    )  # fmt: skip
+
+
+@scalar
+def begun(state: State, held: float, follows: bool) -> State:
+    """The state of a block at rest that begins to slide (t1)."""
+    return State(
+        state.velocity, state.displacement, held, state.peak, state.least, True, follows, state.stopped_at,
+        state.least_held, state.slips + 1.0, state.logged,
+    )  # fmt: skip
+
+
+@scalar
+def at_end_of_rise(state: State) -> State:
+    """The state with b noted: by Eq. 12 no block comes to rest with b ≤ 0."""
+    return State(
+        state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
+        state.stopped_at, min(state.least_held, state.held), state.slips, state.logged,
+    )  # fmt: skip
+
+
+@scalar
+def logged(state: State, log: np.ndarray, kind: int, piece: int, tau: float, start: float, end: float) -> State:
+    """Add what follows to the log, if one is kept."""
+    if log.size == 0:
+        return state
+    row = log[state.logged]
+    row["kind"], row["piece"], row["tau"], row["start"], row["end"] = kind, piece, tau, start, end
+    row["held"], row["velocity"], row["displacement"] = state.held, state.velocity, state.displacement
+    return State(
+        state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
+        state.stopped_at, state.least_held, state.slips, state.logged + 1,
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------------ Eq. 4 on the rise, as a function of Üg alone
+
+
+@scalar
+def inside(x: float, end: float) -> float:
+    """Where on the way from x to end the signs of a phase from x on are read, which is not at x itself."""
+    way = end - x
+    return x + math.copysign(min(max(_SLIVER * abs(way), _ROUNDING * abs(x)), abs(way)), way)
+
+
+@scalar
+def next_break(block: Block, x: float, end: float) -> float:
+    """Where, on the way from x to end, one of E, dE/dx and D first ceases to be monotone."""
+    inner = inside(x, end)
+    if 0.0 < inner < inflection(block):
+        end = min(inflection(block), end)
+    before, after = slopes(block, inner)[1], slopes(block, end)[1]
+    # dE/dx passes 1 where D turns and 0 where E turns; the one nearer to `before` comes first
+    for turn in (1.0, 0.0) if before > after else (0.0, 1.0):
+        if min(before, after) < turn < max(before, after):
+            return slope_root(block, turn, inner, end)
+    return end
+
+
+@scalar
+def onset(block: Block, x: float, top: float) -> float:
+    """t1: Üg on the rise from x ≥ Üy to `top` at which the block at rest starts to slide, D > 0 (`top` if it does not)."""
+    if block.rise == NEWMARK or relative_acceleration(block, inside(x, top)) > 0.0:
+        return x
+    for _ in range(MOST_PHASES):
+        if x >= top:
+            break
+        end = next_break(block, x, top)
+        inner = inside(x, end)
+        if relative_acceleration(block, inner) > 0.0:
+            return x
+        if relative_acceleration(block, end) > 0.0:
+            return relative_acceleration_root(block, inner, end)
+        x = end
+    return top if x >= top else math.nan
+
+
+@scalar
+def phase_on_rise(block: Block, x: float, top: float, held: float, follows: bool) -> RisePhase:
+    """The next phase of a slide on the rise from x to `top`; what `rise` does is decided here.
+
+    Newmark: b = Üy to the top.  Literal: b = Eq. 4 throughout.  Monotone: b = max(b, Eq. 4), held until Eq. 4 comes to
+    it, followed until Eq. 4 falls.  A phase that follows Eq. 4 ends where D changes its sign, too.
+    """
+    if block.rise == NEWMARK:
+        return RisePhase(top, False, False)
+    end = top
+    inner = inside(x, end)
+    bends = inner < inflection(block)
+    if bends:
+        end = next_break(block, x, top)
+        inner = inside(x, end)
+    eq4, slope, _ = slopes(block, inner)
+    follows = block.rise == LITERAL or (slope > 0.0 and (follows or eq4 >= held))
+    if follows:
+        if not bends:  # E is convex, D concave: it may be positive between two places where it is not
+            end = next_break(block, x, top)
+            inner = inside(x, end)
+        if opposite(relative_acceleration(block, inner), relative_acceleration(block, end)):
+            end = relative_acceleration_root(block, inner, end)
+        return RisePhase(end, True, True)
+    crosses = response(block, end) > held
+    if crosses:
+        end = response_root(block, held, inner, end)
+    if x < held < end:  # from there on V grows
+        return RisePhase(held, False, False)
+    return RisePhase(end, False, crosses)
+
+
+@scalar
+def yield_governs(block: Block, wave: Wave) -> bool:
+    """Whether Eq. 4 stays at or below the yield value over all that the base rises through or jumps to.
+
+    Not said of Newmark's block, which knows no Eq. 4.
+    """
+    governs = block.rise != NEWMARK
+    for i in range(wave.rises.shape[0]):
+        high = block.amplitude * wave.rises[i, 1]
+        if governs and high > block.yield_acceleration:
+            low = max(block.amplitude * wave.rises[i, 0], block.yield_acceleration)
+            governs = stays_below_yield(block, low, high)
+    return governs
+
+
+# ------------------------------------------------------------------ along a part of one piece
+
+
+@scalar
+def _held_lost(where: tuple[np.ndarray, int, float, float, float, float], tau: float) -> tuple[float, float]:
+    """−V at τ of a hold that V entered at `start`, and its rate."""
+    pieces, p, amplitude, held, velocity, start = where
+    left = velocity + held_gain(pieces, p, amplitude, held, start, tau)
+    return -left, held - base_acceleration(pieces, p, amplitude, tau)
+
+
+@scalar
+def _followed_lost(where: tuple[Block, np.ndarray, int, float, float, np.ndarray], tau: float) -> tuple[float, float]:
+    """−V at τ where b follows Eq. 4, and its rate."""
+    block, pieces, p, velocity, start, nodes = where
+    left = velocity + eq4_integrals(block, pieces, p, start, tau, nodes)[0]
+    return -left, -relative_acceleration(block, base_acceleration(pieces, p, block.amplitude, tau))
+
+
+_held_stop = root_of(_held_lost)
+_followed_stop = root_of(_followed_lost)
+
+
+@scalar
+def hold(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, log: np.ndarray
+) -> tuple[float, State]:
+    """Slide with b held, V' = Üg − b, along piece p from start to end, or to the stop: where that is."""
+    amplitude, held, velocity = block.amplitude, state.held, state.velocity
+    # most parts are whole pieces, whose ends are known
+    x = amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
+    x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else base_acceleration(pieces, p, amplitude, end)
+    rate, rate_end = x - held, x_end - held
+    width, slope, straight = end - start, amplitude * pieces[p, COEFFICIENTS], pieces[p, DEGREE] <= 1.0
+    if straight:
+        gained, displaced = linear.held_integrals(rate, slope, width)
+    else:
+        gained, displaced = held_integrals(pieces, p, amplitude, held, start, end)
+    low, high, peak, least = start, end, state.peak, state.least
+    stops = velocity + gained <= 0.0
+    if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
+        # nothing slows it: over a part so short that its gain is rounding, it does not stop
+        stops, gained = False, max(gained, 0.0)
+    if opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
+        # V turns where x = b; one that starts from rest there only seems to fall, by rounding
+        if straight:
+            turn = start - rate / slope
+            extreme = velocity - 0.5 * rate * (rate / slope)
+        else:
+            turn = offset_at(pieces, p, amplitude, held)
+            extreme = velocity + held_gain(pieces, p, amplitude, held, start, turn)
+        if rate > 0.0:
+            peak = max(extreme, peak)  # in this order a NaN is kept
+            low = turn
+        else:
+            least = min(extreme, least)
+            stops, high = extreme <= 0.0, turn
+    if stops:
+        end = start
+        if velocity > 0.0 or rate > 0.0:
+            if straight:
+                end = start + min(linear.held_stop(velocity, rate, slope), width)
+            else:
+                where = (pieces, p, amplitude, held, velocity, start)
+                end = _held_stop(where, low, high, 0.5 * (low + high), start)
+        width = end - start
+        if straight:
+            gained, displaced = linear.held_integrals(rate, slope, width)
+        else:
+            gained, displaced = held_integrals(pieces, p, amplitude, held, start, end)
+    if log.size:
+        state = logged(state, log, HOLD, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end))
+    after = state.displacement + (velocity * width + displaced)
+    if stops:
+        state = at_rest(moved(state, velocity, after, peak), phase_at(pieces, p, end))
+    else:
+        state = moved(state, velocity + gained, after, peak)
+    return end, with_least(state, least)
+
+
+@scalar
+def with_least(state: State, least: float) -> State:
+    """The state of a block whose V was as small as `least`."""
+    return State(
+        state.velocity, state.displacement, state.held, state.peak, min(state.least, least), state.sliding,
+        state.follows, state.stopped_at, state.least_held, state.slips, state.logged,
+    )  # fmt: skip
+
+
+@scalar
+def follow(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, workspace: Workspace
+) -> tuple[float, State]:
+    """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop: where that is."""
+    velocity, nodes = state.velocity, workspace.nodes
+    gained, displaced = eq4_integrals(block, pieces, p, start, end, nodes)
+    stops = velocity + gained <= 0.0
+    if stops:
+        end = _followed_stop((block, pieces, p, velocity, start, nodes), start, end, 0.5 * (start + end), start)
+        gained, displaced = eq4_integrals(block, pieces, p, start, end, nodes)
+    if workspace.log.size:
+        state = logged(state, workspace.log, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end))
+    after = state.displacement + (velocity * (end - start) + displaced)
+    if stops:
+        return end, at_rest(moved(state, velocity, after, state.peak), phase_at(pieces, p, end))
+    return end, moved(state, velocity + gained, after, state.peak)
+
+
+# ------------------------------------------------------------------ along the pieces of a pulse
+
+
+@scalar
+def rise(
+    block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, workspace: Workspace
+) -> State:
+    """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
+    amplitude, top, p = block.amplitude, block.amplitude * pieces[last, LAST], first
+    for _ in range(MOST_PHASES * (1 + last - first)):
+        if not state.sliding:
+            began = top
+            if top > block.yield_acceleration:
+                began = onset(block, max(x, block.yield_acceleration), top)
+            if began >= top:
+                return state
+            if began > x:
+                p, tau = place_of(block, pieces, began, p, tau, last)
+            # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g μs
+            beyond = began > max(x, block.yield_acceleration)
+            b = began if beyond else min(starting_acceleration(block, began), began)
+            state, x = begun(state, b, block.rise == LITERAL), began
+        phase = phase_on_rise(block, x, top, state.held, state.follows)
+        until, tau_until = place_of(block, pieces, phase.end, p, tau, last)
+        while True:
+            end = tau_until if p == until else pieces[p, FINISH]
+            if phase.follows:
+                tau, state = follow(block, pieces, p, tau, end, state, workspace)
+            else:
+                tau, state = hold(block, pieces, p, tau, end, state, workspace.log)
+            if not state.sliding or p == until:
+                break
+            p += 1
+            tau = pieces[p, BEGIN]
+        if not state.sliding and (p < until or tau < tau_until):
+            if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
+                p, tau, x = until, tau_until, phase.end
+            else:
+                x = base_acceleration(pieces, p, amplitude, tau)
+            continue
+        x = phase.end
+        state = with_held(state, response(block, x) if phase.follows else state.held, phase.follows_after)
+        if x >= top:
+            return state
+    return moved(state, math.nan, math.nan, math.nan)
+
+
+@scalar
+def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, last: int) -> tuple[int, float]:
+    """Where on the rise from τ on piece p to the end of piece `last` the base's acceleration comes to x."""
+    while p < last and block.amplitude * pieces[p, LAST] < x:
+        p += 1
+        tau = pieces[p, BEGIN]
+    if block.amplitude * pieces[p, LAST] <= x:
+        return p, pieces[p, FINISH]
+    return p, max(tau, offset_at(pieces, p, block.amplitude, x))
+
+
+@scalar
+def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State) -> State:
+    """Reset b of a block that slides where piece p, Üg = x, begins, or begin a slide there (t1), if not by a rise."""
+    literal = block.rise == LITERAL
+    if state.sliding:
+        held = state.held
+        if literal:
+            held = response(block, x)
+        elif block.rise != NEWMARK:
+            held = max(held, response(block, x))
+        return with_held(state, held, literal)
+    if x >= block.yield_acceleration and pieces[p, FIRST] >= pieces[p, LAST]:
+        b = starting_acceleration(block, x)
+        if b < x:
+            return begun(state, b, literal)
+    return with_held(state, state.held, literal)
+
+
+@scalar
+def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
+    """The last piece of the rise that begins with piece p, before piece `end`."""
+    while p + 1 < end and pieces[p, LAST] == pieces[p + 1, FIRST] < pieces[p + 1, LAST]:
+        p += 1
+    return p
+
+
+@scalar
+def through_interval(
+    block: Block, wave: Wave, k: int, p: int, tau: float, state: State, workspace: Workspace
+) -> State:
+    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of interval k."""
+    pieces, q, end = wave.pieces, p, wave.interval[k, 1]
+    while q < end:
+        x = block.amplitude * pieces[q, FIRST]
+        if q == p:
+            x = max(x, block.yield_acceleration)
+        else:
+            tau = pieces[q, BEGIN]
+        if rises_anew(pieces, q):
+            state = reset_held(block, pieces, q, x, state)
+        if pieces[q, FIRST] < pieces[q, LAST]:
+            last = end_of_rise(pieces, q, end)
+            state = rise(block, pieces, q, last, tau, x, state, workspace)
+            q = last
+        elif state.sliding:
+            level = pieces[q, FIRST] == pieces[q, LAST]
+            if not level:
+                state = at_end_of_rise(state)
+            tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, workspace.log)
+            if level and not state.sliding:
+                state = reset_held(block, pieces, q, x, state)
+                if state.sliding:
+                    tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, workspace.log)
+        q += 1
+    return state
+
+
+@scalar
+def attenuated(state: State, duration: float) -> State:
+    """Eq. 12 for `duration` of phase, or to the stop, with Ümax = b; V may have either sign."""
+    speed, side = abs(state.velocity), math.copysign(1.0, state.velocity)
+    displaced = side * eq.attenuated_displacement(speed, state.held, duration)
+    velocity = side * eq.attenuated_velocity(speed, state.held, duration)
+    return moved(state, velocity, state.displacement + displaced, state.peak)
+
+
+@scalar
+def recouple(
+    block: Block, options: Options, wave: Wave, q: int, following: int, state: State, workspace: Workspace
+) -> State:
+    """From Üg = 0 (t5) at the beginning of piece q to the pulse of the `following` interval, or to the stop."""
+    pieces, count, last = wave.pieces, wave.pieces.shape[0], following >= wave.height.size
+    p, tau = count, 0.0
+    if not last:
+        p, tau = beginning(block, wave, following)
+    started = pieces[q, START] if q < count else pieces[q - 1, END]
+    stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
+    if options.recoupling == INTEGRATE:
+        stopped_at = math.inf
+        for piece in range(q, min(p + 1, count)):
+            end = tau if piece == p else pieces[piece, FINISH]
+            if state.sliding and end > pieces[piece, BEGIN]:
+                _, state = hold(block, pieces, piece, pieces[piece, BEGIN], end, state, workspace.log)
+        started = pieces[count - 1, END]
+    if state.sliding and (last or options.recoupling != INTEGRATE):
+        duration = math.inf if last else phase_at(pieces, p, tau) - started
+        if workspace.log.size:
+            until = started + min(duration, state.velocity / state.held)
+            state = logged(state, workspace.log, ATTENUATE, 0, 0.0, started, until)
+        state = attenuated(state, duration)
+        return State(
+            state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
+            stopped_at, state.least_held, state.slips, state.logged,
+        )  # fmt: skip
+    return state
+
+
+@scalar
+def pulse(
+    block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
+) -> Pulse:
+    """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows."""
+    p, tau = beginning(block, wave, k)
+    x = max(block.amplitude * wave.pieces[p, FIRST], block.yield_acceleration)
+    state = State(
+        velocity=velocity,
+        displacement=0.0,
+        held=starting_acceleration(block, x),
+        peak=velocity,
+        least=velocity,
+        sliding=velocity > 0.0,
+        follows=block.rise == LITERAL,
+        stopped_at=0.0,
+        least_held=math.inf,
+        slips=0.0,
+        logged=0,
+    )
+    state = through_interval(block, wave, k, p, tau, state, workspace)
+    if state.sliding:
+        if state.held <= 0.0:
+            return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, KD_NOT_POSITIVE)
+        state = recouple(block, options, wave, wave.interval[k, 1], following, state, workspace)
+    validity = KD_NOT_POSITIVE if state.least_held <= 0.0 else 0
+    return Pulse(
+        state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.stopped_at,
+        state.slips, validity,
+    )  # fmt: skip

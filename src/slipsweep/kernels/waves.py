@@ -1,0 +1,78 @@
+"""The exact kernel for waveforms: a block that sticks and slips, or slides continuously, through all cycles."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.compiling import kernel
+from slipsweep.jit.decorators import scalar
+from slipsweep.kernels.block import (
+    NO_VALUE,
+    UNSOLVED,
+    YIELD_GOVERNS,
+    Block,
+    Cell,
+    Motion,
+    Options,
+    block_of,
+    settled,
+    without_estimates,
+)
+from slipsweep.kernels.continuous import slide_continuously
+from slipsweep.kernels.exact import Workspace, pulse, yield_governs
+from slipsweep.kernels.grid import Cells, solve_each
+from slipsweep.kernels.pulse import Pulse, validity_before
+from slipsweep.kernels.train import train_of
+from slipsweep.model import equations as eq
+from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
+from slipsweep.motion.pieces import Wave
+
+_train = train_of(pulse)
+
+
+class Problem(NamedTuple):
+    """What all cells under a waveform share."""
+
+    options: Options
+    wave: Wave
+    workspace: Workspace
+
+
+@scalar
+def motion_of(block: Block, validity: int, found: Pulse) -> Motion:
+    """The motion of a cell under a waveform; an iteration that has not ended has made its W or V NaN."""
+    validity |= found.validity
+    if math.isnan(found.displacement) and validity & NO_VALUE == 0:
+        validity |= UNSOLVED
+    validity = settled(without_estimates(validity), found.displacement, block.amplitude)
+    mode = -1 if validity & NO_VALUE else block.sliding_mode
+    return Motion(found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan)
+
+
+@scalar
+def solve_exactly(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
+    """The response of a cell of any law that gives what this kernel takes of it (`exact.check_law`)."""
+    options, wave, workspace = problem
+    block = block_of(law, cell, options.rise, options.g)
+    mode, validity = block.sliding_mode, validity_before(block, wave)
+    found = Pulse(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+    if mode == eq.CONTINUOUS:
+        found = slide_continuously(block, options.wants_peak, wave, workspace)
+    elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
+        validity |= YIELD_GOVERNS if yield_governs(block, wave) else 0
+        found = _train(block, options, wave, workspace, workspace.known)
+    elif mode < 0:
+        found = Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
+    return motion_of(block, validity, found)
+
+
+@scalar
+def _solve(cell: Cell, problem: Problem) -> Motion:
+    return solve_exactly(EXPONENTIAL, cell, problem)
+
+
+@kernel
+def solve_waves(cells: Cells, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
+    """Solve the cells of a tile under a waveform exactly; `results` is (fields of `Motion`, cells)."""
+    solve_each(_solve, cells, Problem(options, wave, workspace), results)
