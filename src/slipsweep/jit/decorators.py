@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import cffi
 import numba
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -27,6 +28,21 @@ inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
 
 #: The same for elementary functions, which have no division to share.
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
+
+
+_ffi = cffi.FFI()
+
+
+def _uncounted(array: Any) -> Any:
+    """The same array, to which numba counts no references.
+
+    For arguments of a kernel, which outlive it: numba would count references to each array of a wave in each function
+    that it goes through, half of the time of a cell.
+    """
+    return numba.carray(_ffi.from_buffer(array), array.shape)
+
+
+uncounted = (lambda array: array) if numba.config.DISABLE_JIT else scalar(_uncounted)
 
 
 def of_arrays(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -76,7 +76,7 @@ def most_gained(
         if min(first, last) < zero < max(first, last):
             at = offset_at(pieces, q, amplitude, zero)
             if start < at < end:
-                highest = max(highest, eq4_integrals(block, pieces, q, start, at, workspace.nodes)[0])
+                highest = max(highest, eq4_integrals(block, pieces, q, start, at)[0])
     return highest
 
 
@@ -96,7 +96,7 @@ def follow_cycle(
             start = tau
             if start >= end:
                 continue
-            lag = lag_integrals(block, pieces, q, start, end, workspace.nodes)
+            lag = lag_integrals(block, pieces, q, start, end)
             highest = most_gained(block, wave, q, start, end, zeros, workspace)
         upper = pieces[q, TOP] > 0.0
         peak = max(peak, velocity + highest)
@@ -117,7 +117,7 @@ def gains_of_cycle(block: Block, wave: Wave, c: int, zeros: Zeros, workspace: Wo
     """Write what Eq. 4 gains over each piece of cycle c into the workspace."""
     for q in range(wave.cycle[c], wave.cycle[c + 1]):
         start, end = wave.pieces[q, BEGIN], wave.pieces[q, FINISH]
-        lag = lag_integrals(block, wave.pieces, q, start, end, workspace.nodes)
+        lag = lag_integrals(block, wave.pieces, q, start, end)
         row = workspace.gains[q - wave.cycle[c]]
         row["first"], row["second"], row["first_x"], row["second_x"] = lag
         row["highest"] = most_gained(block, wave, q, start, end, zeros, workspace)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.decorators import inlined, scalar, summed
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.block import Block, friction
 from slipsweep.kernels.excitation import base_acceleration, offset_at
@@ -58,63 +58,70 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
 
 
 @scalar
-def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: float, x: np.ndarray) -> None:
-    """Fill in |Üg| at the nodes of the quadrature from `start` on: power by power, so that LLVM takes nodes together."""
-    top = pieces[p, TOP]
+def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: float) -> np.ndarray:
+    """|Üg| at the nodes of the quadrature from `start` on: power by power, so that LLVM takes nodes together."""
+    top, x = pieces[p, TOP], np.zeros(NODES.size)
     if pieces[p, ARC] > 0.0:
         for node in range(NODES.size):
             x[node] = amplitude * (1.0 - versine(start + width * NODES[node]))
-        return
-    for node in range(NODES.size):
-        x[node] = 0.0
+        return x
     for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
         coefficient = pieces[p, COEFFICIENTS + TERM * k]
         for node in range(NODES.size):
             x[node] = x[node] * (start + width * NODES[node]) + coefficient
     for node in range(NODES.size):
         x[node] = amplitude * abs(top + x[node] * (start + width * NODES[node]))
+    return x
 
 
 @summed
-def curved_lag(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float, nodes: np.ndarray
-) -> Lag:
-    """`Lag` where |Üg| goes along a curve: Gauss-Legendre quadrature, panel by panel; `nodes` is a workspace."""
-    amplitude, mu_s, kept = block.amplitude, block.mu_s, block.mu_s - block.tan_theta
-    length = block.law.decay_length(block.decay_rate, block.g)
-    e_foldings = abs(x_end - x_start) / length
-    near, far = (start, end) if x_start <= x_end else (end, start)
-    least = min(x_start, x_end)
-    whole = start == pieces[p, BEGIN] and end == pieces[p, FINISH] and e_foldings <= PANEL_BOUNDS[0]
+def panel_lag(block: Block, pieces: np.ndarray, p: int, near: float, until: float, end: float) -> Lag:
+    """`Lag` over a panel of the quadrature: 16 nodes of Gauss and Legendre."""
+    width = until - near
+    values = at_nodes(pieces, p, block.amplitude, near, width)
+    kept = block.mu_s - block.tan_theta
     first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
-    for bound in PANEL_BOUNDS:
-        until = far
-        if e_foldings > bound:
-            until = offset_at(pieces, p, amplitude, math.copysign(least + bound * length, pieces[p, TOP]))
-        width = until - near
-        if whole:
-            for node in range(NODES.size):
-                nodes[node] = amplitude * pieces[p, pieces.shape[1] - NODES.size + node]
-        else:
-            at_nodes(pieces, p, amplitude, near, width, nodes)
-        for node in range(NODES.size):
-            x = nodes[node]
-            mu = friction(block, x)
-            weight = abs(width) * WEIGHTS[node]
-            left = end - (near + width * NODES[node])
-            lag, lag_x = weight * (mu_s - mu), weight * x * (kept - mu)
-            first += lag
-            second += left * lag
-            first_x += lag_x
-            second_x += left * lag_x
-        near = until
-        if e_foldings <= bound:
-            break
+    for node in range(NODES.size):
+        x = values[node]
+        mu = friction(block, x)
+        weight, left = abs(width) * WEIGHTS[node], end - (near + width * NODES[node])
+        rate, rate_x = weight * (block.mu_s - mu), weight * x * (kept - mu)
+        first += rate
+        second += left * rate
+        first_x += rate_x
+        second_x += left * rate_x
     return Lag(first, second, first_x, second_x)
 
 
 @scalar
-def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float, nodes: np.ndarray) -> Lag:
+def curved_lag(
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float
+) -> Lag:
+    """`Lag` where |Üg| goes along a curve, panel by panel from the end where the friction is larger."""
+    length = block.law.decay_length(block.decay_rate, block.g)
+    e_foldings = abs(x_end - x_start) / length
+    near, far = (start, end) if x_start <= x_end else (end, start)
+    least = min(x_start, x_end)
+    lag = Lag(0.0, 0.0, 0.0, 0.0)
+    for bound in PANEL_BOUNDS:
+        until = far
+        if e_foldings > bound:
+            until = offset_at(pieces, p, block.amplitude, math.copysign(least + bound * length, pieces[p, TOP]))
+        panel = panel_lag(block, pieces, p, near, until, end)
+        lag = Lag(
+            lag.first + panel.first,
+            lag.second + panel.second,
+            lag.first_x + panel.first_x,
+            lag.second_x + panel.second_x,
+        )
+        near = until
+        if e_foldings <= bound:
+            break
+    return lag
+
+
+@scalar
+def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float) -> Lag:
     """`Lag` over a part of piece p."""
     amplitude = block.amplitude
     # most parts begin or end where the piece does
@@ -123,14 +130,14 @@ def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: f
     x_start, x_end = abs(x_start), abs(x_end)
     if int(pieces[p, DEGREE]) <= 1:
         return straight_lag(block, x_start, x_end - x_start, end - start)
-    return curved_lag(block, pieces, p, start, end, x_start, x_end, nodes)
+    return curved_lag(block, pieces, p, start, end, x_start, x_end)
 
 
 @scalar
 def eq4_integrals(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, nodes: np.ndarray
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float
 ) -> tuple[float, float]:
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest, after Eq. 4."""
-    lag = lag_integrals(block, pieces, p, start, end, nodes)
+    lag = lag_integrals(block, pieces, p, start, end)
     side_g = math.copysign(block.g, pieces[p, TOP])
     return side_g * lag.first + block.tan_theta * lag.first_x, side_g * lag.second + block.tan_theta * lag.second_x

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import inlined, scalar, uncounted
 from slipsweep.kernels import linear
 from slipsweep.kernels.block import (
     INTEGRATE,
@@ -36,7 +36,7 @@ from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
 from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, LAST, NODES, START, Wave
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, LAST, START, Wave
 
 #: Signs at the start of a phase are read this fraction of the phase inside it, but no closer to the start than this
 #: fraction of that: where a phase ends at a turn of E, the sign just behind is known only beyond rounding.
@@ -65,12 +65,11 @@ GAINS = np.dtype([("first", "f8"), ("second", "f8"), ("first_x", "f8"), ("second
 class Workspace(NamedTuple):
     """What the exact kernels write into, one for all cells.
 
-    `nodes` is for quadratures; `log` has one row for each part of the motion if a history is requested, else none;
+    `log` has one row for each part of the motion if a history is requested, else none;
     `gains` has a row for each piece of a cycle, and `zeros`, (2, MOST_PHASES), is for zeros of D on either side of
     Üg = 0 (`continuous`); `known` is for pulses that come again (`train`).
     """
 
-    nodes: np.ndarray
     log: np.ndarray
     gains: np.ndarray
     zeros: np.ndarray
@@ -108,12 +107,20 @@ class RisePhase(NamedTuple):
 def workspace_of(wave: Wave, logged: int = 0) -> Workspace:
     """A workspace for a wave, with a log of so many rows."""
     return Workspace(
-        nodes=np.empty(NODES.size),
         log=np.empty(logged, LOG),
         gains=np.empty(int(np.diff(wave.cycle).max()), GAINS),
         zeros=np.empty((2, MOST_PHASES)),
         known=np.empty((wave.height.size, 2)),
     )
+
+
+@inlined
+def uncounted_workspace(workspace: Workspace) -> Workspace:
+    """The same workspace (`decorators.uncounted`)."""
+    return Workspace(
+        uncounted(workspace.log), uncounted(workspace.gains), uncounted(workspace.zeros),
+        uncounted(workspace.known),
+    )  # fmt: skip
 
 
 @scalar
@@ -276,10 +283,10 @@ def _held_lost(where: tuple[np.ndarray, int, float, float, float, float], tau: f
 
 
 @scalar
-def _followed_lost(where: tuple[Block, np.ndarray, int, float, float, np.ndarray], tau: float) -> tuple[float, float]:
+def _followed_lost(where: tuple[Block, np.ndarray, int, float, float], tau: float) -> tuple[float, float]:
     """−V at τ where b follows Eq. 4, and its rate."""
-    block, pieces, p, velocity, start, nodes = where
-    left = velocity + eq4_integrals(block, pieces, p, start, tau, nodes)[0]
+    block, pieces, p, velocity, start = where
+    left = velocity + eq4_integrals(block, pieces, p, start, tau)[0]
     return -left, -relative_acceleration(block, base_acceleration(pieces, p, block.amplitude, tau))
 
 
@@ -355,17 +362,17 @@ def with_least(state: State, least: float) -> State:
 
 @scalar
 def follow(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, workspace: Workspace
+    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, log: np.ndarray
 ) -> tuple[float, State]:
     """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop: where that is."""
-    velocity, nodes = state.velocity, workspace.nodes
-    gained, displaced = eq4_integrals(block, pieces, p, start, end, nodes)
+    velocity = state.velocity
+    gained, displaced = eq4_integrals(block, pieces, p, start, end)
     stops = velocity + gained <= 0.0
     if stops:
-        end = _followed_stop((block, pieces, p, velocity, start, nodes), start, end, 0.5 * (start + end), start)
-        gained, displaced = eq4_integrals(block, pieces, p, start, end, nodes)
-    if workspace.log.size:
-        state = logged(state, workspace.log, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end))
+        end = _followed_stop((block, pieces, p, velocity, start), start, end, 0.5 * (start + end), start)
+        gained, displaced = eq4_integrals(block, pieces, p, start, end)
+    if log.size:
+        state = logged(state, log, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end))
     after = state.displacement + (velocity * (end - start) + displaced)
     if stops:
         return end, at_rest(moved(state, velocity, after, state.peak), phase_at(pieces, p, end))
@@ -377,8 +384,8 @@ def follow(
 
 @scalar
 def rise(
-    block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, workspace: Workspace
-) -> State:
+    block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
+) -> State:  # fmt: skip
     """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
     amplitude, top, p = block.amplitude, block.amplitude * pieces[last, LAST], first
     for _ in range(MOST_PHASES * (1 + last - first)):
@@ -399,9 +406,9 @@ def rise(
         while True:
             end = tau_until if p == until else pieces[p, FINISH]
             if phase.follows:
-                tau, state = follow(block, pieces, p, tau, end, state, workspace)
+                tau, state = follow(block, pieces, p, tau, end, state, log)
             else:
-                tau, state = hold(block, pieces, p, tau, end, state, workspace.log)
+                tau, state = hold(block, pieces, p, tau, end, state, log)
             if not state.sliding or p == until:
                 break
             p += 1
@@ -458,10 +465,10 @@ def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
 
 @scalar
 def through_interval(
-    block: Block, wave: Wave, k: int, p: int, tau: float, state: State, workspace: Workspace
+    block: Block, pieces: np.ndarray, p: int, tau: float, end: int, state: State, log: np.ndarray
 ) -> State:
-    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the end of interval k."""
-    pieces, q, end = wave.pieces, p, wave.interval[k, 1]
+    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the beginning of piece `end`."""
+    q = p
     while q < end:
         x = block.amplitude * pieces[q, FIRST]
         if q == p:
@@ -472,17 +479,17 @@ def through_interval(
             state = reset_held(block, pieces, q, x, state)
         if pieces[q, FIRST] < pieces[q, LAST]:
             last = end_of_rise(pieces, q, end)
-            state = rise(block, pieces, q, last, tau, x, state, workspace)
+            state = rise(block, pieces, q, last, tau, x, state, log)
             q = last
         elif state.sliding:
             level = pieces[q, FIRST] == pieces[q, LAST]
             if not level:
                 state = at_end_of_rise(state)
-            tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, workspace.log)
+            tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, log)
             if level and not state.sliding:
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
-                    tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, workspace.log)
+                    tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, log)
         q += 1
     return state
 
@@ -498,27 +505,28 @@ def attenuated(state: State, duration: float) -> State:
 
 @scalar
 def recouple(
-    block: Block, options: Options, wave: Wave, q: int, following: int, state: State, workspace: Workspace
+    block: Block, recoupling: int, pieces: np.ndarray, q: int, p: int, tau: float, state: State, log: np.ndarray
 ) -> State:
-    """From Üg = 0 (t5) at the beginning of piece q to the pulse of the `following` interval, or to the stop."""
-    pieces, count, last = wave.pieces, wave.pieces.shape[0], following >= wave.height.size
-    p, tau = count, 0.0
-    if not last:
-        p, tau = beginning(block, wave, following)
+    """From Üg = 0 (t5) at the beginning of piece q to the next pulse, τ on piece p, or to the stop.
+
+    p lies past the last piece if there is no next pulse.
+    """
+    count = pieces.shape[0]
+    last = p >= count
     started = pieces[q, START] if q < count else pieces[q - 1, END]
     stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
-    if options.recoupling == INTEGRATE:
+    if recoupling == INTEGRATE:
         stopped_at = math.inf
         for piece in range(q, min(p + 1, count)):
             end = tau if piece == p else pieces[piece, FINISH]
             if state.sliding and end > pieces[piece, BEGIN]:
-                _, state = hold(block, pieces, piece, pieces[piece, BEGIN], end, state, workspace.log)
+                _, state = hold(block, pieces, piece, pieces[piece, BEGIN], end, state, log)
         started = pieces[count - 1, END]
-    if state.sliding and (last or options.recoupling != INTEGRATE):
+    if state.sliding and (last or recoupling != INTEGRATE):
         duration = math.inf if last else phase_at(pieces, p, tau) - started
-        if workspace.log.size:
+        if log.size:
             until = started + min(duration, state.velocity / state.held)
-            state = logged(state, workspace.log, ATTENUATE, 0, 0.0, started, until)
+            state = logged(state, log, ATTENUATE, 0, 0.0, started, until)
         state = attenuated(state, duration)
         return State(
             state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
@@ -528,12 +536,12 @@ def recouple(
 
 
 @scalar
-def pulse(
-    block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
-) -> Pulse:
-    """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows."""
-    p, tau = beginning(block, wave, k)
-    x = max(block.amplitude * wave.pieces[p, FIRST], block.yield_acceleration)
+def pulse_between(
+    block: Block, recoupling: int, pieces: np.ndarray, p: int, tau: float, end: int, next_p: int, next_tau: float,
+    velocity: float, log: np.ndarray,
+) -> Pulse:  # fmt: skip
+    """From Üg = Üy, τ on piece p, through Üg = 0 (t5) at the beginning of piece `end`, to the next pulse."""
+    x = max(block.amplitude * pieces[p, FIRST], block.yield_acceleration)
     state = State(
         velocity=velocity,
         displacement=0.0,
@@ -547,13 +555,27 @@ def pulse(
         slips=0.0,
         logged=0,
     )
-    state = through_interval(block, wave, k, p, tau, state, workspace)
+    state = through_interval(block, pieces, p, tau, end, state, log)
     if state.sliding:
         if state.held <= 0.0:
             return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, KD_NOT_POSITIVE)
-        state = recouple(block, options, wave, wave.interval[k, 1], following, state, workspace)
+        state = recouple(block, recoupling, pieces, end, next_p, next_tau, state, log)
     validity = KD_NOT_POSITIVE if state.least_held <= 0.0 else 0
     return Pulse(
         state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.stopped_at,
         state.slips, validity,
+    )  # fmt: skip
+
+
+@scalar
+def pulse(
+    block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
+) -> Pulse:
+    """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows."""
+    p, tau = beginning(block, wave, k)
+    next_p, next_tau = wave.pieces.shape[0], 0.0
+    if following < wave.height.size:
+        next_p, next_tau = beginning(block, wave, following)
+    return pulse_between(
+        block, options.recoupling, wave.pieces, p, tau, wave.interval[k, 1], next_p, next_tau, velocity, workspace.log
     )  # fmt: skip

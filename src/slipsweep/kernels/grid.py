@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, scalar, uncounted
 from slipsweep.kernels.block import Cell, Motion, store
+from slipsweep.motion.pieces import Wave
 
 #: Rows of a tile's results.
 ROWS = Motion._fields
@@ -39,6 +40,30 @@ def cell_at(cells: Cells, j: int) -> Cell:
         cells.delta_mu[j],
         cells.minimum_friction[j],
     )
+
+
+@inlined
+def uncounted_cells(cells: Cells) -> Cells:
+    """The same cells (`decorators.uncounted`)."""
+    return Cells(
+        uncounted(cells.tan_theta),
+        uncounted(cells.mu_s),
+        uncounted(cells.amplitude),
+        uncounted(cells.yield_acceleration),
+        uncounted(cells.decay_rate),
+        uncounted(cells.delta_mu),
+        uncounted(cells.minimum_friction),
+    )
+
+
+@inlined
+def uncounted_wave(wave: Wave) -> Wave:
+    """The same wave (`decorators.uncounted`)."""
+    return Wave(
+        uncounted(wave.pieces), uncounted(wave.cycle), uncounted(wave.shape), uncounted(wave.interval),
+        uncounted(wave.height), uncounted(wave.same), uncounted(wave.rises), wave.highest, wave.lowest, wave.lead,
+        wave.repeats, wave.again,
+    )  # fmt: skip
 
 
 @scalar

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels.block import FRICTION_ESTIMATED, NEAR_MODE_LIMIT, Block
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.motion.pieces import BEGIN, FIRST, JUMPS, LAST, Wave

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, scalar, uncounted
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
@@ -38,9 +38,9 @@ from slipsweep.kernels.block import (
 )
 from slipsweep.kernels.continuous import zeros_of_relative_acceleration
 from slipsweep.kernels.eq4 import eq4_integrals
-from slipsweep.kernels.exact import Workspace, pulse
+from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
 from slipsweep.kernels.excitation import offset_at, phase_at
-from slipsweep.kernels.grid import Cells, solve_each
+from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
@@ -128,7 +128,7 @@ def follow_straight(
     block: Block, wave: Wave, p: int, tau: float, until: Following, wants_peak: bool, workspace: Workspace
 ) -> tuple[float, float, float]:
     """Eq. 4 from rest, τ on piece p, to where it ends: gains of V and W, the largest V."""
-    pieces, nodes = wave.pieces, workspace.nodes
+    pieces = wave.pieces
     velocity, displacement, peak, up, down = 0.0, 0.0, 0.0, 0, 0
     if wants_peak:
         zeros = zeros_of_relative_acceleration(block, wave, workspace)
@@ -147,8 +147,8 @@ def follow_straight(
             if min(first, last) < zero < max(first, last):
                 at = offset_at(pieces, q, block.amplitude, zero)
                 if start < at < end:
-                    peak = max(peak, velocity + eq4_integrals(block, pieces, q, start, at, nodes)[0])
-        gained, displaced = eq4_integrals(block, pieces, q, start, end, nodes)
+                    peak = max(peak, velocity + eq4_integrals(block, pieces, q, start, at)[0])
+        gained, displaced = eq4_integrals(block, pieces, q, start, end)
         displacement += velocity * (end - start) + displaced
         velocity += gained
         peak = max(peak, velocity)
@@ -270,4 +270,5 @@ def _solve(cell: Cell, problem: Problem) -> Motion:
 @kernel
 def solve_record(cells: Cells, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
     """Solve the cells of a tile under a record exactly; `results` is (fields of `Motion`, cells)."""
-    solve_each(_solve, cells, Problem(options, wave, workspace), results)
+    problem = Problem(options, uncounted_wave(wave), uncounted_workspace(workspace))
+    solve_each(_solve, uncounted_cells(cells), problem, uncounted(results))

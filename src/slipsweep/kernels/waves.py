@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import inlined, scalar, uncounted
 from slipsweep.kernels.block import (
     NO_VALUE,
     UNSOLVED,
@@ -20,8 +20,8 @@ from slipsweep.kernels.block import (
     without_estimates,
 )
 from slipsweep.kernels.continuous import slide_continuously
-from slipsweep.kernels.exact import Workspace, pulse, yield_governs
-from slipsweep.kernels.grid import Cells, solve_each
+from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace, yield_governs
+from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, validity_before
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
@@ -75,4 +75,5 @@ def _solve(cell: Cell, problem: Problem) -> Motion:
 @kernel
 def solve_waves(cells: Cells, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
     """Solve the cells of a tile under a waveform exactly; `results` is (fields of `Motion`, cells)."""
-    solve_each(_solve, cells, Problem(options, wave, workspace), results)
+    problem = Problem(options, uncounted_wave(wave), uncounted_workspace(workspace))
+    solve_each(_solve, uncounted_cells(cells), problem, uncounted(results))
