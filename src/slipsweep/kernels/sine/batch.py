@@ -1,8 +1,8 @@
 """A batch: cells whose motion is computed together, and Eq. 4 in them.
 
-A batch is a NumPy record with an array of `WIDTH` numbers for each quantity, so that the compiler knows where each
-array is, that no two overlap and how long they are: then a loop over the cells of a batch becomes SIMD.  All `WIDTH` cells
-are computed, used or not: a scalar remainder of a loop would round otherwise, and the last digits of a cell would depend
+A batch is a NumPy record with an array of `WIDTH` numbers for each quantity.  So the compiler knows where each array
+is, that no two overlap and how long they are: a loop over the cells of a batch becomes SIMD.  All `WIDTH` cells are
+computed, used or not: a scalar remainder of a loop would round otherwise, and the last digits of a cell would depend
 on how many others there are.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, versine
+from slipsweep.kernels.block import Cell
 from slipsweep.kernels.grid import Cells
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_derivatives
@@ -42,11 +43,11 @@ BATCH = np.dtype(
                 # continuous sliding (`continuous`)
                 "quarter", "drift", "missed", "rebound",
                 # whether all events have been found, and the flags of the motion
-                "solved", "flags",
+                "solved", "validity",
             )
         ]
-        # which cell of the results this is, and the kind of its motion (`kinds`)
-        + [("cell", np.int64, (WIDTH,)), ("kind", np.int64, (WIDTH,))],
+        # which cell of the results this is, and the kind of its motion (`kinds`); how many cells there are
+        + [("cell", np.int64, (WIDTH,)), ("kind", np.int64, (WIDTH,)), ("used", np.int64)],
     )
 )  # fmt: skip
 
@@ -62,9 +63,10 @@ _MOST_STEPS = 32
 
 
 @inlined
-def load(cells: Cells, first: int, size: int, batch: Batch) -> None:
-    """Take `size` cells, from the `first` on, into a batch; the fields of estimates may be NaN as they are given."""
-    for j in range(size):
+def load(cells: Cells, first: int, batch: Batch) -> None:
+    """Fill a batch with cells, from the `first` on; fields of the block that have estimates are NaN where not given."""
+    batch.used = min(WIDTH, cells.amplitude.size - first)
+    for j in range(batch.used):
         batch.tan_theta[j] = cells.tan_theta[first + j]
         batch.mu_s[j] = cells.mu_s[first + j]
         batch.amplitude[j] = cells.amplitude[first + j]
@@ -72,6 +74,15 @@ def load(cells: Cells, first: int, size: int, batch: Batch) -> None:
         batch.decay_rate[j] = cells.decay_rate[first + j]
         batch.delta_mu[j] = cells.delta_mu[first + j]
         batch.minimum_friction[j] = cells.minimum_friction[first + j]
+
+
+@inlined
+def given(batch: Batch, j: int) -> Cell:
+    """What is given of cell j of a batch."""
+    return Cell(
+        batch.tan_theta[j], batch.mu_s[j], batch.amplitude[j], batch.yield_acceleration[j], batch.decay_rate[j],
+        batch.delta_mu[j], batch.minimum_friction[j],
+    )  # fmt: skip
 
 
 @inlined

@@ -23,7 +23,7 @@ from slipsweep.kernels.sine.batch import (
 )
 
 #: Coefficients, highest first, of ∫ e^(−k sin φ) dφ over [0, π/2] in powers of 4 − k: integrals of
-#: sinⁿ e^(−4 sin) / n!, all positive.  31 terms give 4e-16 for k from 0 to 6; about 4, no digits cancel where k is large.
+#: sinⁿ e^(−4 sin) / n!, all positive.  31 terms give 4e-16 for k from 0 to 6.
 _CENTRE = 4.0
 _PANEL = HALF_PI / 8
 _SINES = np.sin(_PANEL * (np.arange(8)[:, np.newaxis] + NODES))
@@ -47,14 +47,18 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 @scalar
 def slide_on(batch: Batch, options: Options) -> None:
-    """W of N cycles, and the largest V.
+    """W of N cycles by Eq. 4 throughout.
 
     Over a rising quarter of the cycle let q₀ = ∫ e^(−k sin φ) dφ, q₁ = ∫ sin φ e^(−k sin φ) dφ, k = λA/g, and
 
-        G = g (μs π/2 − (μs + Δμ) q₀)        R = A tan θ ((μs − tan θ) π/2-fold mean − (μs + Δμ) q₁)
+        G = g (μs π/2 − (μs + Δμ) q₀)        R = A tan θ (μs − tan θ − (μs + Δμ) q₁)
 
-    Then V gains G + R over a quarter of the positive half cycle, R − G over one of the negative, and the drift 4R over a
-    cycle.  Before Üg = Üy, at ψy, the first cycle misses d₀ = ∫ D dψ and d₁ = ∫ (ψy − ψ) D dψ.
+    V gains G + R over a quarter of the positive half cycle (`quarter`), R − G over one of the negative, and 4R over a
+    cycle (`drift`).  Up to Üg = Üy, at ψy, the first cycle misses d₀ = ∫ D dψ (`missed`) and d₁ = ∫ (ψy − ψ) D dψ:
+
+        W₁ = ψy d₀ − d₁ + (π/2)(2 (G + R) − d₀) + π (2 (G + R) − d₀ + (R − G))
+
+        W = W₁ + (N − 1) π (3 (G + R) + (R − G) − 2 d₀ + 4R N)
     """
     g = options.g
     for j in range(WIDTH):
@@ -64,28 +68,25 @@ def slide_on(batch: Batch, options: Options) -> None:
         drift = amplitude * tan_theta * ((mu_s - tan_theta) - largest_friction * with_sine)
         batch.quarter[j] = g * (HALF_PI * mu_s - largest_friction * plain) + drift
         batch.drift[j] = 4.0 * drift
-        batch.start[j], batch.end[j] = -HALF_PI, batch.yield_phase[j]
-        batch.peak_velocity[j], batch.flags[j], batch.solved[j] = math.nan, 0.0, 1.0
+        batch.start[j], batch.end[j], batch.level[j] = -HALF_PI, batch.yield_phase[j], 0.0
+        batch.peak_velocity[j], batch.validity[j], batch.solved[j] = math.nan, 0.0, 1.0
     integrate_eq4(batch, 1.0, g)
     later = options.cycles - 1.0
     for j in range(WIDTH):
         missed, drift, up, yields = batch.gain[j], batch.drift[j], batch.quarter[j], batch.yield_phase[j]
         down = 0.5 * drift - up  # over a quarter of the negative half cycle
-        # to the peak W misses what D would have given before Üg = Üy; the other quarters are whole
         first = yields * missed - batch.moment[j] + HALF_PI * (2.0 * up - missed) + math.pi * (2.0 * up - missed + down)
-        again = 2.0 * (drift - missed) + 3.0 * up + down + drift * (later - 1.0)
+        again = 3.0 * up + down - 2.0 * missed + drift * options.cycles
         batch.displacement[j], batch.missed[j] = first + later * math.pi * again, missed
-    if options.wants_peak:
-        find_peak_velocity(batch, options.cycles, g)
 
 
 @scalar
 def find_rebound(batch: Batch, side: float, g: float) -> None:
     """∫ D dψ on the rise of the half cycle of a `side`, from Üg = 0 to where D changes its sign, or 0: field `rebound`.
 
-    D is ∓ g Δμ at Üg = 0.  On the positive half it is concave (by `kinds.sort`), on the negative one convex (as long as the
-    block does not lift off): it changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on the
-    positive half, behind it on the negative one, from where Newton's iteration passes it once, and not again.
+    D is ∓ g Δμ at Üg = 0.  On the positive half it is concave (by `kinds.sort`), on the negative one convex (as long as
+    the block does not lift off): it changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on
+    the positive half, behind it on the negative one, from where Newton's iteration passes it once, and not again.
     """
     for j in range(WIDTH):
         at_peak, slope = relative_acceleration(batch, j, side * batch.amplitude[j], g)
@@ -105,12 +106,13 @@ def find_rebound(batch: Batch, side: float, g: float) -> None:
 
 
 @scalar
-def find_peak_velocity(batch: Batch, cycles: int, g: float) -> None:
+def find_peak_velocity(batch: Batch, options: Options) -> None:
     """The largest V of all cycles: at a zero of D, or at the end of a half cycle.
 
     The fall mirrors the rise: D changes its sign back where ∫ D dψ, from Üg = 0 on, is that of the half cycle less the
     `rebound`.
     """
+    cycles, g = options.cycles, options.g
     find_rebound(batch, 1.0, g)
     for j in range(WIDTH):
         batch.rebound[j] = batch.gain[j]

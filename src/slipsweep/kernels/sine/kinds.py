@@ -7,8 +7,8 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
-from slipsweep.kernels.block import MONOTONE, Cell, Options, decay_rate_of, interface_of
-from slipsweep.kernels.sine.batch import MOST_E_FOLDINGS, WIDTH, Batch, relative_acceleration, response
+from slipsweep.kernels.block import MONOTONE, Options, decay_rate_of, interface_of
+from slipsweep.kernels.sine.batch import MOST_E_FOLDINGS, WIDTH, Batch, given, relative_acceleration, response
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
@@ -18,15 +18,6 @@ YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON = range(4)
 KINDS = 4
 #: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg; and any other.
 RESTS, OTHER = 4, 5
-
-
-@inlined
-def cell_at(batch: Batch, j: int) -> Cell:
-    """What is given of cell j of a batch."""
-    return Cell(
-        batch.tan_theta[j], batch.mu_s[j], batch.amplitude[j], batch.yield_acceleration[j], batch.decay_rate[j],
-        batch.delta_mu[j], batch.minimum_friction[j],
-    )  # fmt: skip
 
 
 @inlined
@@ -65,25 +56,25 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 
 
 @scalar
-def sort(batch: Batch, first: int, size: int, options: Options, results: np.ndarray) -> None:
+def sort(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
     """The block of each cell of a batch and the kind of its motion; mode and a-priori validity go into the results."""
     g, slides, sticks = options.g, 0, 0
     for j in range(WIDTH):
-        cell = cell_at(batch, j)
+        cell = given(batch, j)
         interface = interface_of(cell, options.rise, g)
         batch.yield_acceleration[j], batch.delta_mu[j] = interface.yield_acceleration, interface.delta_mu
         batch.minimum_friction[j] = interface.minimum_friction
-        batch.sliding_mode[j], batch.flags[j] = interface.sliding_mode, interface.validity
+        batch.sliding_mode[j], batch.validity[j] = interface.sliding_mode, interface.validity
         batch.kind[j] = RESTS
         slides += 1 if interface.sliding_mode > STUCK else 0
         sticks += 1 if interface.sliding_mode == STICK_SLIP else 0
-    for j in range(size):
-        results[2, first + j], results[3, first + j] = batch.sliding_mode[j], batch.flags[j]
+    for j in range(batch.used):
+        results[2, first + j], results[3, first + j] = batch.sliding_mode[j], batch.validity[j]
     # neighbours are mostly alike: what none of them needs is left out
     if slides == 0:
         return
     for j in range(WIDTH):
-        batch.decay_rate[j] = decay_rate_of(cell_at(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g)
+        batch.decay_rate[j] = decay_rate_of(given(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g)
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
     lagging = 0
     if sticks > 0:

@@ -28,19 +28,6 @@ _LEAST = 1e-150
 
 
 @scalar
-def solve_pulses(batch: Batch, kind: int, options: Options) -> None:
-    """W and the largest V of all cycles of a batch of one kind of stick-slip."""
-    begin_to_slide(batch, kind, options.g)
-    rise(batch, kind, options.g)
-    fall(batch, options)
-    if options.recoupling == INTEGRATE:  # at rest within the cycle: all are alike
-        for j in range(WIDTH):
-            batch.displacement[j] *= options.cycles
-    else:
-        attenuate(batch, kind, options.cycles)
-
-
-@scalar
 def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
     """t1: the ψ at which a cell begins to slide (`start`) and the b that it then holds (`level`).
 
@@ -48,7 +35,7 @@ def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
     docs/numerics.md#onset-and-switch
     """
     for j in range(WIDTH):
-        batch.solved[j], batch.flags[j] = 1.0, 0.0
+        batch.solved[j], batch.validity[j] = 1.0, 0.0
         batch.level[j], batch.start[j] = batch.yield_acceleration[j], batch.yield_phase[j]
     if kind != STICKS_AT_YIELD:
         return
@@ -104,8 +91,8 @@ def fall(batch: Batch, options: Options) -> None:
     """b held from the peak to the stop; with Eq. 12 no further than to t5, Üg = 0, where `velocity` is then V.
 
     V at t5 is V + A − b π/2.  V is largest, V₀, at Üg = b, ψ₀, and below the parabola V₀ − ½ A sin ψ₀ (ψ − ψ₀)²
-    from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ ≥ 2 χ²/π².  The zeros of these are
-    beyond the stop: there the iteration starts.
+    from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ ≥ 2 χ²/π².  The zeros of the
+    parabola, and of that with 2 χ²/π², are beyond the stop: there the iteration starts.
     docs/numerics.md#stop
     """
     eq12 = options.recoupling != INTEGRATE
@@ -128,7 +115,7 @@ def fall(batch: Batch, options: Options) -> None:
             after_t5 = HALF_PI + min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi)
             beyond = HALF_PI if eq12 else after_t5
             batch.event[j] = beyond if at_t5 > 0.0 else before_t5
-            batch.peak_velocity[j] = peak
+            batch.peak_velocity[j] = peak if options.wants_peak else math.nan
     if missing > 0:
         find_stop(batch, HALF_PI if eq12 else 3.0 * HALF_PI)
     for j in range(WIDTH):
@@ -140,19 +127,24 @@ def fall(batch: Batch, options: Options) -> None:
 
 
 @scalar
-def attenuate(batch: Batch, kind: int, cycles: int) -> None:
-    """Eq. 12 from t5 on, and all cycles.
+def repeat(batch: Batch, kind: int, options: Options) -> None:
+    """Eq. 12 from t5 on, and all cycles: W, and the largest V.
 
-    Let L be V at t5, M be W up to there, v₁ what Eq. 12 leaves of L to the next Üg = Üy, h the phase from Üg = Üy to t5, and
-    W₀ = M + (L² − v₁²)/(2b).  Where a block that moves at Üg = Üy goes on as one at rest does, with b = Üy, each of N
-    cycles adds v₁ to V, and the last slides to its stop:
+    By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let L be V and M be W at t5, v₁
+    what is left of L at the next Üg = Üy, h the phase from Üg = Üy to t5, and W₀ = M + (L² − v₁²)/(2b).  Where a block
+    that moves at Üg = Üy goes on as one at rest does, with b = Üy, each of N cycles adds v₁ to V, and the last slides
+    to its stop:
 
         W = (N − 1)(W₀ + π v₁ (N − 2)) + M + (N − 1) v₁ h + (L + (N − 1) v₁)²/(2b)
 
     A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is left to the general kernel.
     docs/numerics.md#batches-of-the-sine
     """
-    later = cycles - 1.0
+    if options.recoupling == INTEGRATE:
+        for j in range(WIDTH):
+            batch.displacement[j] *= options.cycles
+        return
+    later = options.cycles - 1.0
     for j in range(WIDTH):
         held, at_t5, to_t5 = batch.held[j], batch.velocity[j], batch.displacement[j]
         pause = 3.0 * HALF_PI + batch.yield_phase[j]
@@ -163,6 +155,6 @@ def attenuate(batch: Batch, kind: int, cycles: int) -> None:
         last += eq.attenuated_displacement(last_at_t5, held, math.inf)
         batch.displacement[j] = later * (cycle + math.pi * left * (later - 1.0)) + last
         batch.peak_velocity[j] += later * left
-        moves = (left > 0.0) & (cycles > 1)
-        batch.flags[j] = NOT_RECOUPLED if moves else 0.0
+        moves = (left > 0.0) & (later > 0.0)
+        batch.validity[j] = NOT_RECOUPLED if moves else 0.0
         batch.solved[j] = 0.0 if moves & (kind == STICKS_AT_YIELD) else batch.solved[j]

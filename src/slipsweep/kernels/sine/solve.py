@@ -10,15 +10,17 @@ from slipsweep.kernels.block import UNSOLVED, Options, settled, without_estimate
 from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
 from slipsweep.kernels.grid import Cells
 from slipsweep.kernels.sine.batch import BATCH, WIDTH, Batch, load
-from slipsweep.kernels.sine.continuous import slide_on
+from slipsweep.kernels.sine.continuous import find_peak_velocity, slide_on
 from slipsweep.kernels.sine.kinds import KINDS, OTHER, RESTS, SLIDES_ON, YIELD_GOVERNS, sort
-from slipsweep.kernels.sine.pulse import solve_pulses
+from slipsweep.kernels.sine.pulse import begin_to_slide, fall, repeat, rise
 from slipsweep.model.equations import STUCK
 
 
 @inlined
-def put(source: Batch, j: int, target: Batch, k: int) -> None:
-    """Put the block of cell j of a batch into place k of another."""
+def append(source: Batch, j: int, cell: int, target: Batch) -> None:
+    """Append the block of cell j of a batch, a `cell` of the results, to another batch."""
+    k = target.used
+    target.cell[k] = cell
     target.amplitude[k] = source.amplitude[j]
     target.yield_acceleration[k] = source.yield_acceleration[j]
     target.mu_s[k] = source.mu_s[j]
@@ -26,26 +28,34 @@ def put(source: Batch, j: int, target: Batch, k: int) -> None:
     target.delta_mu[k] = source.delta_mu[j]
     target.decay_rate[k] = source.decay_rate[j]
     target.yield_phase[k] = source.yield_phase[j]
+    target.used = k + 1
 
 
 @scalar
-def solve_batch(batch: Batch, kind: int, used: int, options: Options, results: np.ndarray) -> int:
-    """Solve a batch whose first `used` cells are of one kind, and store what was found; how many remain unsolved."""
+def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) -> int:
+    """Solve a batch of cells of one kind, store what was found, and empty it; how many cells remain unsolved."""
+    used = batch.used
     for k in range(used, WIDTH):
-        put(batch, 0, batch, k)
+        append(batch, k - used, batch.cell[k - used], batch)
     if kind == SLIDES_ON:
         slide_on(batch, options)
+        if options.wants_peak:
+            find_peak_velocity(batch, options)
     else:
-        solve_pulses(batch, kind, options)
+        begin_to_slide(batch, kind, options.g)
+        rise(batch, kind, options.g)
+        fall(batch, options)
+        repeat(batch, kind, options)
     governs = YIELD_GOVERNS_FLAG if kind == YIELD_GOVERNS else 0
     unsolved = 0
     for k in range(used):
         cell, displacement = batch.cell[k], batch.displacement[k]
-        validity = without_estimates(int(results[3, cell]) | int(batch.flags[k]) | governs)
+        validity = without_estimates(int(results[3, cell]) | int(batch.validity[k]) | governs)
         solved = batch.solved[k] > 0.0
         results[0, cell], results[1, cell] = displacement, batch.peak_velocity[k]
         results[3, cell] = settled(validity, displacement, batch.amplitude[k]) if solved else UNSOLVED
         unsolved += 0 if solved else 1
+    batch.used = 0
     return unsolved
 
 
@@ -55,15 +65,15 @@ def solve_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
 
     Returns how many are left to the kernel that solves any waveform: their validity is `UNSOLVED`.
     """
-    batches = np.zeros(KINDS + 1, BATCH)
-    used = np.zeros(KINDS, np.int64)
+    batches = np.empty(KINDS + 1, BATCH)
+    for kind in range(KINDS):
+        batches[kind].used = 0
     loaded = batches[KINDS]
     unsolved = 0
-    for first in range(0, results.shape[1], WIDTH):
-        size = min(WIDTH, results.shape[1] - first)
-        load(cells, first, size, loaded)
-        sort(loaded, first, size, options, results)
-        for j in range(size):
+    for first in range(0, cells.amplitude.size, WIDTH):
+        load(cells, first, loaded)
+        sort(loaded, first, options, results)
+        for j in range(loaded.used):
             kind, cell = loaded.kind[j], first + j
             if kind == RESTS:
                 at_rest = 0.0 if loaded.sliding_mode[j] >= STUCK else math.nan
@@ -72,14 +82,10 @@ def solve_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
                 results[3, cell] = UNSOLVED
                 unsolved += 1
             else:
-                batch = batches[kind]
-                put(loaded, j, batch, used[kind])
-                batch.cell[used[kind]] = cell
-                used[kind] += 1
-                if used[kind] == WIDTH:
-                    unsolved += solve_batch(batch, kind, WIDTH, options, results)
-                    used[kind] = 0
+                append(loaded, j, cell, batches[kind])
+                if batches[kind].used == WIDTH:
+                    unsolved += solve_batch(batches[kind], kind, options, results)
     for kind in range(KINDS):
-        if used[kind] > 0:
-            unsolved += solve_batch(batches[kind], kind, used[kind], options, results)
+        if batches[kind].used > 0:
+            unsolved += solve_batch(batches[kind], kind, options, results)
     return unsolved

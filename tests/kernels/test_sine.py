@@ -1,0 +1,243 @@
+"""The sine's batches: reference cases, quadrature by SciPy in every kind of motion, and invariances."""
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from slipsweep.kernels.block import (
+    EQ12,
+    INTEGRATE,
+    LITERAL,
+    MONOTONE,
+    NEWMARK,
+    NOT_RECOUPLED,
+    UNSOLVED,
+    UPSLOPE,
+    YIELD_GOVERNS,
+    Motion,
+    Options,
+)
+from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.sine.newmark import solve_newmark_sine
+from slipsweep.kernels.sine.solve import solve_sine
+from tests.support.cases import Case, read_cases
+
+Array = NDArray[np.float64]
+G = 9.81
+PLAIN = Options(MONOTONE, EQ12, 1, True, G)
+FIELDS = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
+
+#: Most cells that are left to the general kernel, of those in cases.csv: sharp decay, a block that comes to the next
+#: pulse in motion and sticks there when at rest, the literal rise.
+LEFT = {"literal": 12, "near_failure": 7, "sharp_decay": 4, "given_friction": 2, "measured_yield": 1}
+
+
+class Found(NamedTuple):
+    displacement: Array
+    peak_velocity: Array
+    mode: Array
+    validity: NDArray[np.int64]
+    left: int
+
+
+def solve(cells: Cells, options: Options = PLAIN) -> Found:
+    results = np.full((len(Motion._fields), cells.amplitude.size), np.nan)
+    left = (solve_newmark_sine if options.rise == NEWMARK else solve_sine)(cells, options, results)
+    return Found(*results[:3], results[3].astype(int), left)
+
+
+def cells_of(theta: Array, mu_s: Array, amplitude: Array, **given: Array) -> Cells:
+    rest = (np.broadcast_to(given.get(name, math.nan), amplitude.shape).astype(float) for name in FIELDS)
+    return Cells(np.tan(np.radians(theta)), mu_s, amplitude, *rest)
+
+
+def pick(cells: Cells, where: NDArray[np.int64]) -> Cells:
+    return Cells(*(np.ascontiguousarray(values[where]) for values in cells))
+
+
+def random_cells(number: int, seed: int) -> Cells:
+    """Cells of all kinds: half of them with Coulomb's Üy, half with a measured one, often small."""
+    rng = np.random.default_rng(seed)
+    theta, mu_s = rng.uniform(0.0, 15.0, number), rng.uniform(0.3, 0.6, number)
+    measured = np.where(rng.random(number) < 0.5, math.nan, np.exp(rng.uniform(-3.0, 1.0, number)))
+    return cells_of(theta, mu_s, np.exp(rng.uniform(0.0, 2.5, number)), yield_acceleration=measured)
+
+
+def by_options(cases: Iterable[Case]) -> list[list[Case]]:
+    groups: dict[tuple[object, ...], list[Case]] = defaultdict(list)
+    for case in cases:
+        groups[case.model, case.rise, case.recoupling, case.cycles].append(case)
+    return list(groups.values())
+
+
+@pytest.mark.parametrize("category", sorted({case.category for case in read_cases()}))
+def test_reference_cases(category: str) -> None:
+    left = 0
+    for group in by_options(case for case in read_cases() if case.category == category and not case.uplift):
+        first = group[0]
+        rise = NEWMARK if first.model == "newmark" else {"monotone": MONOTONE, "literal": LITERAL}[first.rise]
+        options = Options(rise, INTEGRATE if first.recoupling == "integrate" else EQ12, first.cycles, True, G)
+        theta, mu_s, amplitude = (np.array([getattr(c, n) for c in group]) for n in ("theta", "mu_s", "amplitude"))
+        given = {name: np.array([dict(case.given).get(name, math.nan) for case in group]) for name in FIELDS}
+        found = solve(cells_of(theta, mu_s, amplitude, **given), options)
+        for j, case in enumerate(group):
+            if found.validity[j] == UNSOLVED:
+                left += 1
+                continue
+            omega = 2.0 * math.pi * case.frequency
+            displacement, velocity = float(case.permanent_displacement), float(case.peak_relative_velocity)
+            # within what the last digit of an input moves
+            assert found.displacement[j] / omega**2 == pytest.approx(
+                displacement, rel=2e-13, abs=1e-12 * case.displacement_scale
+            ), case
+            assert found.peak_velocity[j] / omega == pytest.approx(
+                velocity, rel=2e-13, abs=1e-12 * case.velocity_scale
+            ), case
+            assert found.mode[j] == case.sliding_mode, case
+            if case.model != "newmark" and case.sliding_mode == 1:
+                assert (found.validity[j] & NOT_RECOUPLED == 0) == case.recoupled, case
+                assert (found.validity[j] & YIELD_GOVERNS > 0) == case.eq4_below_yield, case
+    assert left <= LEFT.get(category, 0)
+
+
+def by_scipy(cells: Cells, j: int, mode: int, recoupling: int) -> tuple[float, float]:
+    """W of a cycle and the largest V of a block that slides, by the rules of docs/model.md."""
+    tan_theta, mu_s, amplitude, onset, *_ = (values[j] for values in cells)
+    onset = G * (mu_s - tan_theta) / (1.0 + mu_s * tan_theta) if math.isnan(onset) else onset
+    ratio = amplitude / ((onset + G * mu_s) / (1.0 - tan_theta * (mu_s - tan_theta)))
+    at_zero, least = (mu_s * ratio, 0.01) if mode == 2 else (mu_s / ratio, mu_s**2 * ratio)
+    decay = math.log(at_zero / least) / amplitude
+
+    def eq4(x: float) -> float:
+        lag = (G + x * tan_theta) * (mu_s - tan_theta - at_zero * math.exp(-decay * abs(x))) + G * tan_theta
+        return x - math.copysign(1.0, x) * lag
+
+    def gains(rate: Callable[[float], float], start: float, end: float) -> tuple[float, float]:
+        """Of V and of W from rest, by parts of smooth rate."""
+        velocity, moved = 0.0, 0.0
+        for left, right in pairwise(
+            [start, *(k * math.pi / 2 for k in (1, 2, 3) if start < k * math.pi / 2 < end), end]
+        ):
+            moment = quad(lambda phi, right=right: (right - phi) * rate(phi), left, right, epsabs=1e-13)[0]
+            moved += velocity * (right - left) + moment
+            velocity += quad(rate, left, right, epsabs=1e-13)[0]
+        return velocity, moved
+
+    def ground(phi: float) -> float:
+        return float(amplitude * math.sin(phi))
+
+    if mode == 2:
+        start, end = math.asin(onset / amplitude), 2.0 * math.pi
+        edges = np.concatenate([np.linspace(start, math.pi, 5001), np.linspace(math.pi, end, 5001)[1:]])
+        rates = np.array([ground(phi) - eq4(ground(phi)) for phi in 0.5 * (edges[1:] + edges[:-1])])
+        steps = np.cumsum(rates * np.diff(edges))
+        return gains(lambda phi: ground(phi) - eq4(ground(phi)), start, end)[1], max(steps)
+    if eq4(onset) >= onset:  # sticks there
+        onset = brentq(lambda x: x - eq4(x), onset, amplitude, xtol=1e-14)
+    start = math.asin(onset / amplitude)
+    # where b leaves the value of the onset, a bend of the rate
+    beyond, bend = onset * (1.0 + 1e-7), start
+    if eq4(beyond) < onset < eq4(amplitude):
+        bend = math.asin(brentq(lambda x: eq4(x) - onset, beyond, amplitude) / amplitude)
+    held, to_bend = max(onset, eq4(amplitude)), gains(lambda phi: ground(phi) - onset, start, bend)
+    rising = gains(lambda phi: ground(phi) - max(onset, eq4(ground(phi))), bend, math.pi / 2)
+    at_peak, moved = to_bend[0] + rising[0], to_bend[1] + to_bend[0] * (math.pi / 2 - bend) + rising[1]
+
+    def velocity(phi: float) -> float:
+        return float(at_peak + amplitude * (-math.cos(phi)) - held * (phi - math.pi / 2))
+
+    top = math.pi - math.asin(held / amplitude)
+    last = math.pi if recoupling == EQ12 else 2.0 * math.pi
+    stop = brentq(velocity, top, last, xtol=1e-14) if velocity(last) < 0.0 else last
+    moved += quad(velocity, math.pi / 2, stop)[0] + max(velocity(stop), 0.0) ** 2 / (2.0 * held)
+    return moved, velocity(top)
+
+
+@pytest.mark.parametrize("recoupling", [EQ12, INTEGRATE])
+def test_every_kind_by_quadrature(recoupling: int) -> None:
+    cells = random_cells(400, 1)
+    found = solve(cells, PLAIN._replace(recoupling=recoupling))
+    assert found.left <= 8
+    kinds = defaultdict(int)
+    for j in np.flatnonzero((found.mode > 0) & (found.displacement > 0.0) & (found.validity != UNSOLVED)):
+        displacement, peak = by_scipy(cells, j, found.mode[j], recoupling)
+        scale = cells.amplitude[j]
+        assert found.displacement[j] == pytest.approx(displacement, rel=1e-9, abs=1e-10 * scale), j
+        assert found.peak_velocity[j] == pytest.approx(peak, rel=1e-6 if found.mode[j] == 2 else 1e-9), j
+        kinds[found.mode[j], found.validity[j] & YIELD_GOVERNS > 0] += 1
+    assert min(kinds[1, True], kinds[1, False], kinds[2, False]) >= 20
+
+
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_cell_does_not_depend_on_others(cycles: int) -> None:
+    """To the last digit: batches are whole, whatever their number."""
+    cells, options = random_cells(500, 2), PLAIN._replace(cycles=cycles)
+    whole, order = solve(cells, options), np.random.default_rng(3).permutation(500)
+    for where in (order, order[:1], order[:33], np.arange(65)):
+        part = solve(pick(cells, where), options)
+        for found, expected in zip(part[:4], whole[:4], strict=True):
+            known = whole.validity[where] != UNSOLVED
+            np.testing.assert_array_equal(found[known], expected[where][known])
+
+
+def test_accelerations_scale() -> None:
+    """Twice all accelerations, g among them: twice W and V, bit by bit."""
+    cells = random_cells(2000, 4)
+    twice = cells._replace(amplitude=2.0 * cells.amplitude, yield_acceleration=2.0 * cells.yield_acceleration)
+    found, double = solve(cells), solve(twice, PLAIN._replace(g=2.0 * G))
+    np.testing.assert_array_equal(double.displacement, 2.0 * found.displacement)
+    np.testing.assert_array_equal(double.peak_velocity, 2.0 * found.peak_velocity)
+    np.testing.assert_array_equal(double.validity, found.validity)
+
+
+def test_peak_velocity_is_an_option() -> None:
+    cells = random_cells(2000, 5)
+    found, without = solve(cells), solve(cells, PLAIN._replace(wants_peak=False))
+    np.testing.assert_array_equal(without.displacement, found.displacement)
+    np.testing.assert_array_equal(without.validity, found.validity)
+    assert np.isnan(without.peak_velocity[found.peak_velocity > 0.0]).all()
+
+
+def test_cycles() -> None:
+    """By integration N cycles are N times one; with drift or Eq. 12 second differences of W over N are constant."""
+    cells = random_cells(4000, 6)
+    one, two, three, four = (solve(cells, PLAIN._replace(cycles=n)) for n in (1, 2, 3, 4))
+    solved = four.validity != UNSOLVED
+    w1, w2, w3, w4 = (found.displacement[solved] for found in (one, two, three, four))
+    np.testing.assert_allclose(w4 - 2.0 * w3 + w2, w3 - 2.0 * w2 + w1, rtol=0.0, atol=1e-11 * np.nanmax(w4))
+    recoupled = solved & (four.mode == 1) & (four.validity & NOT_RECOUPLED == 0)
+    np.testing.assert_allclose(four.displacement[recoupled], 4.0 * one.displacement[recoupled], rtol=1e-14)
+    assert (four.validity[solved] & NOT_RECOUPLED > 0).sum() > 20
+    integrated = PLAIN._replace(recoupling=INTEGRATE)
+    slides = one.mode == 1
+    np.testing.assert_array_equal(
+        solve(cells, integrated._replace(cycles=4)).displacement[slides],
+        4.0 * solve(cells, integrated).displacement[slides],
+    )
+
+
+def test_cells_left_are_marked() -> None:
+    """Their number is returned; the literal rise leaves all that stick and slip and move."""
+    cells = random_cells(2000, 7)
+    monotone, literal = solve(cells), solve(cells, PLAIN._replace(rise=LITERAL))
+    for found in (monotone, literal):
+        assert (found.validity == UNSOLVED).sum() == found.left
+    moves = (literal.mode == 1) & (monotone.displacement != 0.0)
+    assert (literal.validity[moves] == UNSOLVED).all()
+    assert monotone.left < 20
+
+
+def test_upslope_is_flagged_where_it_is_no_rounding() -> None:
+    """A steep plane drifts upslope over some cycles; on a level plane there is none."""
+    cells = cells_of(np.array([16.0, 0.0]), np.array([0.3, 0.3]), np.array([15.0, 8.0]))
+    found = solve(cells, PLAIN._replace(cycles=5))
+    assert found.mode.tolist() == [2, 2]
+    assert (found.validity & UPSLOPE > 0).tolist() == [True, False]
