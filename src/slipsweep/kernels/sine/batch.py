@@ -41,7 +41,7 @@ BATCH = np.dtype(
                 # a pulse: b from its beginning and from the peak on, V and W up to now, the largest V
                 "level", "held", "velocity", "displacement", "peak_velocity",
                 # continuous sliding (`continuous`)
-                "quarter", "drift", "missed", "rebound",
+                "quarter", "drift", "missed", "dip",
                 # whether all events have been found, and the flags of the motion
                 "solved", "validity",
             )
@@ -93,17 +93,11 @@ def friction(batch: Batch, j: int, x: float, g: float) -> float:
 
 @inlined
 def relative_acceleration(batch: Batch, j: int, x: float, g: float) -> tuple[float, float]:
-    """Eq. 4 as D(x) = x − E(x), and dD/dx (x ≠ 0, or a zero with the sign of its side)."""
+    """Eq. 4, E, as D(x) = x − E(x), and dD/dx (x ≠ 0, or a zero with the sign of its side)."""
     mu_s, tan_theta, mu = batch.mu_s[j], batch.tan_theta[j], friction(batch, j, x, g)
     friction_slope = exponential_derivatives(mu, batch.decay_rate[j], g)[0]
     slope = eq.relative_acceleration_slope(x, mu, friction_slope, mu_s, tan_theta, g)
     return eq.relative_acceleration(x, mu, mu_s, tan_theta, g), slope
-
-
-@inlined
-def response(batch: Batch, j: int, x: float, g: float) -> float:
-    """Eq. 4: E(x)."""
-    return eq.block_acceleration(x, friction(batch, j, x, g), batch.mu_s[j], batch.tan_theta[j], g)
 
 
 @inlined

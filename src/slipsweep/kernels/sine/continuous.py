@@ -81,44 +81,35 @@ def slide_on(batch: Batch, options: Options) -> None:
 
 
 @scalar
-def find_rebound(batch: Batch, side: float, g: float) -> None:
-    """∫ D dψ on the rise of the half cycle of a `side`, from Üg = 0 to where D changes its sign, or 0: field `rebound`.
-
-    D is ∓ g Δμ at Üg = 0.  On the positive half it is concave (by `kinds.sort`), on the negative one convex (as long as
-    the block does not lift off): it changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on
-    the positive half, behind it on the negative one, from where Newton's iteration passes it once, and not again.
-    """
-    for j in range(WIDTH):
-        at_peak, slope = relative_acceleration(batch, j, side * batch.amplitude[j], g)
-        turns = side * at_peak > 0.0
-        # one that has its first sign at the peak may have changed twice, unless it still goes away from it
-        batch.solved[j] = batch.solved[j] if turns | (slope >= 0.0) else 0.0
-        batch.found[j] = 0.0 if turns else 1.0
-        # μ = μs after ln(1 + r) e-foldings, r = Δμ/μs, nearly 2r/(2 + r)
-        delta_mu = batch.delta_mu[j]
-        at_static = 2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
-        batch.event[j] = at_static if turns else 0.0
-    find_eq4_event(batch, 0.0, side, g)
-    for j in range(WIDTH):
-        batch.solved[j] = min(batch.solved[j], batch.found[j])
-        batch.start[j], batch.end[j] = -HALF_PI, rising_phase(batch.event[j], batch.amplitude[j])
-    integrate_eq4(batch, side, g)
-
-
-@scalar
 def find_peak_velocity(batch: Batch, options: Options) -> None:
-    """The largest V of all cycles: at a zero of D, or at the end of a half cycle.
+    """The largest V of all cycles: where D changes its sign, or at the end of a half cycle.
 
-    The fall mirrors the rise: D changes its sign back where ∫ D dψ, from Üg = 0 on, is that of the half cycle less the
-    `rebound`.
+    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by `kinds.sort`), on the negative
+    one convex (as long as the block does not lift off): it changes its sign once at most.  Where μ = μs it is
+    −tan² θ |Üg|: before the zero on the positive half, behind it on the negative one, from where Newton's iteration
+    passes it once, and not again.  Up to there V gains ∫ D dψ: the `dip` and the `bump`.  The fall mirrors the rise: D
+    changes its sign back when V has gained what it does in the half cycle, less the dip or the bump.
     """
     cycles, g = options.cycles, options.g
-    find_rebound(batch, 1.0, g)
+    for side in (1.0, -1.0):
+        for j in range(WIDTH):
+            at_peak, slope = relative_acceleration(batch, j, side * batch.amplitude[j], g)
+            turns = side * at_peak > 0.0
+            # one that has its first sign at the peak may have changed twice, unless it still goes away from it
+            batch.solved[j] = batch.solved[j] if turns | (slope >= 0.0) else 0.0
+            batch.found[j] = 0.0 if turns else 1.0
+            # μ = μs after ln(1 + r) e-foldings, r = Δμ/μs, nearly 2r/(2 + r)
+            delta_mu = batch.delta_mu[j]
+            at_static = 2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
+            batch.event[j] = at_static if turns else 0.0
+            batch.dip[j] = batch.gain[j]
+        find_eq4_event(batch, 0.0, side, g)
+        for j in range(WIDTH):
+            batch.solved[j] = min(batch.solved[j], batch.found[j])
+            batch.end[j] = rising_phase(batch.event[j], batch.amplitude[j])
+        integrate_eq4(batch, side, g)
     for j in range(WIDTH):
-        batch.rebound[j] = batch.gain[j]
-    find_rebound(batch, -1.0, g)
-    for j in range(WIDTH):
-        dip, bump, missed, drift = batch.rebound[j], batch.gain[j], batch.missed[j], batch.drift[j]
+        dip, bump, missed, drift = batch.dip[j], batch.gain[j], batch.missed[j], batch.drift[j]
         half, other_half = 2.0 * batch.quarter[j], drift - 2.0 * batch.quarter[j]
         # of half cycles that are entered with V = 0, and the negative one with what the positive one has left
         from_yield = max(half, half - dip)

@@ -8,7 +8,7 @@ import numpy as np
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import MONOTONE, Options, decay_rate_of, interface_of
-from slipsweep.kernels.sine.batch import MOST_E_FOLDINGS, WIDTH, Batch, given, relative_acceleration, response
+from slipsweep.kernels.sine.batch import MOST_E_FOLDINGS, WIDTH, Batch, given, relative_acceleration
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
@@ -79,8 +79,9 @@ def sort(batch: Batch, first: int, options: Options, results: np.ndarray) -> Non
     lagging = 0
     if sticks > 0:
         for j in range(WIDTH):
-            batch.response_at_yield[j] = response(batch, j, batch.yield_acceleration[j], g)
-            batch.response_at_peak[j] = response(batch, j, batch.amplitude[j], g)
+            start, end = batch.yield_acceleration[j], batch.amplitude[j]
+            batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
+            batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
             if batch.sliding_mode[j] == STICK_SLIP:
                 batch.kind[j] = pulse_kind(batch, j, g) if options.rise == MONOTONE else OTHER
             lagging += 1 if batch.response_at_peak[j] >= batch.amplitude[j] else 0
