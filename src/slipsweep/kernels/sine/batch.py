@@ -13,7 +13,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, versine
-from slipsweep.kernels.block import Cell
+from slipsweep.kernels.block import Cell, Motion
 from slipsweep.kernels.grid import Cells
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_derivatives
@@ -52,6 +52,11 @@ BATCH = np.dtype(
 )  # fmt: skip
 
 Batch: TypeAlias = np.record
+
+#: Rows of the results, (fields of `Motion`, cells).
+DISPLACEMENT, PEAK_VELOCITY, SLIDING_MODE, VALIDITY = (
+    Motion._fields.index(name) for name in ("displacement", "peak_velocity", "sliding_mode", "validity")
+)
 
 #: Gauss–Legendre rule on [0, 1].  It is right to 1e-13 where friction falls by no more than e^6 (`MOST_E_FOLDINGS`).
 NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
@@ -145,11 +150,11 @@ def integrate_eq4(batch: Batch, side: float, g: float) -> None:
 
 
 @scalar
-def find_eq4_event(batch: Batch, level: float, side: float, g: float) -> None:
-    """Take `event`, an |Üg|, to where D(±|Üg|) = 0, ± is `side`; or, if `level` is 1, to where E(Üg) = b of `level`.
+def find_eq4_event(batch: Batch, holds: float, side: float, g: float) -> None:
+    """The |Üg| at which D(±|Üg|) = 0, ± is `side`; or, if `holds` is 1, at which E(Üg) = b, `level`: field `event`.
 
-    Newton's iteration of all cells that have not `found` it.  It needs no bracket: each begins on the side from which
-    it cannot pass the root (docs/numerics.md#batches-of-the-sine).
+    Newton's iteration of all cells that have not `found` it, from `event` on.  It needs no bracket: each begins on the
+    side from which it cannot pass the root (docs/numerics.md#batches-of-the-sine).
     """
     for _ in range(_MOST_STEPS):
         missing = 0
@@ -157,7 +162,7 @@ def find_eq4_event(batch: Batch, level: float, side: float, g: float) -> None:
             x = batch.event[j]
             rate, slope = relative_acceleration(batch, j, side * x, g)
             # E(x) − b = (x − b) − D
-            step = (level * (x - batch.level[j]) - rate) / (level - side * slope)
+            step = (holds * (x - batch.level[j]) - rate) / (holds - side * slope)
             there = batch.found[j] > 0.0
             batch.event[j] = x if there else x - step
             there |= abs(step) <= _TOLERANCE * min(x, batch.amplitude[j] - x)
@@ -185,9 +190,9 @@ def gains_after_peak(amplitude: float, held: float, psi: float) -> tuple[float, 
 
 @scalar
 def find_stop(batch: Batch, last: float) -> None:
-    """Take `event`, a ψ up to `last`, to where V, `velocity` at the peak, is 0, with b `held` from there on.
+    """The ψ at which V, `velocity` at the peak, is used up with b `held` from there on: field `event`.
 
-    Newton's iteration from beyond the stop, before which V is concave.
+    Newton's iteration of all cells that have not `found` it, from `event` on, beyond the stop, and up to `last`.
     """
     for _ in range(_MOST_STEPS):
         missing = 0

@@ -84,7 +84,7 @@ def slide_on(batch: Batch, options: Options) -> None:
 def find_peak_velocity(batch: Batch, options: Options) -> None:
     """The largest V of all cycles: where D changes its sign, or at the end of a half cycle.
 
-    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by `kinds.sort`), on the negative
+    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by `kinds.classify`), on the negative
     one convex (as long as the block does not lift off): it changes its sign once at most.  Where μ = μs it is
     −tan² θ |Üg|: before the zero on the positive half, behind it on the negative one, from where Newton's iteration
     passes it once, and not again.  Up to there V gains ∫ D dψ: the `dip` and the `bump`.  The fall mirrors the rise: D

@@ -8,7 +8,15 @@ import numpy as np
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import MONOTONE, Options, decay_rate_of, interface_of
-from slipsweep.kernels.sine.batch import MOST_E_FOLDINGS, WIDTH, Batch, given, relative_acceleration
+from slipsweep.kernels.sine.batch import (
+    MOST_E_FOLDINGS,
+    SLIDING_MODE,
+    VALIDITY,
+    WIDTH,
+    Batch,
+    given,
+    relative_acceleration,
+)
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
@@ -56,12 +64,11 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 
 
 @scalar
-def sort(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
+def classify(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
     """The block of each cell of a batch and the kind of its motion; mode and a-priori validity go into the results."""
     g, slides, sticks = options.g, 0, 0
     for j in range(WIDTH):
-        cell = given(batch, j)
-        interface = interface_of(cell, options.rise, g)
+        interface = interface_of(given(batch, j), options.rise, g)
         batch.yield_acceleration[j], batch.delta_mu[j] = interface.yield_acceleration, interface.delta_mu
         batch.minimum_friction[j] = interface.minimum_friction
         batch.sliding_mode[j], batch.validity[j] = interface.sliding_mode, interface.validity
@@ -69,7 +76,7 @@ def sort(batch: Batch, first: int, options: Options, results: np.ndarray) -> Non
         slides += 1 if interface.sliding_mode > STUCK else 0
         sticks += 1 if interface.sliding_mode == STICK_SLIP else 0
     for j in range(batch.used):
-        results[2, first + j], results[3, first + j] = batch.sliding_mode[j], batch.validity[j]
+        results[SLIDING_MODE, first + j], results[VALIDITY, first + j] = batch.sliding_mode[j], batch.validity[j]
     # neighbours are mostly alike: what none of them needs is left out
     if slides == 0:
         return
@@ -91,7 +98,7 @@ def sort(batch: Batch, first: int, options: Options, results: np.ndarray) -> Non
                 batch.kind[j] = RESTS
     for j in range(WIDTH):
         gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
-        # where the peak velocity is wanted, D has to be concave (`continuous`)
+        # for the peak velocity D has to be concave (`continuous`)
         concave = batch.decay_rate[j] >= 2.0 * batch.tan_theta[j]
         if batch.sliding_mode[j] == CONTINUOUS:
             batch.kind[j] = SLIDES_ON if gentle & (concave | (not options.wants_peak)) else OTHER

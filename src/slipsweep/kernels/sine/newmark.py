@@ -12,7 +12,17 @@ from slipsweep.jit.decorators import elementary
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import NEWMARK, Options, interface_of
 from slipsweep.kernels.grid import Cells
-from slipsweep.kernels.sine.batch import BATCH, WIDTH, given, held_gains, load
+from slipsweep.kernels.sine.batch import (
+    BATCH,
+    DISPLACEMENT,
+    PEAK_VELOCITY,
+    SLIDING_MODE,
+    VALIDITY,
+    WIDTH,
+    given,
+    held_gains,
+    load,
+)
 from slipsweep.model.equations import STUCK
 
 
@@ -23,7 +33,7 @@ def newmark_slide(yield_acceleration: float, amplitude: float) -> float:
     s, from 2π to 9/2, is interpolated at 26 Chebyshev nodes (within 3e-17).
     """
     excess = amplitude - yield_acceleration
-    z = 2.0 * math.sqrt(yield_acceleration / amplitude) - 1.0
+    z = 2.0 * math.sqrt(max(yield_acceleration, 0.0) / amplitude) - 1.0
     z2 = z * z
     z4 = z2 * z2
     p0 = 3.029390521856469e-09
@@ -79,6 +89,7 @@ def solve_newmark_sine(cells: Cells, options: Options, results: np.ndarray) -> i
                 at_rest = batch.peak_velocity[j]
                 batch.peak_velocity[j] = 2.0 * to_peak if batch.sliding_mode[j] > STUCK else at_rest
         for j in range(batch.used):
-            results[0, first + j], results[1, first + j] = batch.displacement[j], batch.peak_velocity[j]
-            results[2, first + j], results[3, first + j] = batch.sliding_mode[j], batch.validity[j]
+            cell = first + j
+            results[DISPLACEMENT, cell], results[PEAK_VELOCITY, cell] = batch.displacement[j], batch.peak_velocity[j]
+            results[SLIDING_MODE, cell], results[VALIDITY, cell] = batch.sliding_mode[j], batch.validity[j]
     return 0

@@ -1,4 +1,4 @@
-"""The cells of a tile under a sine: sorted into batches by the kind of their motion, and solved batch by batch."""
+"""The cells of a tile under a sine: put into batches by the kind of their motion, and solved batch by batch."""
 
 import math
 
@@ -9,9 +9,9 @@ from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels.block import UNSOLVED, Options, settled, without_estimates
 from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
 from slipsweep.kernels.grid import Cells
-from slipsweep.kernels.sine.batch import BATCH, WIDTH, Batch, load
+from slipsweep.kernels.sine.batch import BATCH, DISPLACEMENT, PEAK_VELOCITY, VALIDITY, WIDTH, Batch, load
 from slipsweep.kernels.sine.continuous import find_peak_velocity, slide_on
-from slipsweep.kernels.sine.kinds import KINDS, OTHER, RESTS, SLIDES_ON, YIELD_GOVERNS, sort
+from slipsweep.kernels.sine.kinds import KINDS, OTHER, RESTS, SLIDES_ON, YIELD_GOVERNS, classify
 from slipsweep.kernels.sine.pulse import begin_to_slide, fall, repeat, rise
 from slipsweep.model.equations import STUCK
 
@@ -50,10 +50,10 @@ def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) 
     unsolved = 0
     for k in range(used):
         cell, displacement = batch.cell[k], batch.displacement[k]
-        validity = without_estimates(int(results[3, cell]) | int(batch.validity[k]) | governs)
-        solved = batch.solved[k] > 0.0
-        results[0, cell], results[1, cell] = displacement, batch.peak_velocity[k]
-        results[3, cell] = settled(validity, displacement, batch.amplitude[k]) if solved else UNSOLVED
+        validity = without_estimates(int(results[VALIDITY, cell]) | int(batch.validity[k]) | governs)
+        solved = batch.solved[k] > 0.0 and not math.isnan(displacement)  # where sums overflow
+        results[DISPLACEMENT, cell], results[PEAK_VELOCITY, cell] = displacement, batch.peak_velocity[k]
+        results[VALIDITY, cell] = settled(validity, displacement, batch.amplitude[k]) if solved else UNSOLVED
         unsolved += 0 if solved else 1
     batch.used = 0
     return unsolved
@@ -72,14 +72,14 @@ def solve_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
     unsolved = 0
     for first in range(0, cells.amplitude.size, WIDTH):
         load(cells, first, loaded)
-        sort(loaded, first, options, results)
+        classify(loaded, first, options, results)
         for j in range(loaded.used):
             kind, cell = loaded.kind[j], first + j
             if kind == RESTS:
                 at_rest = 0.0 if loaded.sliding_mode[j] >= STUCK else math.nan
-                results[0, cell] = results[1, cell] = at_rest
+                results[DISPLACEMENT, cell] = results[PEAK_VELOCITY, cell] = at_rest
             elif kind == OTHER:
-                results[3, cell] = UNSOLVED
+                results[VALIDITY, cell] = UNSOLVED
                 unsolved += 1
             else:
                 append(loaded, j, cell, batches[kind])
