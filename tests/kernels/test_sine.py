@@ -59,10 +59,6 @@ def cells_of(theta: Array, mu_s: Array, amplitude: Array, **given: Array) -> Cel
     return Cells(np.tan(np.radians(theta)), mu_s, amplitude, *rest)
 
 
-def pick(cells: Cells, where: NDArray[np.int64]) -> Cells:
-    return Cells(*(np.ascontiguousarray(values[where]) for values in cells))
-
-
 def random_cells(number: int, seed: int) -> Cells:
     """Cells of all kinds: half of them with Coulomb's Üy, half with a measured one, often small."""
     rng = np.random.default_rng(seed)
@@ -106,12 +102,10 @@ def by_scipy(cells: Cells, j: int, mode: float, recoupling: int) -> tuple[float,
         lag = (G + x * tan_theta) * (mu_s - tan_theta - at_zero * math.exp(-decay * abs(x))) + G * tan_theta
         return x - math.copysign(1.0, x) * lag
 
-    def gains(rate: Callable[[float], float], start: float, end: float) -> tuple[float, float]:
-        """Of V and of W from rest, by parts of smooth rate."""
+    def gains(rate: Callable[[float], float], *ends: float) -> tuple[float, float]:
+        """Of V and of W from rest, by parts on which the rate of V is smooth."""
         velocity, moved = 0.0, 0.0
-        for left, right in pairwise(
-            [start, *(k * math.pi / 2 for k in (1, 2, 3) if start < k * math.pi / 2 < end), end]
-        ):
+        for left, right in pairwise(ends):
             moment = quad(lambda phi, right=right: (right - phi) * rate(phi), left, right, epsabs=1e-13)[0]
             moved += velocity * (right - left) + moment
             velocity += quad(rate, left, right, epsabs=1e-13)[0]
@@ -121,11 +115,12 @@ def by_scipy(cells: Cells, j: int, mode: float, recoupling: int) -> tuple[float,
         return float(amplitude * math.sin(phi))
 
     if mode == 2:
-        start, end = math.asin(onset / amplitude), 2.0 * math.pi
-        edges = np.concatenate([np.linspace(start, math.pi, 5001), np.linspace(math.pi, end, 5001)[1:]])
+        start, half = math.asin(onset / amplitude), math.pi / 2
+        edges = np.concatenate([np.linspace(start, 2 * half, 5001), np.linspace(2 * half, 4 * half, 5001)[1:]])
         rates = np.array([ground(phi) - eq4(ground(phi)) for phi in 0.5 * (edges[1:] + edges[:-1])])
         steps = np.cumsum(rates * np.diff(edges))
-        return gains(lambda phi: ground(phi) - eq4(ground(phi)), start, end)[1], max(steps)
+        moved = gains(lambda phi: ground(phi) - eq4(ground(phi)), start, half, 2 * half, 3 * half, 4 * half)[1]
+        return moved, max(steps)
     if eq4(onset) >= onset:  # sticks there
         onset = brentq(lambda x: x - eq4(x), onset, amplitude, xtol=1e-14)
     start = math.asin(onset / amplitude)
@@ -133,12 +128,11 @@ def by_scipy(cells: Cells, j: int, mode: float, recoupling: int) -> tuple[float,
     beyond, bend = onset * (1.0 + 1e-7), start
     if eq4(beyond) < onset < eq4(amplitude):
         bend = math.asin(brentq(lambda x: eq4(x) - onset, beyond, amplitude) / amplitude)
-    held, to_bend = max(onset, eq4(amplitude)), gains(lambda phi: ground(phi) - onset, start, bend)
-    rising = gains(lambda phi: ground(phi) - max(onset, eq4(ground(phi))), bend, math.pi / 2)
-    at_peak, moved = to_bend[0] + rising[0], to_bend[1] + to_bend[0] * (math.pi / 2 - bend) + rising[1]
+    held = max(onset, eq4(amplitude))
+    at_peak, moved = gains(lambda phi: ground(phi) - max(onset, eq4(ground(phi))), start, bend, math.pi / 2)
 
     def velocity(phi: float) -> float:
-        return float(at_peak + amplitude * (-math.cos(phi)) - held * (phi - math.pi / 2))
+        return float(at_peak - amplitude * math.cos(phi) - held * (phi - math.pi / 2))
 
     top = math.pi - math.asin(held / amplitude)
     last = math.pi if recoupling == EQ12 else 2.0 * math.pi
@@ -167,7 +161,7 @@ def test_cell_does_not_depend_on_others(cycles: int) -> None:
     cells, options = random_cells(500, 2), PLAIN._replace(cycles=cycles)
     whole, order = solve(cells, options), np.random.default_rng(3).permutation(500)
     for where in (order, order[:1], order[:33], np.arange(65)):
-        part = solve(pick(cells, where), options)
+        part = solve(Cells(*(values[where] for values in cells)), options)
         for found, expected in zip(part[:4], whole[:4], strict=True):
             known = whole.validity[where] != UNSOLVED
             np.testing.assert_array_equal(found[known], expected[where][known])
