@@ -7,12 +7,22 @@ import math
 
 import numpy as np
 
+from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import elementary
 from slipsweep.jit.elementary import rising_phase
-from slipsweep.kernels.block import NEWMARK, Options, cell_of, fill_up, interface_of, whole_lanes
-from slipsweep.kernels.sine.cells import Room
-from slipsweep.kernels.sine.roots import held_motion
-from slipsweep.kernels.sine.shapes import SINE
+from slipsweep.kernels.block import NEWMARK, Options, interface_of
+from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.sine.batch import (
+    BATCH,
+    DISPLACEMENT,
+    PEAK_VELOCITY,
+    SLIDING_MODE,
+    VALIDITY,
+    WIDTH,
+    given,
+    held_gains,
+    load,
+)
 from slipsweep.model.equations import STUCK
 
 
@@ -23,7 +33,7 @@ def newmark_slide(yield_acceleration: float, amplitude: float) -> float:
     s, from 2π to 9/2, is interpolated at 26 Chebyshev nodes (within 3e-17).
     """
     excess = amplitude - yield_acceleration
-    z = 2.0 * math.sqrt(yield_acceleration / amplitude) - 1.0
+    z = 2.0 * math.sqrt(max(yield_acceleration, 0.0) / amplitude) - 1.0
     z2 = z * z
     z4 = z2 * z2
     p0 = 3.029390521856469e-09
@@ -55,23 +65,31 @@ def newmark_slide(yield_acceleration: float, amplitude: float) -> float:
     return p * (excess / amplitude) * excess
 
 
-def solve_newmark_under_sine(
-    cells: np.ndarray, count: int, options: Options, room: Room, motion: np.ndarray, codes: np.ndarray
-) -> int:
-    """Solve `count` cells of a tile (rows as in `Cell`) into W, V and mode, validity; none remains."""
-    fill_up(count, 7, cells)
-    moved, peak, modes, validity = motion[0], motion[1], codes[0], codes[1]
-    for j in range(whole_lanes(count)):
-        cell = cell_of(cells, j)
-        onset, _, _, _, _, mode, flags = interface_of(cell, NEWMARK, options.g)
-        at_rest = 0.0 if mode == STUCK else math.nan
-        moved[j] = options.cycles * newmark_slide(onset, cell.amplitude) if mode > STUCK else at_rest
-        modes[j], validity[j] = mode, flags
-    for j in range(whole_lanes(count) if options.wants_peak else 0):
-        cell = cell_of(cells, j)
-        onset, _, _, _, _, mode, _ = interface_of(cell, NEWMARK, options.g)
-        # V rises and falls alike on either side of the peak
-        half = held_motion(SINE, cell.amplitude, onset, rising_phase(onset, cell.amplitude), 0.0)[0]
-        at_rest = 0.0 if mode == STUCK else math.nan
-        peak[j] = 2.0 * half if mode > STUCK else at_rest
+@kernel
+def solve_newmark_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
+    """Newmark's block under a sine, as `solve.solve_sine`; no cell is left.
+
+    V rises up to Üg = Üy on the fall, and as much from the peak on as before it.
+    """
+    batch = np.empty(1, BATCH)[0]
+    for first in range(0, cells.amplitude.size, WIDTH):
+        load(cells, first, batch)
+        for j in range(WIDTH):
+            block = interface_of(given(batch, j), NEWMARK, options.g)
+            amplitude, onset, mode = batch.amplitude[j], block.yield_acceleration, block.sliding_mode
+            at_rest = 0.0 if mode == STUCK else math.nan
+            slide = options.cycles * newmark_slide(onset, amplitude)
+            batch.displacement[j] = slide if mode > STUCK else at_rest
+            batch.peak_velocity[j] = at_rest
+            batch.yield_acceleration[j], batch.sliding_mode[j], batch.validity[j] = onset, mode, block.validity
+        if options.wants_peak:
+            for j in range(WIDTH):
+                amplitude, onset = batch.amplitude[j], batch.yield_acceleration[j]
+                to_peak = held_gains(amplitude, onset, rising_phase(onset, amplitude), 0.0)[0]
+                at_rest = batch.peak_velocity[j]
+                batch.peak_velocity[j] = 2.0 * to_peak if batch.sliding_mode[j] > STUCK else at_rest
+        for j in range(batch.used):
+            cell = first + j
+            results[DISPLACEMENT, cell], results[PEAK_VELOCITY, cell] = batch.displacement[j], batch.peak_velocity[j]
+            results[SLIDING_MODE, cell], results[VALIDITY, cell] = batch.sliding_mode[j], batch.validity[j]
     return 0

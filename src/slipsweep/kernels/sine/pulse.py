@@ -1,142 +1,160 @@
-"""The first pulse in lanes: from its onset to the stop, or to Üg = 0 (t5).
+"""Stick-slip under a sine: a pulse from its onset to the stop, and all cycles.
 
-docs/numerics.md#held-block-acceleration, docs/numerics.md#onset-and-switch and docs/numerics.md#stop
+Rules of the motion: docs/model.md.  ψ is the phase from the peak of the pulse.
 """
 
 import math
 
-import numpy as np
-
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import (
-    AMPLITUDE,
-    BEGAN,
-    DECAY,
-    TAN_THETA,
-    YIELD,
-    lane_loss,
-    lane_slant,
-)
-from slipsweep.kernels.events import STRIP
-from slipsweep.kernels.sine.lanes import (
-    CONVERGED,
+from slipsweep.jit.elementary import angle_minus_sine, rising_phase
+from slipsweep.kernels.block import INTEGRATE, NOT_RECOUPLED, Options
+from slipsweep.kernels.sine.batch import (
     HALF_PI,
-    HELD,
-    LANE_NODES,
-    LANE_WEIGHTS,
-    LEFT,
-    LEVEL,
-    MOMENT,
-    PEAK,
-    PSI,
-    RATE,
-    START,
-    STICKS,
-    YIELD_GOVERNS,
-    V,
-    W,
-    X,
+    WIDTH,
+    Batch,
+    find_eq4_event,
+    find_stop,
+    gains_after_peak,
+    held_gains,
+    integrate_eq4,
+    relative_acceleration,
 )
-from slipsweep.kernels.sine.roots import FALL_STOP, SWITCH, TURN, held_motion, lane_response_and_slope, settle
-from slipsweep.kernels.sine.shapes import SQUARE, fallen, phase_of, steepness
+from slipsweep.kernels.sine.kinds import STICKS_AT_YIELD, YIELD_GOVERNS
+from slipsweep.model import equations as eq
+from slipsweep.model.friction import exponential_inflection
 
 #: No λ or tan θ is divided by that is smaller.
 _LEAST = 1e-150
 
 
 @scalar
-def lane_onset(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
-    """t1: where each lane begins to slide (ψ in START) and the value it then holds (LEVEL)."""
-    for j in range(STRIP):
-        lanes[CONVERGED + j] = 1.0
-        lanes[LEVEL + j], lanes[START + j] = lanes[YIELD + j], lanes[BEGAN + j]
-    if kind != STICKS:
+def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
+    """t1: the ψ at which a cell begins to slide (`start`) and the b that it then holds (`level`).
+
+    Üg = Üy, or where the block sticks there the Üg at which E has come down to it, D = 0.
+    docs/numerics.md#onset-and-switch
+    """
+    for j in range(WIDTH):
+        batch.solved[j], batch.validity[j] = 1.0, 0.0
+        batch.level[j], batch.start[j] = batch.yield_acceleration[j], batch.yield_phase[j]
+    if kind != STICKS_AT_YIELD:
         return
-    for j in range(STRIP):
+    for j in range(WIDTH):
         # from where D ceases to be convex: beyond the root before it, and before the root beyond it
-        decay, tan_theta = max(lanes[DECAY + j], _LEAST), max(lanes[TAN_THETA + j], _LEAST)
-        bend = (2.0 * tan_theta / decay - g) / tan_theta
-        lanes[LEVEL + j] = min(max(bend, lanes[YIELD + j]), lanes[AMPLITUDE + j])
-        lanes[CONVERGED + j] = 0.0
-    settle(TURN, shape, LEVEL, CONVERGED, 1.0, g, lanes)
-    for j in range(STRIP):
-        lanes[START + j] = phase_of(shape, lanes[LEVEL + j], lanes[AMPLITUDE + j])
+        tan_theta, decay_rate = max(batch.tan_theta[j], _LEAST), max(batch.decay_rate[j], _LEAST)
+        bend = exponential_inflection(tan_theta, decay_rate, g)
+        batch.event[j] = min(max(bend, batch.yield_acceleration[j]), batch.amplitude[j])
+        batch.found[j] = 0.0
+    find_eq4_event(batch, 0.0, 1.0, g)
+    for j in range(WIDTH):
+        batch.solved[j], batch.level[j] = batch.found[j], batch.event[j]
+        batch.start[j] = rising_phase(batch.event[j], batch.amplitude[j])
 
 
 @scalar
-def lane_switch(shape: int, g: float, lanes: np.ndarray) -> None:
-    """x at which each lane ceases to hold its level and follows Eq. 4 (X), and b at the peak (HELD)."""
-    for j in range(STRIP):
-        amplitude, level = lanes[AMPLITUDE + j], lanes[LEVEL + j]
-        eq4, slope = lane_response_and_slope(lanes, j, amplitude, g)
-        follows = eq4 > level
-        lanes[HELD + j] = eq4 if follows else level
-        lanes[X + j] = amplitude - (eq4 - level) / slope if follows else amplitude
-        # the square jumps past it
-        lanes[PSI + j] = 0.0 if follows & (shape != SQUARE) else 1.0
-    settle(SWITCH, shape, X, PSI, 1.0, g, lanes)
-    for j in range(STRIP):
-        lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[PSI + j])
+def rise(batch: Batch, kind: int, g: float) -> None:
+    """From t1 to the peak, b = max(b, E): V and W gained, and Ümax = b at the peak (`held`).
 
-
-@scalar
-def lane_rise(kind: int, shape: int, g: float, lanes: np.ndarray) -> None:
-    """From t1 to the peak: b in HELD, V and W gained from rest in V and W."""
+    b is held up to E = b, the switch, and follows Eq. 4 beyond it.
+    docs/numerics.md#onset-and-switch
+    """
     if kind == YIELD_GOVERNS:
-        for j in range(STRIP):
-            lanes[X + j], lanes[HELD + j] = lanes[AMPLITUDE + j], lanes[LEVEL + j]
-            lanes[V + j], lanes[W + j] = held_motion(
-                shape, lanes[AMPLITUDE + j], lanes[LEVEL + j], lanes[START + j], 0.0
-            )
+        for j in range(WIDTH):
+            batch.held[j] = batch.level[j]
+            gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], 0.0)
+            batch.velocity[j], batch.displacement[j] = gained
         return
-    lane_switch(shape, g, lanes)
-    # the hold
-    for j in range(STRIP):
-        amplitude = lanes[AMPLITUDE + j]
-        # no earlier than the start, from which it may differ by the roundings of two roots
-        psi = max(phase_of(shape, lanes[X + j], amplitude), lanes[START + j])
-        lanes[PSI + j] = psi
-        lanes[V + j], lanes[W + j] = held_motion(shape, amplitude, lanes[LEVEL + j], lanes[START + j], psi)
-        lanes[RATE + j] = lanes[MOMENT + j] = 0.0
-    # Eq. 4: n (μs − μ) at nodes, the rest in closed form
-    for node in range(LANE_NODES.size):
-        left, weight = 1.0 - LANE_NODES[node], LANE_WEIGHTS[node]
-        for j in range(STRIP):
-            x = lanes[AMPLITUDE + j] * (1.0 - fallen(shape, lanes[PSI + j] * left))
-            weighted = weight * lane_loss(lanes, j, x, g)
-            lanes[RATE + j] += weighted
-            lanes[MOMENT + j] += left * weighted
-    for j in range(STRIP):
-        width = -lanes[PSI + j]
-        plane, plane_moment = held_motion(shape, lanes[AMPLITUDE + j], 0.0, -width, 0.0)
-        lanes[W + j] += (lanes[V + j] + lanes[MOMENT + j] * width) * width - lane_slant(lanes, j, plane_moment)
-        lanes[V + j] += lanes[RATE + j] * width - lane_slant(lanes, j, plane)
+    for j in range(WIDTH):
+        amplitude, level = batch.amplitude[j], batch.level[j]
+        rate, slope = relative_acceleration(batch, j, amplitude, g)
+        excess = amplitude - rate - level
+        follows = excess > 0.0
+        batch.held[j] = amplitude - rate if follows else level
+        batch.event[j] = amplitude - excess / (1.0 - slope) if follows else amplitude
+        batch.found[j] = 0.0 if follows else 1.0
+    find_eq4_event(batch, 1.0, 1.0, g)
+    for j in range(WIDTH):
+        batch.solved[j] = min(batch.solved[j], batch.found[j])
+        # not before the start, from which it may differ by the rounding of two roots
+        switch = max(rising_phase(batch.event[j], batch.amplitude[j]), batch.start[j])
+        gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], switch)
+        batch.velocity[j], batch.displacement[j] = gained
+        batch.start[j], batch.end[j] = switch, 0.0
+    integrate_eq4(batch, 1.0, g)
+    for j in range(WIDTH):
+        batch.displacement[j] += batch.moment[j] - batch.velocity[j] * batch.start[j]
+        batch.velocity[j] += batch.gain[j]
 
 
 @scalar
-def lane_fall(shape: int, wants_peak: bool, lanes: np.ndarray) -> None:
-    """The hold from the peak to the stop or to Üg = 0 (t5): V left in LEFT, if wanted the largest V in PEAK."""
-    unsettled = 0
-    for j in range(STRIP):
-        left = lanes[V + j] + held_motion(shape, lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, HALF_PI)[0]
-        lanes[LEFT + j] = max(left, 0.0)
-        lanes[PSI + j] = HALF_PI
-        lanes[PEAK + j] = math.nan
-        unsettled += 0 if left > 0.0 else 1
-    if wants_peak or unsettled > 0:
-        for j in range(STRIP):
-            # V is largest where x = b; a parabola from there overestimates the stop
-            amplitude, held, velocity = lanes[AMPLITUDE + j], lanes[HELD + j], lanes[V + j]
-            top = -phase_of(shape, held, amplitude)
-            peak = velocity + held_motion(shape, amplitude, held, 0.0, top)[0]
-            onward = math.sqrt(2.0 * peak / (amplitude * steepness(shape, top)))
-            lanes[PSI + j] = HALF_PI if lanes[LEFT + j] > 0.0 else min(top + onward, HALF_PI)
-            lanes[PEAK + j] = peak if wants_peak else math.nan
-            lanes[X + j] = 1.0 if lanes[LEFT + j] > 0.0 else 0.0
-        if unsettled > 0:
-            settle(FALL_STOP, shape, PSI, X, 1.0, 0.0, lanes)
-        for j in range(STRIP):
-            lanes[CONVERGED + j] = min(lanes[CONVERGED + j], lanes[X + j])
-    for j in range(STRIP):
-        end = lanes[PSI + j]
-        lanes[W + j] += lanes[V + j] * end + held_motion(shape, lanes[AMPLITUDE + j], lanes[HELD + j], 0.0, end)[1]
+def fall(batch: Batch, options: Options) -> None:
+    """b held from the peak to the stop; with Eq. 12 no further than to t5, Üg = 0, where `velocity` is then V.
+
+    V at t5 is V + A − b π/2.  V is largest, V₀, at Üg = b, ψ₀, and below the parabola V₀ − ½ A sin ψ₀ (ψ − ψ₀)²
+    from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ ≥ 2 χ²/π².  The zeros of the
+    parabola, and of that with 2 χ²/π², are beyond the stop: there the iteration starts.
+    docs/numerics.md#stop
+    """
+    eq12 = options.recoupling != INTEGRATE
+    missing = 0
+    for j in range(WIDTH):
+        at_t5 = batch.velocity[j] + batch.amplitude[j] - HALF_PI * batch.held[j]
+        found = eq12 & (at_t5 > 0.0)
+        batch.gain[j], batch.event[j], batch.found[j] = at_t5, HALF_PI, 1.0 if found else 0.0
+        batch.peak_velocity[j] = math.nan
+        missing += 0 if found else 1
+    if options.wants_peak or missing > 0:
+        for j in range(WIDTH):
+            amplitude, held, at_t5 = batch.amplitude[j], batch.held[j], batch.gain[j]
+            top = -rising_phase(held, amplitude)
+            peak = batch.velocity[j] + held_gains(amplitude, held, 0.0, top)[0]
+            sine = top - angle_minus_sine(top)
+            before_t5 = min(top + math.sqrt(2.0 * peak / (amplitude * sine)), HALF_PI)
+            longest = max(at_t5, 0.0) / held
+            curvature = amplitude / held * (4.0 / (math.pi * math.pi))
+            after_t5 = HALF_PI + min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi)
+            beyond = HALF_PI if eq12 else after_t5
+            batch.event[j] = beyond if at_t5 > 0.0 else before_t5
+            batch.peak_velocity[j] = peak if options.wants_peak else math.nan
+    if missing > 0:
+        find_stop(batch, HALF_PI if eq12 else 3.0 * HALF_PI)
+    for j in range(WIDTH):
+        stop = batch.event[j]
+        batch.solved[j] = min(batch.solved[j], batch.found[j])
+        gained = gains_after_peak(batch.amplitude[j], batch.held[j], stop)[1]
+        batch.displacement[j] += batch.velocity[j] * stop + gained
+        batch.velocity[j] = max(batch.gain[j], 0.0) if eq12 else 0.0
+
+
+@scalar
+def repeat(batch: Batch, kind: int, options: Options) -> None:
+    """Eq. 12 from t5 on, and all cycles: W, and the largest V.
+
+    By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let L be V and M be W at t5, v₁
+    what is left of L at the next Üg = Üy, h the phase from Üg = Üy to t5, and W₀ = M + (L² − v₁²)/(2b).  Where a block
+    that moves at Üg = Üy goes on as one at rest does, with b = Üy, each of N cycles adds v₁ to V, and the last slides
+    to its stop:
+
+        W = (N − 1)(W₀ + π v₁ (N − 2)) + M + (N − 1) v₁ h + (L + (N − 1) v₁)²/(2b)
+
+    A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is left to the general kernel.
+    docs/numerics.md#batches-of-the-sine
+    """
+    if options.recoupling == INTEGRATE:
+        for j in range(WIDTH):
+            batch.displacement[j] *= options.cycles
+        return
+    later = options.cycles - 1.0
+    for j in range(WIDTH):
+        held, at_t5, to_t5 = batch.held[j], batch.velocity[j], batch.displacement[j]
+        pause = 3.0 * HALF_PI + batch.yield_phase[j]
+        left = eq.attenuated_velocity(at_t5, held, pause)
+        cycle = to_t5 + eq.attenuated_displacement(at_t5, held, pause)
+        last_at_t5 = at_t5 + later * left
+        last = to_t5 + later * left * (HALF_PI - batch.yield_phase[j])
+        last += eq.attenuated_displacement(last_at_t5, held, math.inf)
+        batch.displacement[j] = later * (cycle + math.pi * left * (later - 1.0)) + last
+        batch.peak_velocity[j] += later * left
+        moves = (left > 0.0) & (later > 0.0)
+        batch.validity[j] = NOT_RECOUPLED if moves else 0.0
+        batch.solved[j] = 0.0 if moves & (kind == STICKS_AT_YIELD) else batch.solved[j]

@@ -1,0 +1,209 @@
+"""A batch: cells whose motion is computed together, and Eq. 4 in them.
+
+A batch is a NumPy record with an array of `WIDTH` numbers for each quantity.  So the compiler knows where each array
+is, that no two overlap and how long they are: a loop over the cells of a batch becomes SIMD.  All `WIDTH` cells are
+computed, used or not: a scalar remainder of a loop would round otherwise, and the last digits of a cell would depend
+on how many others there are.
+"""
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, versine
+from slipsweep.kernels.block import Cell, Motion
+from slipsweep.kernels.grid import Cells
+from slipsweep.model import equations as eq
+from slipsweep.model.friction import exponential_derivatives
+
+#: Cells of a batch.  Its iterations end with that of the slowest cell.
+WIDTH = 32
+
+HALF_PI = 0.5 * math.pi
+
+#: Quantities of the cells of a batch, each (WIDTH,).
+BATCH = np.dtype(
+    (
+        np.record,
+        [
+            (name, np.float64, (WIDTH,))
+            for name in (
+                # the block (`kernels.block`), and ψ at which Üg = Üy
+                "amplitude", "yield_acceleration", "mu_s", "tan_theta", "delta_mu", "decay_rate", "yield_phase",
+                # known of a cell before its motion: μmin, mode, and Eq. 4 at Üg = Üy and at the peak
+                "minimum_friction", "sliding_mode", "response_at_yield", "response_at_peak",
+                # the search for an event: where it is, and whether it has been found
+                "event", "found",
+                # a part of the cycle, from ψ to ψ, and the gains of V and W on it
+                "start", "end", "gain", "moment",
+                # a pulse: b from its beginning and from the peak on, V and W up to now, the largest V
+                "level", "held", "velocity", "displacement", "peak_velocity",
+                # continuous sliding (`continuous`)
+                "quarter", "drift", "missed", "dip",
+                # whether all events have been found, and the flags of the motion
+                "solved", "validity",
+            )
+        ]
+        # which cell of the results this is, and the kind of its motion (`kinds`); how many cells there are
+        + [("cell", np.int64, (WIDTH,)), ("kind", np.int64, (WIDTH,)), ("used", np.int64)],
+    )
+)  # fmt: skip
+
+Batch: TypeAlias = np.record
+
+#: Rows of the results, (fields of `Motion`, cells).
+DISPLACEMENT, PEAK_VELOCITY, SLIDING_MODE, VALIDITY = (
+    Motion._fields.index(name) for name in ("displacement", "peak_velocity", "sliding_mode", "validity")
+)
+
+#: Gauss–Legendre rule on [0, 1].  It is right to 1e-13 where friction falls by no more than e^6 (`MOST_E_FOLDINGS`).
+NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
+MOST_E_FOLDINGS = 6.0
+
+#: An event is found when Newton's last step is smaller than this part of its value: 1e-14 is left.
+_TOLERANCE = 1e-7
+_MOST_STEPS = 32
+
+
+@inlined
+def load(cells: Cells, first: int, batch: Batch) -> None:
+    """Fill a batch with cells, from the `first` on; fields of the block that have estimates are NaN where not given."""
+    batch.used = min(WIDTH, cells.amplitude.size - first)
+    for j in range(batch.used):
+        batch.tan_theta[j] = cells.tan_theta[first + j]
+        batch.mu_s[j] = cells.mu_s[first + j]
+        batch.amplitude[j] = cells.amplitude[first + j]
+        batch.yield_acceleration[j] = cells.yield_acceleration[first + j]
+        batch.decay_rate[j] = cells.decay_rate[first + j]
+        batch.delta_mu[j] = cells.delta_mu[first + j]
+        batch.minimum_friction[j] = cells.minimum_friction[first + j]
+
+
+@inlined
+def given(batch: Batch, j: int) -> Cell:
+    """What is given of cell j of a batch."""
+    return Cell(
+        batch.tan_theta[j], batch.mu_s[j], batch.amplitude[j], batch.yield_acceleration[j], batch.decay_rate[j],
+        batch.delta_mu[j], batch.minimum_friction[j],
+    )  # fmt: skip
+
+
+@inlined
+def friction(batch: Batch, j: int, x: float, g: float) -> float:
+    """μ(x), Eq. 6."""
+    return eq.friction_coefficient(x, batch.mu_s[j], batch.delta_mu[j], batch.decay_rate[j], g)
+
+
+@inlined
+def relative_acceleration(batch: Batch, j: int, x: float, g: float) -> tuple[float, float]:
+    """Eq. 4, E, as D(x) = x − E(x), and dD/dx (x ≠ 0, or a zero with the sign of its side)."""
+    mu_s, tan_theta, mu = batch.mu_s[j], batch.tan_theta[j], friction(batch, j, x, g)
+    friction_slope = exponential_derivatives(mu, batch.decay_rate[j], g)[0]
+    slope = eq.relative_acceleration_slope(x, mu, friction_slope, mu_s, tan_theta, g)
+    return eq.relative_acceleration(x, mu, mu_s, tan_theta, g), slope
+
+
+@inlined
+def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+    """∫ (Üg − b) dψ and ∫ (end − ψ)(Üg − b) dψ from `start` to `end`: gains of V and W from rest with b held.
+
+        Üg = A (1 − vers ψ)        S = ψ − sin ψ        H = ψ²/2 − vers ψ        |ψ| ≤ π/2
+
+        (A − b)(e − s) − A [S(e) − S(s)]        ½ (A − b)(e − s)² − A [H(e) − H(s) − S(s)(e − s)]
+
+    docs/numerics.md#held-block-acceleration
+    """
+    width, excess = end - start, amplitude - held
+    before = angle_minus_sine(start)
+    gain = excess * width - amplitude * (angle_minus_sine(end) - before)
+    swept = half_square_minus_versine(end) - half_square_minus_versine(start) - before * width
+    return gain, 0.5 * excess * width * width - amplitude * swept
+
+
+@scalar
+def integrate_eq4(batch: Batch, side: float, g: float) -> None:
+    """∫ D dψ and ∫ (end − ψ) D dψ from `start` to `end`, gains of V and W from rest by Eq. 4: fields `gain`, `moment`.
+
+        |Üg| = A (1 − vers ψ)        D = ± n (μs − μ) − |Üg| tan² θ        ± is `side`
+
+    The first term is summed over nodes, the second has its integral in closed form.
+    docs/numerics.md#eq-4-as-a-lag
+    """
+    for j in range(WIDTH):
+        batch.gain[j] = batch.moment[j] = 0.0
+    for node in range(NODES.size):
+        at, weight = NODES[node], WEIGHTS[node]
+        for j in range(WIDTH):
+            psi = batch.start[j] + (batch.end[j] - batch.start[j]) * at
+            x = side * (batch.amplitude[j] * (1.0 - versine(psi)))
+            normal = eq.normal_acceleration(x, batch.tan_theta[j], g)
+            lost = weight * (normal * (batch.mu_s[j] - friction(batch, j, x, g)))
+            batch.gain[j] += lost
+            batch.moment[j] += (1.0 - at) * lost
+    for j in range(WIDTH):
+        width, tan_theta = batch.end[j] - batch.start[j], batch.tan_theta[j]
+        plane, plane_moment = held_gains(batch.amplitude[j], 0.0, batch.start[j], batch.end[j])
+        batch.gain[j] = side * batch.gain[j] * width - tan_theta * tan_theta * plane
+        batch.moment[j] = side * batch.moment[j] * width * width - tan_theta * tan_theta * plane_moment
+
+
+@scalar
+def find_eq4_event(batch: Batch, holds: float, side: float, g: float) -> None:
+    """The |Üg| at which D(±|Üg|) = 0, ± is `side`; or, if `holds` is 1, at which E(Üg) = b, `level`: field `event`.
+
+    Newton's iteration of all cells that have not `found` it, from `event` on.  It needs no bracket: each begins on the
+    side from which it cannot pass the root (docs/numerics.md#batches-of-the-sine).
+    """
+    for _ in range(_MOST_STEPS):
+        missing = 0
+        for j in range(WIDTH):
+            x = batch.event[j]
+            rate, slope = relative_acceleration(batch, j, side * x, g)
+            # E(x) − b = (x − b) − D
+            step = (holds * (x - batch.level[j]) - rate) / (holds - side * slope)
+            there = batch.found[j] > 0.0
+            batch.event[j] = x if there else x - step
+            there |= abs(step) <= _TOLERANCE * min(x, batch.amplitude[j] - x)
+            batch.found[j] = 1.0 if there else 0.0
+            missing += 0 if there else 1
+        if missing == 0:
+            break
+
+
+@inlined
+def gains_after_peak(amplitude: float, held: float, psi: float) -> tuple[float, float, float]:
+    """`held_gains` from the peak to 0 ≤ ψ ≤ 3π/2, and the rate of V there, Üg − b."""
+    beyond = psi > HALF_PI
+    # sin ψ = −sin χ and cos ψ = −cos χ for χ = ψ − π
+    near = psi - math.pi if beyond else psi
+    fallen, lag = versine(near), angle_minus_sine(near)
+    swept = half_square_minus_versine(near)
+    if beyond:
+        swept = 0.5 * psi * psi - (2.0 - fallen)
+        fallen, lag = 2.0 - fallen, psi + (near - lag)
+    excess = amplitude - held
+    rate = excess - amplitude * fallen
+    return excess * psi - amplitude * lag, 0.5 * excess * psi * psi - amplitude * swept, rate
+
+
+@scalar
+def find_stop(batch: Batch, last: float) -> None:
+    """The ψ at which V, `velocity` at the peak, is used up with b `held` from there on: field `event`.
+
+    Newton's iteration of all cells that have not `found` it, from `event` on, beyond the stop, and up to `last`.
+    """
+    for _ in range(_MOST_STEPS):
+        missing = 0
+        for j in range(WIDTH):
+            psi = batch.event[j]
+            gain, _, rate = gains_after_peak(batch.amplitude[j], batch.held[j], psi)
+            step = (batch.velocity[j] + gain) / rate
+            there = batch.found[j] > 0.0
+            batch.event[j] = psi if there else min(max(psi - step, 0.0), last)
+            there |= abs(step) <= _TOLERANCE * psi
+            batch.found[j] = 1.0 if there else 0.0
+            missing += 0 if there else 1
+        if missing == 0:
+            break
