@@ -1,7 +1,7 @@
 """The stepping kernel: the paper's motion in steps of phase, V += (Üg − Ü) h.
 
-Ü is the block's acceleration: Üg while it sticks, Eq. 4 or a held b while it slides, and b of Eq. 12 from t5 on.  A rule
-is the polynomial through the rate Üg − Ü at one, two or three points of a step; V and W are its integrals.
+Ü is the acceleration of the block: Üg while it sticks, Eq. 4 or a held b while it slides, that of Eq. 12 from t5 on.  A
+rule is the polynomial through the rate Üg − Ü at one, two or three points of a step; V and W are its integrals.
 
 ==========  =====================  =====  ==================================
 rule        rate taken at          order  also known as
