@@ -1,0 +1,483 @@
+"""The stepping kernel: the paper's motion in steps of phase, V += (Üg − Ü) h.
+
+Ü is the acceleration of the block: Üg while it sticks, Eq. 4 or a held b while it slides, that of Eq. 12 from t5 on.  A
+rule is the polynomial through the rate Üg − Ü at one, two or three points of a step; V and W are its integrals.
+
+==========  =====================  =====  ==================================
+rule        rate taken at          order  also known as
+==========  =====================  =====  ==================================
+rectangle   start                  1      Euler; the paper's
+trapezoid   start, end             2      linear acceleration
+simpson     start, middle, end     4      Runge-Kutta 4 for a rate free of V
+==========  =====================  =====  ==================================
+
+`advance` is one step, `acceleration` is Ü while the block slides (option `rise`), `walk` goes step by step, `cut_step`
+finds the events in one, `pulse` is t1 to t5 and Eq. 12, `slide_continuously` is Eq. 4 throughout.  Any friction law
+will do: of `block.law` only μ(Üg) is used.  docs/numerics.md#step-solver
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipsweep.jit.compiling import kernel
+from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.block import Block, Cell, Motion, Options
+from slipsweep.kernels.events import root_of
+from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
+from slipsweep.kernels.grid import Cells, solve_each
+from slipsweep.kernels.pulse import Pulse, beginning, first_pulse, validity_before
+from slipsweep.kernels.train import train_of
+from slipsweep.kernels.waves import motion_of
+from slipsweep.model import equations as eq
+from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
+from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
+from slipsweep.motion.steps import Steps
+
+RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
+
+#: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
+HELD, FOLLOWED = 3, 4
+
+#: No slide up to its greatest rate is covered by fewer than N/64 steps, N a cycle; no step is shorter than the other.
+SHARE_OF_CYCLE, LEAST_STEP = 64.0, 1e-14
+
+#: Accelerations nearer to each other than this part of Üg are one.
+ROUNDING = 1e-12
+
+
+class State(NamedTuple):
+    """The block: V, W, its acceleration b while it slides, the largest and the least V, and whether it slides.
+
+    The slide `began` at a phase, and its rate `grows` for another; that limits steps (`longest_step`).
+    """
+
+    velocity: float
+    displacement: float
+    held: float
+    peak: float
+    least: float
+    sliding: bool
+    began: float
+    grows: float
+
+
+class Point(NamedTuple):
+    """An instant: τ on its piece, Üg, and Üg − Ü by Eq. 4."""
+
+    tau: float
+    base: float
+    rate: float
+
+
+@inlined
+def rate_polynomial(rule: int, start: float, middle: float, end: float) -> tuple[float, float, float]:
+    """The rate c₀ + c₁ s + c₂ s², s from 0 to 1, by that at the start, the middle and the end of a step."""
+    if rule == RECTANGLE:
+        return start, 0.0, 0.0
+    if rule == TRAPEZOID:
+        return start, end - start, 0.0
+    return start, 4.0 * middle - 3.0 * start - end, 2.0 * (start + end) - 4.0 * middle
+
+
+@inlined
+def mean_rate(c0: float, c1: float, c2: float, s: float) -> float:
+    """Mean of the rate up to the part s of a step."""
+    return c0 + s * (0.5 * c1 + s * c2 / 3.0)
+
+
+@scalar
+def _lost(where: tuple[float, float, float, float, float], s: float) -> tuple[float, float]:
+    velocity, h, c0, c1, c2 = where
+    return -velocity - mean_rate(c0, c1, c2, s) * h * s, -h * (c0 + s * (c1 + s * c2))
+
+
+_stop = root_of(_lost)
+
+
+@inlined
+def advance(
+    rule: int, start: float, middle: float, end: float, h: float, may_stop: bool, held: float, state: State
+) -> tuple[float, State]:
+    """One step, V += (Üg − Ü) h: the part of it that is taken, 1 but for a stop, and the block then, with b = `held`.
+
+    `start`, `middle` and `end` are Üg − Ü there.  V is largest or least where it changes its sign.
+    """
+    c0, c1, c2 = rate_polynomial(rule, start, middle, end)
+    taken, velocity = 1.0, state.velocity + mean_rate(c0, c1, c2, 1.0) * h
+    turn, extreme = 1.0, velocity
+    if physics.opposite(c0, c0 + c1 + c2):
+        turn = 2.0 / (math.sqrt((c1 / c0) * (c1 / c0) - 4.0 * (c2 / c0)) - c1 / c0)
+        extreme = state.velocity + mean_rate(c0, c1, c2, turn) * h * turn
+    least = min(velocity, extreme)
+    stops = may_stop and (least < 0.0 or (least == 0.0 and state.velocity > 0.0))
+    if stops:
+        low, high = (turn, 1.0) if extreme > state.velocity else (0.0, turn)
+        taken = _stop((state.velocity, h, c0, c1, c2), low, high, 0.5 * (low + high), 0.0)
+        velocity = least = 0.0
+    h *= taken
+    displacement = state.displacement + (state.velocity + (0.5 * c0 + taken * (c1 / 6.0 + taken * c2 / 12.0)) * h) * h
+    peak, least = max(state.peak, velocity, extreme), min(state.least, least)
+    sliding = state.sliding and not stops
+    return taken, State(velocity, displacement, held, peak, least, sliding, state.began, state.grows)
+
+
+@inlined
+def acceleration(how: int, yield_acceleration: float, b: float, eq4: float) -> float:
+    """Ü of a block that slides, given what it was (b) and what Eq. 4 gives: the option `rise`."""
+    if how == physics.NEWMARK:
+        return yield_acceleration
+    if how == physics.MONOTONE:
+        return max(b, eq4)
+    return b if how == HELD else eq4
+
+
+@inlined
+def eq4_rate(block: Block, x: float) -> float:
+    """Üg − Ü at Üg = x with Ü by Eq. 4 and friction by Eq. 6; for Newmark's block Ü = Üy."""
+    if block.rise == physics.NEWMARK:
+        return x - block.yield_acceleration
+    return eq.relative_acceleration(x, physics.friction(block, x), block.mu_s, block.tan_theta, block.g)
+
+
+@scalar
+def point_at(block: Block, pieces: np.ndarray, p: int, tau: float) -> Point:
+    """The instant τ on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
+    x = math.copysign(base_acceleration(pieces, p, block.amplitude, tau), pieces[p, TOP])
+    return Point(tau, x, eq4_rate(block, x))
+
+
+@inlined
+def bends(start: Point, middle: Point, end: Point, limit: float) -> bool:
+    """Whether Eq. 4 bends too much for one step: friction may decay in a layer that is thinner than steps."""
+    return abs(start.rate - 2.0 * middle.rate + end.rate) > limit and end.tau - start.tau > LEAST_STEP
+
+
+@inlined
+def beyond(point: Point, state: State) -> float:
+    """How far Eq. 4 is beyond Ü of the block: below Üg if it rests, so that it slides, above b if it slides."""
+    return point.base - point.rate - state.held if state.sliding else point.rate
+
+
+@inlined
+def turns(first: float, half: float, last: float) -> bool:
+    """Whether a parabola through three values has its vertex between them, and that is a maximum."""
+    return 4.0 * half - 3.0 * first - last > 0.0 > first - 4.0 * half + 3.0 * last
+
+
+@scalar
+def _beyond_and_slope(where: tuple[Block, np.ndarray, int, State, float], tau: float) -> tuple[float, float]:
+    block, pieces, p, state, part = where
+    value = beyond(point_at(block, pieces, p, tau), state)
+    return value, (beyond(point_at(block, pieces, p, tau + part), state) - value) / part
+
+
+_crossing = root_of(_beyond_and_slope)
+
+
+@scalar
+def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, state: State) -> Point:
+    """Where in a step Eq. 4 comes beyond Ü of the block, or turns back beyond it; `end` if nowhere."""
+    middle, top = point_at(block, pieces, p, 0.5 * (start.tau + end.tau)), end
+    first, half, last = beyond(start, state), beyond(middle, state), beyond(end, state)
+    if turns(first, half, last):
+        low, high = start.tau, end.tau
+        for _ in range(50):  # the largest value, by thirds
+            left, right = low + (high - low) / 3.0, high - (high - low) / 3.0
+            lower = beyond(point_at(block, pieces, p, left), state) < beyond(point_at(block, pieces, p, right), state)
+            low, high = (left, high) if lower else (low, right)
+        top = point_at(block, pieces, p, 0.5 * (low + high))
+        top = top if beyond(top, state) > max(first, last) + ROUNDING * end.base else end
+    if first >= 0.0 and not state.sliding:
+        return start
+    if first >= -ROUNDING * start.base and state.sliding:
+        return top
+    if beyond(top, state) <= 0.0:
+        return end
+    where = (block, pieces, p, state, 1e-4 * (top.tau - start.tau))
+    return point_at(block, pieces, p, _crossing(where, start.tau, top.tau, 0.5 * (start.tau + top.tau), 0.0))
+
+
+@inlined
+def begun(block: Block, x: float, phase: float, grows: float, state: State) -> State:
+    """The block as it begins to slide at Üg = x (t1), after which its rate grows for a phase."""
+    b = min(physics.starting_acceleration(block, x), x)
+    return State(state.velocity, state.displacement, b, state.peak, state.least, True, phase, grows)
+
+
+@scalar
+def onset(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, state: State) -> tuple[Point, State]:
+    """t1, if a block at rest begins to slide before `end`: Üg ≥ Üy, and Eq. 4 falls below Üg."""
+    if end.base < block.yield_acceleration:
+        return end, state
+    if start.base < block.yield_acceleration:
+        tau = min(max(offset_at(pieces, p, block.amplitude, block.yield_acceleration), start.tau), end.tau)
+        start = Point(tau, block.yield_acceleration, eq4_rate(block, block.yield_acceleration))
+    began = next_event(block, pieces, p, start, end, state)
+    if began.tau >= end.tau:
+        return end, state
+    grows = (end.tau if end.rate <= 0.0 else pieces[p, FINISH]) - began.tau
+    return began, begun(block, began.base, phase_at(pieces, p, began.tau), grows, state)
+
+
+@inlined
+def rate(how: int, point: Point, b: float) -> float:
+    """Üg − b; where b is by Eq. 4, without its rounding."""
+    by_eq4 = how == FOLLOWED or (how != HELD and point.base - point.rate == b)
+    return point.rate if by_eq4 else point.base - b
+
+
+@inlined
+def slide(
+    block: Block, rule: int, how: int, start: Point, middle: Point, end: Point, state: State
+) -> tuple[float, State]:
+    """One step of a block that slides: the part of it up to a stop, and the block then."""
+    least, may_stop = block.yield_acceleration, how != FOLLOWED
+    b = acceleration(how, least, state.held, start.base - start.rate)
+    b_middle = acceleration(how, least, b, middle.base - middle.rate)
+    b_end = acceleration(how, least, b, end.base - end.rate)
+    first = rate(how, start, b)
+    first = max(first, 0.0) if may_stop and state.velocity == 0.0 else first  # rounding may not stop what starts here
+    half, last = rate(how, middle, b_middle), rate(how, end, b_end)
+    return advance(rule, first, half, last, end.tau - start.tau, may_stop, b_end, state)
+
+
+@inlined
+def longest_step(per_cycle: int, phase: float, state: State) -> float:
+    """The longest step from a phase on: those of a slide shorter than steps grow from its onset on."""
+    return max(SHARE_OF_CYCLE / per_cycle * max(state.grows, 0.25 * (phase - state.began)), LEAST_STEP)
+
+
+@inlined
+def is_whole(how: int, start: Point, middle: Point, end: Point, longest: float, limit: float, state: State) -> bool:
+    """Whether a step is taken as it is: nothing happens in it that a look at its three instants could show."""
+    if not state.sliding or end.tau - start.tau > longest:
+        return False
+    if how == HELD or bends(start, middle, end, limit):
+        return how == HELD
+    first, half, last = beyond(start, state), beyond(middle, state), beyond(end, state)
+    return how != physics.MONOTONE or not (turns(first, half, last) or first < 0.0 < last)
+
+
+@scalar
+def cut_step(
+    block: Block, pieces: np.ndarray, p: int, rule: int, per_cycle: int, how: int, start: Point, end: Point,
+    limit: float, state: State,
+) -> State:  # fmt: skip
+    """A step in parts: cut at t1, where Eq. 4 comes beyond b or turns back, at the stop, and where it is too long."""
+    size = end.tau - start.tau
+    while start.tau < end.tau:
+        if not state.sliding and how != HELD:
+            start, state = onset(block, pieces, p, start, end, state)
+        if not state.sliding:
+            break
+        longest = min(2.0 * size, longest_step(per_cycle, phase_at(pieces, p, start.tau), state))
+        cut = end if start.tau + longest >= end.tau else point_at(block, pieces, p, start.tau + longest)
+        middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
+        while how != HELD and bends(start, middle, cut, limit):
+            cut, middle = middle, point_at(block, pieces, p, 0.5 * (start.tau + middle.tau))
+        if how == physics.MONOTONE:
+            cut = next_event(block, pieces, p, start, cut, state)
+            middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
+        size = cut.tau - start.tau
+        taken, state = slide(block, rule, how, start, middle, cut, state)
+        stopped = start.tau + taken * size
+        start = cut if state.sliding or stopped <= start.tau else point_at(block, pieces, p, stopped)
+    return state
+
+
+@inlined
+def walk(
+    block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, until: float, how: int, state: State
+) -> State:
+    """From τ to `until` on piece p, step by step."""
+    w, rates, rule, per_cycle, amplitude = steps.w, steps.rates, steps.rule, steps.per_cycle, block.amplitude
+    at, count, begin = steps.at[p], steps.counts[p], pieces[p, BEGIN]
+    h, shift, limit = (pieces[p, FINISH] - begin) / count, pieces[p, START] - begin, 0.0
+    i = min(max(int((tau - begin) / h), 0), count - 1)
+    if how != HELD:
+        for j in range(2 * i, 2 * count + 1):
+            rates[j] = eq4_rate(block, amplitude * w[at + j])
+        # a second difference of (32/N)² of what friction takes off Üg at most
+        limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * block.g * physics.friction(block, 0.0)
+    first = i if begin == 0.0 else i - count
+    start = point_at(block, pieces, p, tau)
+    while i < count and start.tau < until and (state.sliding or how != HELD):
+        end = Point((first + 1) * h, amplitude * w[at + 2 * i + 2], rates[2 * i + 2])
+        middle = Point((first + 0.5) * h, amplitude * w[at + 2 * i + 1], rates[2 * i + 1])
+        if end.tau > until or start.tau > first * h:
+            end = end if end.tau <= until else point_at(block, pieces, p, until)
+            middle = point_at(block, pieces, p, 0.5 * (start.tau + end.tau))
+        longest, after = longest_step(per_cycle, shift + start.tau, state), state
+        whole = is_whole(how, start, middle, end, longest, limit, state)
+        if whole:
+            _, after = slide(block, rule, how, start, middle, end, state)
+        if not whole or not (after.sliding or how == HELD):
+            after = cut_step(block, pieces, p, rule, per_cycle, how, start, end, limit, state)
+        state, start, i, first = after, end, i + 1, first + 1
+    return state
+
+
+@scalar
+def rise(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, state: State) -> State:
+    """From τ on piece p, on which Üg > 0 does not fall, to its end."""
+    return walk(block, pieces, steps, p, tau, pieces[p, FINISH], block.rise, state)
+
+
+@scalar
+def hold(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, until: float, state: State) -> State:
+    """From τ on piece p with b held, to `until` or to the stop."""
+    return walk(block, pieces, steps, p, tau, until, HELD, state)
+
+
+@scalar
+def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
+    """A pulse of the paper: t1 to t5 in interval k of Üg > 0, and Eq. 12 up to the `following` one (see `train`)."""
+    pieces, end, validity = wave.pieces, wave.interval[k, 1], 0
+    p, tau = beginning(block, wave, k)
+    x = max(block.amplitude * pieces[p, FIRST], block.yield_acceleration)
+    b = physics.starting_acceleration(block, x)
+    state = State(velocity, 0.0, b, velocity, velocity, velocity > 0.0, -math.inf, 0.0)
+    for q in range(p, end):
+        begin = tau if q == p else pieces[q, BEGIN]
+        rises = pieces[q, FIRST] <= pieces[q, LAST]
+        if pieces[q, JUMPS] > 0.0 and not rises:
+            top = point_at(block, pieces, q, begin)
+            if state.sliding:
+                _, state = slide(block, RECTANGLE, block.rise, top, top, top, state)
+            elif top.base >= block.yield_acceleration and top.rate > 0.0:
+                grows = offset_at(pieces, q, block.amplitude, physics.starting_acceleration(block, top.base)) - begin
+                state = begun(block, top.base, pieces[q, START], grows, state)
+        if not rises and state.sliding and state.held <= 0.0:
+            validity = physics.KD_NOT_POSITIVE
+        if rises:
+            state = rise(block, pieces, steps, q, begin, state)
+        else:
+            state = hold(block, pieces, steps, q, begin, pieces[q, FINISH], state)
+    if state.sliding and state.held <= 0.0:
+        return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
+    # t5: Üg = 0
+    started = stopped_at = pieces[end - 1, END]
+    next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
+    if following < wave.height.size:
+        next_p, next_tau = beginning(block, wave, following)
+        begins = phase_at(pieces, next_p, next_tau)
+    if options.recoupling == physics.INTEGRATE:
+        for q in range(end, min(next_p + 1, pieces.shape[0])):
+            if state.sliding:
+                until = next_tau if q == next_p else pieces[q, FINISH]
+                state = hold(block, pieces, steps, q, pieces[q, BEGIN], until, state)
+                stopped_at = math.inf if state.sliding else pieces[q, END]
+    velocity, displacement = state.velocity, state.displacement
+    if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
+        displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
+        velocity = eq.attenuated_velocity(velocity, state.held, begins - started)
+    return Pulse(velocity, displacement, state.peak, min(state.least, velocity), stopped_at, 0.0, validity)
+
+
+_train = train_of(pulse)
+
+
+@scalar
+def yield_governs(block: Block, wave: Wave) -> bool:
+    """Whether Eq. 4 stays at or below Üy on all rises; not said of Newmark's block, which knows no Eq. 4."""
+    largest = -math.inf if block.rise != physics.NEWMARK else math.inf
+    for i in range(wave.rises.shape[0]):
+        low, high = block.amplitude * wave.rises[i, 0], block.amplitude * wave.rises[i, 1]
+        low, before, now = max(low, block.yield_acceleration), math.inf, -math.inf
+        for j in range(33 if high > block.yield_acceleration else 0):
+            eq4 = physics.response(block, low + (high - low) * (j / 32.0))
+            if before < now > eq4:  # the vertex of the parabola through three
+                largest = max(largest, now + (eq4 - before) * (eq4 - before) / (8.0 * (2.0 * now - before - eq4)))
+            largest, before, now = max(largest, eq4), now, eq4
+    return largest <= block.yield_acceleration
+
+
+@scalar
+def follow(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, last: int, until: float) -> State:
+    """Eq. 4 throughout, from rest at τ on piece p to `until` on piece `last`."""
+    state = State(0.0, 0.0, 0.0, 0.0, 0.0, True, -math.inf, 0.0)
+    for q in range(p, last + 1):
+        begin, end = tau if q == p else pieces[q, BEGIN], until if q == last else pieces[q, FINISH]
+        state = walk(block, pieces, steps, q, begin, end, FOLLOWED, state)
+    return state
+
+
+@scalar
+def mirrored_gain(block: Block, wave: Wave, steps: Steps) -> float:
+    """Gain of V over the repeated cycle, whose halves mirror each other: what both sides share, twice.
+
+    The rest cancels.  In V it would leave its rounding, and on a plane nearly level that is more than the gain.
+    """
+    gain, drifts = 0.0, np.empty(3)
+    for p in range(wave.cycle[wave.lead], wave.cycle[wave.lead + 1]):
+        h = (wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]) / steps.counts[p]
+        for i in range(steps.counts[p] if wave.pieces[p, TOP] > 0.0 else 0):
+            for j in range(3):
+                x = block.amplitude * steps.w[steps.at[p] + 2 * i + j]
+                drifts[j] = eq.drift(x, physics.friction(block, x), block.mu_s, block.tan_theta)
+            c0, c1, c2 = rate_polynomial(steps.rule, drifts[0], drifts[1], drifts[2])
+            gain += 2.0 * mean_rate(c0, c1, c2, 1.0) * h
+    return gain
+
+
+@scalar
+def slide_continuously(block: Block, wave: Wave, steps: Steps) -> Pulse:
+    """Continuous sliding from the first Üg ≥ Üy on, as one pulse: Eq. 4 throughout, and repeated cycles as a series."""
+    pieces = wave.pieces
+    velocity, displacement, peak, gain, moved, most, known = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1
+    k = first_pulse(block, wave, 0)
+    p, tau = beginning(block, wave, k) if k < wave.height.size else (pieces.shape[0], 0.0)
+    for c in range(wave.shape.size):
+        first, last = wave.cycle[c], wave.cycle[c + 1] - 1
+        if last < p:
+            continue
+        repeats = float(wave.repeats if wave.repeats > 0 and c == wave.lead else 1)
+        begin, end = pieces[first, BEGIN], pieces[last, FINISH]
+        if first <= p:
+            before = follow(block, pieces, steps, first, begin, p, tau)
+            after = follow(block, pieces, steps, p, tau, last, end)
+            velocity, displacement, peak = after.velocity, after.displacement, after.peak
+            rest = pieces[last, END] - phase_at(pieces, p, tau)
+            gain, moved = before.velocity + velocity, before.displacement + before.velocity * rest + displacement
+            most = max(before.peak, before.velocity + peak)
+            repeats -= 1.0
+        elif wave.shape[c] != known:
+            whole = follow(block, pieces, steps, first, begin, last, end)
+            gain, moved, most = whole.velocity, whole.displacement, whole.peak
+        known = wave.shape[c]
+        if steps.mirrored and c == wave.lead:
+            gain = mirrored_gain(block, wave, steps)
+        if repeats > 0.0:
+            peak = max(peak, velocity + most + max(0.0, (repeats - 1.0) * gain))
+            displacement += repeats * (moved + math.pi * (2.0 * velocity + gain * (repeats - 1.0)))
+            velocity += repeats * gain
+    return Pulse(velocity, displacement, peak, 0.0, 0.0, 0.0, 0)
+
+
+@scalar
+def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps: Steps) -> Motion:
+    """The response of a cell with any friction law."""
+    block = physics.block_of(law, cell, options.rise, options.g)
+    validity, unknown = validity_before(block, wave), math.nan if block.sliding_mode < 0 else 0.0
+    found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
+    if block.sliding_mode == eq.CONTINUOUS:
+        found = slide_continuously(block, wave, steps)
+    elif block.sliding_mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
+        validity |= physics.YIELD_GOVERNS if yield_governs(block, wave) else 0
+        found = _train(block, options, wave, steps, steps.known)
+    return motion_of(block, validity, found)
+
+
+@scalar
+def _solve(cell: Cell, common: tuple[Options, Wave, Steps]) -> Motion:
+    options, wave, steps = common
+    return solve_cell(EXPONENTIAL, cell, options, wave, steps)
+
+
+@kernel
+def solve_steps(cells: Cells, options: Options, wave: Wave, steps: Steps, results: np.ndarray) -> None:
+    """Solve the cells of a tile by steps; `results` is (fields of `Motion`, cells)."""
+    solve_each(_solve, cells, (options, wave, steps), results)

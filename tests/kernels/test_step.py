@@ -1,0 +1,394 @@
+"""The stepping kernel: orders and errors against 30 digits, hard cases, another friction law, Eq. 12 by hand."""
+
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from math import asin, cos, isfinite, pi, radians, sin, sqrt, tan
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import slipsweep
+from slipsweep.jit.decorators import inlined
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.block import Motion, Options
+from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_cell, solve_steps
+from slipsweep.model.friction import FrictionLaw
+from slipsweep.model.variables import VALUELESS, Validity
+from slipsweep.motion.cutting import wave_of
+from slipsweep.motion.steps import Steps, own_steps, steps_of
+from slipsweep.motion.waveforms import Harmonics, Sine, Square, Triangle, Waveform
+from tests.support.cases import read_cases
+from tests.support.hard_cells import read_hard_cases
+from tests.support.wave_cases import WaveCase, read_wave_cases, terms
+
+G = 9.81
+RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
+ORDERS = {"rectangle": 1, "trapezoid": 2, "simpson": 4}
+RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
+EVERY_RULE = pytest.mark.parametrize("rule", RULES)
+
+CASES = [case for case in read_cases() if not case.uplift]
+HARD_CASES = read_hard_cases()
+WAVE_CASES = [case for case in read_wave_cases() if case.permanent_displacement != "nan"]
+
+#: Categories of cases.csv in which every piece of the motion is smooth over many steps.
+SMOOTH = ("stick_slip", "continuous", "measured_yield", "newmark", "integrate", "level_plane", "mode_limit")
+
+#: W, largest V, sliding mode and validity of each cell.
+Results = np.ndarray
+
+
+def options_of(model: str, rise: str, recoupling: str, cycles: int, g: float = G) -> Options:
+    newmark = model == "newmark"
+    integrate = newmark or recoupling == "integrate"
+    return Options(
+        rise=physics.NEWMARK if newmark else RISES[rise],
+        recoupling=physics.INTEGRATE if integrate else physics.EQ12,
+        cycles=cycles,
+        wants_peak=True,
+        g=g,
+    )
+
+
+def solve(
+    waveform: Waveform, rule: str, steps_per_cycle: int, model: str = "mendez", rise: str = "monotone",
+    recoupling: str = "eq12", g: float = G, **columns: Any,
+) -> Results:  # fmt: skip
+    """The kernel's results, (4, cells), of columns of parameters."""
+    columns["tan_theta"] = np.tan(np.radians(columns.pop("theta")))
+    values = np.broadcast_arrays(*(np.atleast_1d(np.float64(columns.get(name, np.nan))) for name in Cells._fields))
+    cells = Cells(*map(np.ascontiguousarray, values))
+    wave, results = wave_of(waveform), np.empty((len(Motion._fields), cells.mu_s.size))
+    steps = steps_of(wave, RULES[rule], steps_per_cycle)
+    solve_steps(cells, options_of(model, rise, recoupling, waveform.cycles, g), wave, steps, results)
+    return results[:4]
+
+
+def waveform_of(case: Any) -> Waveform:
+    """The waveform of a line of cases.csv, of hard_cases.csv or of waveforms.csv."""
+    if not isinstance(case, WaveCase):
+        return Sine(cycles=case.cycles)
+    given = {"cycles": case.cycles, "ramp_in": case.ramp_in, "ramp_out": case.ramp_out}
+    if case.waveform == "harmonics":
+        return Harmonics(**(terms(case.harmonics) or {}), **given)
+    return {name.__name__.lower(): name for name in (Sine, Square, Triangle, slipsweep.Cosine)}[case.waveform](**given)
+
+
+def key_of(case: Any) -> tuple[Any, ...]:
+    shape = (case.waveform, case.harmonics, case.ramp_in, case.ramp_out) if isinstance(case, WaveCase) else ()
+    return (*shape, case.cycles, case.model, case.rise, case.recoupling, getattr(case, "g", G))
+
+
+def solve_cases(cases: Iterable[Any], rule: str, steps_per_cycle: int) -> dict[int, Results]:
+    """u, largest v, mode and validity of each case by its number, those with the same options together."""
+    found: dict[int, Results] = {}
+    for _, together in groupby(sorted(cases, key=key_of), key_of):
+        group = list(together)
+        columns = {name: [getattr(case, name) for case in group] for name in ("theta", "mu_s", "amplitude")}
+        for name in ("yield_acceleration", "decay_rate", "delta_mu"):
+            values = [
+                getattr(case, name) if isinstance(case, WaveCase) else dict(case.given).get(name) for case in group
+            ]
+            columns[name] = [np.nan if value is None else value for value in values]
+        one = group[0]
+        results = solve(
+            waveform_of(one),
+            rule,
+            steps_per_cycle,
+            one.model,
+            one.rise,
+            one.recoupling,
+            getattr(one, "g", G),
+            **columns,
+        )
+        omega = 2 * pi * np.array([getattr(case, "frequency", 1.0) for case in group])
+        results[0] /= omega**2
+        results[1] /= omega
+        found |= {case.case: results[:, j] for j, case in enumerate(group)}
+    return found
+
+
+def errors_of(cases: Sequence[Any], rule: str, counts: Sequence[int]) -> np.ndarray:
+    """|u/exact - 1|, (counts, cases)."""
+    exact = np.array([float(case.permanent_displacement) for case in cases])
+    runs = [solve_cases(cases, rule, count) for count in counts]
+    return np.array([[abs(run[case.case][0] / u - 1) for case, u in zip(cases, exact, strict=True)] for run in runs])
+
+
+# ------------------------------------------------------------------ errors and orders
+
+
+@pytest.mark.parametrize("rule", ["trapezoid", "simpson"])
+def test_every_case(rule: str) -> None:
+    """8192 steps a cycle: 2e-3 |u| + 1e-12 A/omega^2, hard cases included; the step squared where all is smooth."""
+    found = solve_cases(CASES, rule, 8192)
+    for case in CASES:
+        relative = 20 * (2 * pi / 8192) ** 2 if case.category in SMOOTH else 2e-3
+        for value, exact, scale in (
+            (found[case.case][0], float(case.permanent_displacement), case.displacement_scale),
+            (found[case.case][1], float(case.peak_relative_velocity), case.velocity_scale),
+        ):
+            assert abs(value - exact) <= relative * abs(exact) + 1e-12 * scale, f"case {case}"
+
+
+def test_rectangle_errs_by_steps_of_the_pulse() -> None:
+    """First order: relative error at most twice the step over the pulse's own length, W/V of the case."""
+    found = solve_cases(CASES, "rectangle", 8192)
+    for case in CASES:
+        exact, peak = float(case.permanent_displacement), float(case.peak_relative_velocity)
+        if exact != 0:
+            length = abs(exact) / case.displacement_scale / (peak / case.velocity_scale * case.cycles)
+            error = abs(found[case.case][0] / exact - 1)
+            assert error <= 2 * (2 * pi / 8192) / min(length, 1.0), f"case {case}"
+
+
+def test_modes_and_flags() -> None:
+    found = solve_cases(CASES, "simpson", 256)
+    for case in CASES:
+        mode, validity = found[case.case][2], Validity(int(found[case.case][3]))
+        assert mode == case.sliding_mode, f"case {case}"
+        sticks_and_slips = case.sliding_mode == 1
+        assert (Validity.NOT_RECOUPLED in validity) == (sticks_and_slips and not case.recoupled), f"case {case}"
+        governs = sticks_and_slips and case.eq4_below_yield and case.model != "newmark"
+        assert (Validity.YIELD_GOVERNS in validity) == governs, f"case {case}"
+
+
+@EVERY_RULE
+@pytest.mark.parametrize("category", SMOOTH)
+def test_order_on_smooth_cases(rule: str, category: str) -> None:
+    """Median of the slopes, since the error varies with where events fall.
+
+    The rectangle's first-order error in u comes from a jump of Üg − Ü at the onset, which only continuous sliding has.
+    """
+    counts = [96, 120, 152, 192, 240, 304, 384, 480, 608, 768]
+    errors = np.maximum(errors_of([case for case in CASES if case.category == category], rule, counts), 1e-16)
+    order = np.median([-np.polyfit(np.log(counts), np.log(error), 1)[0] for error in errors.T])
+    assert order > 0.9 * ORDERS[rule], f"observed order {order:.2f}"
+    if rule != "rectangle" or category == "continuous":
+        assert order < 1.1 * ORDERS[rule], f"observed order {order:.2f}"
+
+
+WAVEFORMS = sorted({case.waveform for case in WAVE_CASES})
+
+
+@EVERY_RULE
+@pytest.mark.parametrize("waveform", WAVEFORMS)
+def test_order_of_every_waveform(waveform: str, rule: str) -> None:
+    """Across jumps and kinks, in all regimes: the median case gains by the order, each by the first at least."""
+    sharp = ("sharp_decay", "just_above_yield")
+    cases = [c for c in WAVE_CASES if c.waveform == waveform and c.sliding_mode > 0 and c.regime not in sharp]
+    # steps of a hundredth of a cycle resolve no fiftieth harmonic
+    cases = [c for c in cases if ":50:" not in c.harmonics]
+    cases = [c for c in cases if abs(float(c.permanent_displacement)) > 1e-6 * c.displacement_scale]
+    counts, times = ([256, 304, 376], 16) if rule == "rectangle" else ([96, 120, 152], 4)
+    before = errors_of(cases, rule, counts).max(axis=0)
+    after = errors_of(cases, rule, [times * count for count in counts]).max(axis=0)
+    assert before.size >= 15
+    rounding = 1e-10
+    slow = [
+        f"{c}: {b:.1e} to {a:.1e}"
+        for c, b, a in zip(cases, before, after, strict=True)
+        if a > max(b / times**0.75, rounding)
+    ]
+    assert not slow, "below first order"
+    seen = after > rounding
+    if seen.sum() >= 5:
+        assert np.median(np.log(before[seen] / after[seen]) / np.log(times)) > ORDERS[rule] - 0.3
+
+
+def test_modes_and_flags_of_every_waveform() -> None:
+    found = solve_cases(read_wave_cases(), "simpson", 1024)
+    for case in read_wave_cases():
+        mode, validity = found[case.case][2:]
+        assert mode == case.sliding_mode, f"case {case}"
+        assert Validity(int(validity)) == Validity(case.validity), f"case {case}"
+        assert np.isnan(found[case.case][0]) == bool(case.validity & VALUELESS), f"case {case}"
+
+
+@EVERY_RULE
+def test_hard_cases_converge_at_first_order(rule: str) -> None:
+    """Slides and layers of friction shorter than steps, 10^6 cycles, rounding at its worst: worst of three step counts.
+
+    Sixteen times the steps, a twelfth of the error, until it is 100 times what one ulp of the inputs does.
+    """
+    counts = [1024, 1192, 1360]
+    coarse = [solve_cases(HARD_CASES, rule, count) for count in counts]
+    fine = [solve_cases(HARD_CASES, rule, 16 * count) for count in counts]
+    slow = []
+    for case in HARD_CASES:
+        if case.sliding_mode < 0:
+            continue
+        for run in (*coarse, *fine):
+            assert isfinite(run[case.case][0]), f"displacement of case {case}"
+            assert 0 <= run[case.case][1] < np.inf, f"peak velocity of case {case}"
+        before, after = (max(case.times_bound(run[case.case][0]) for run in runs) for runs in (coarse, fine))
+        if not after <= max(100.0, before / 16**0.9):
+            slow.append(f"case {case}: {before:.1e} to {after:.1e} times the conditioning bound")
+    assert not slow
+
+
+# ------------------------------------------------------------------ closed forms
+
+
+@EVERY_RULE
+def test_square_wave_under_newmark(rule: str) -> None:
+    """Rate (A − Üy) for π, then −(A + Üy) to the stop: constant, so that every rule is exact with any step."""
+    exact = 3 * (pi**2 / 2 + pi**2 / (2 * 3))
+    for steps in (8, 1000):
+        block = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
+        found = solve(Square(cycles=3), rule, steps, model="newmark", **block)
+        assert found[0, 0] == pytest.approx(exact, rel=1e-13)
+
+
+@pytest.mark.parametrize("rule", ["trapezoid", "simpson"])
+def test_triangle_wave_under_newmark(rule: str) -> None:
+    """From t1 on the rate rises for L = π/4 with s = 2A/π, falls as fast, and V is 0 √2 L after the rate was."""
+    exact = 3 * (4 / pi) * (pi / 4) ** 3 * (1 + 2 * sqrt(2) / 3)
+    block = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
+    found = solve(Triangle(cycles=3), rule, 8, model="newmark", **block)
+    assert found[0, 0] == pytest.approx(exact, rel=1e-12), "exact on straight lines"
+
+
+@pytest.mark.parametrize("steps", [8, 1000, 4000])
+@EVERY_RULE
+def test_a_slide_that_begins_at_the_end_of_a_piece(rule: str, steps: int) -> None:
+    """Where a ramp ends, steps grow from the little that was left of it: 1e-9 of Üy and less."""
+    wave = Triangle(cycles=2, ramp_in=0.1)
+    block = {"theta": 0.0, "mu_s": 0.9, "amplitude": 5.0}
+    left = np.array([1e-9, 1e-10, 1e-11, 1e-12])
+    found = solve(wave, rule, steps, model="newmark", yield_acceleration=2.0 * (1 - left), **block)
+    at_ramp, whole = (
+        solve(wave, "simpson", 64, model="newmark", yield_acceleration=y, **block)[0, 0] for y in (2.0, 1.99999)
+    )
+    assert at_ramp < whole
+    allowed = 3 / steps if rule == "rectangle" else 1e-8
+    np.testing.assert_allclose(found[0], at_ramp, rtol=allowed)
+
+
+def test_eq12_by_hand() -> None:
+    """Newmark's slide up to t5 in closed form, then V/b more: v − b t (monotone rise that the yield value governs)."""
+    amplitude, least, mu_s = 3.0, 1.0, 0.5
+    first = asin(least / amplitude)
+    velocity = amplitude * (cos(first) + 1.0) - least * (pi - first)
+    assert velocity > 0.0, "it still slides at t5"
+    displacement = amplitude * (cos(first) * (pi - first) + sin(pi) - sin(first)) - least * (pi - first) ** 2 / 2
+    exact = displacement + velocity**2 / (2 * least)
+    found = solve(
+        Sine(cycles=1), "simpson", 1024, theta=0.0, mu_s=mu_s, amplitude=amplitude, yield_acceleration=least,
+        decay_rate=50.0, delta_mu=0.0,
+    )  # fmt: skip
+    assert Validity.YIELD_GOVERNS in Validity(int(found[3, 0]))
+    assert found[0, 0] == pytest.approx(exact, rel=1e-9)
+
+
+# ------------------------------------------------------------------ another law
+
+
+@inlined
+def hyperbolic_friction(x: float, mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
+    return mu_s / (1.0 + decay_rate * abs(x) / g)
+
+
+HYPERBOLIC = FrictionLaw(friction=hyperbolic_friction)
+
+
+@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
+def solve_hyperbolic(cell: physics.Cell, options: Options, wave: Any, steps: Steps) -> Motion:
+    return solve_cell(HYPERBOLIC, cell, options, wave, steps)
+
+
+class Hyperbolic:
+    """Üg = A sin φ and Eq. 4 with that friction, for SciPy."""
+
+    def __init__(self, theta: float, mu_s: float, amplitude: float, least: float, decay_rate: float) -> None:
+        self.tangent, self.mu_s, self.amplitude = tan(radians(theta)), mu_s, amplitude
+        self.least, self.decay_rate = least, decay_rate
+
+    def rate(self, x: float) -> float:
+        """Üg − Ü."""
+        friction = self.mu_s / (1.0 + self.decay_rate * abs(x) / G)
+        n = G + x * self.tangent
+        lag = n * (self.mu_s - self.tangent - friction) + G * self.tangent
+        return lag if x >= 0 else -lag
+
+    def found(self, rule: str, steps_per_cycle: int, cycles: int, recoupling: str = "eq12") -> Motion:
+        cell = physics.Cell(self.tangent, self.mu_s, self.amplitude, self.least, self.decay_rate, 0.0, np.nan)
+        wave = wave_of(Sine(cycles=cycles))
+        steps = own_steps(steps_of(wave, RULES[rule], steps_per_cycle))
+        return solve_hyperbolic(cell, options_of("mendez", "monotone", recoupling, cycles), wave, steps)
+
+    def integrate(self, start: float, end: float, state: Any, rate: Any, stops: bool = False) -> tuple[Any, float]:
+        """V and W at the end or at the stop, and where that is."""
+
+        def stop(t: float, y: Any) -> float:
+            return float(y[0])
+
+        stop.terminal, stop.direction = True, -1.0  # type: ignore[attr-defined]
+        solution = solve_ivp(
+            lambda t, y: (rate(self.amplitude * sin(t)), y[0]), (start, end), state, "DOP853", rtol=1e-11, atol=1e-13,
+            events=stop if stops else None,
+        )  # fmt: skip
+        return solution.y[:, -1], float(solution.t[-1])
+
+    def stick_slip(self, recoupling: str) -> float:
+        """W of one pulse from rest to rest: b = max(b, Eq. 4) on the rise, held on the fall, Eq. 12 from t5 on."""
+        x = np.linspace(self.least, self.amplitude, 10_000)
+        eq4 = np.array([value - self.rate(value) for value in x])
+        assert (np.diff(eq4) > 0).all(), "Eq. 4 rises"
+        begins = self.least
+        if self.rate(begins) <= 0.0:  # t1 lies beyond Üy
+            begins = brentq(self.rate, self.least, self.amplitude, xtol=1e-15)
+        held = max(self.least, float(eq4[-1]))
+        switch = begins
+        if begins - self.rate(begins) < self.least < eq4[-1]:
+            switch = brentq(lambda v: v - self.rate(v) - self.least, begins, self.amplitude, xtol=1e-15)
+        phases = [asin(begins / self.amplitude), asin(min(switch / self.amplitude, 1.0)), pi / 2]
+        state, _ = self.integrate(phases[0], phases[1], [0.0, 0.0], lambda x: x - self.least)
+        state, _ = self.integrate(
+            phases[1], phases[2], state, self.rate if eq4[-1] > self.least else lambda x: x - held
+        )
+        end = pi if recoupling == "eq12" else 2 * pi
+        state, at = self.integrate(phases[2], end, state, lambda x: x - held, stops=True)
+        return float(state[1]) + (state[0] ** 2 / (2 * held) if at == pi else 0.0)
+
+    def continuous(self, cycles: int) -> float:
+        state, start = np.zeros(2), asin(self.least / self.amplitude)
+        for end in [*np.arange(1, 2 * cycles + 1) * pi]:
+            side = 1.0 if sin(0.5 * (start + end)) > 0 else -1.0
+            state, _ = self.integrate(start, end, state, lambda x, side=side: self.rate(side * max(side * x, 1e-300)))
+            start = end
+        return float(state[1])
+
+
+@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+@pytest.mark.parametrize(
+    "block",
+    [
+        Hyperbolic(theta=5.0, mu_s=0.38, amplitude=3.55, least=0.59, decay_rate=1.5),
+        Hyperbolic(theta=5.0, mu_s=0.38, amplitude=3.1, least=2.0, decay_rate=1.0),
+        Hyperbolic(theta=14.0, mu_s=0.5, amplitude=3.0, least=1.5, decay_rate=0.8),
+    ],
+    ids=["measured", "near Coulomb", "steep"],
+)
+def test_another_law_in_stick_slip(block: Hyperbolic, recoupling: str) -> None:
+    """A law of another shape, in ten lines and without an edit in a kernel, as SciPy integrates it."""
+    exact = block.stick_slip(recoupling)
+    for rule, allowed in (("rectangle", 0.02), ("trapezoid", 1e-4), ("simpson", 1e-9)):
+        found = block.found(rule, 2048, 3, recoupling)
+        assert found.sliding_mode == 1
+        assert not int(found.validity) & (VALUELESS | Validity.NOT_RECOUPLED)
+        assert found.displacement == pytest.approx(3 * exact, rel=allowed), rule
+
+
+def test_another_law_in_continuous_sliding() -> None:
+    block = Hyperbolic(theta=6.0, mu_s=0.38, amplitude=5.1, least=0.08, decay_rate=2.3)
+    exact = block.continuous(4)
+    for rule, allowed in (("rectangle", 0.02), ("trapezoid", 1e-4), ("simpson", 1e-8)):
+        found = block.found(rule, 2048, 4)
+        assert found.sliding_mode == 2
+        assert found.displacement == pytest.approx(exact, rel=allowed), rule
