@@ -27,7 +27,6 @@ from slipsweep.errors import InputError
 from slipsweep.explore.excerpt import read_excerpt
 from slipsweep.explore.page import cell_arrays, page
 from slipsweep.files import spec
-from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import NOTES
 from slipsweep.runs import store
 from slipsweep.runs.jobs import sweep_job
@@ -674,7 +673,7 @@ def test_the_order_of_dimensions_does_not_matter(lined: Path) -> None:
         table = opened.select(["permanent_displacement", "validity"], keep, {"mu_s": 0.25})
     straight = sheet.reliable(table.data_vars, "permanent_displacement", Look())
     validity = table["validity"]
-    turned = {**table.data_vars, "validity": Variable(validity.dims[::-1], validity.values.T)}
+    turned = {**table.data_vars, "validity": xr.Variable(validity.dims[::-1], validity.values.T)}
     again = sheet.reliable(turned, "permanent_displacement", Look())
     assert np.isnan(straight.values).any()
     np.testing.assert_array_equal(again.values, straight.values)

@@ -128,7 +128,7 @@ def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
 def test_the_plan_of_a_block() -> None:
     part = spec.parse(CASES, "a.toml").plan().part({"mu_s": slice(1, 3), "case": slice(1, 2)})
     assert part.sizes == {"mu_s": 2, "frequency": 2, "case": 1}
-    coords = part.empty().coords
+    coords = part.template().coords
     np.testing.assert_array_equal(coords["mu_s"].values, [0.5, 0.7])
     np.testing.assert_array_equal(coords["frequency"].values, [1, 2])
     np.testing.assert_array_equal(coords["theta"].values, [6])

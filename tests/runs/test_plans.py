@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +22,6 @@ from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import chunk_lengths, grid_chunks, places
-from slipsweep.grid.tables import Table
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import Job, limit_job, sweep_job
 from slipsweep.runs.stored import stored_table
@@ -144,7 +142,7 @@ PLANS: dict[str, Callable[[], Job]] = {
 def assert_part(plan: AnyPlan, chunk: dict[str, slice], found: Any, whole: Any) -> None:
     """A table of a chunk is the chunk of the table, bit for bit."""
     assert list(found.data_vars) == list(whole.data_vars) == list(plan.names)
-    for name, one in (whole.data_vars | whole.coords).items():
+    for name, one in whole.variables.items():
         part = found[name]
         expected = one.values[tuple(places(chunk, one.sizes).values())]
         assert (part.dims, part.values.dtype, part.values.shape) == (one.dims, one.values.dtype, expected.shape)
@@ -161,7 +159,7 @@ def cut_from(whole: Any) -> solving.Solved:
     """What gives chunks out of all results: single cells, which another test solves by themselves."""
 
     def part(chunk: dict[str, slice], one: Any) -> Any:
-        return replace(one, values=one.values[tuple(places(chunk, one.sizes).values())].copy())
+        return xr.Variable(one.dims, one.values[tuple(places(chunk, one.sizes).values())].copy(), one.attrs)
 
     def cut(plan: AnyPlan, missing: Any, progress: Any = None) -> Any:
         for number, chunk in missing.items():
@@ -169,7 +167,7 @@ def cut_from(whole: Any) -> solving.Solved:
                 {name: part(chunk, one) for name, one in variables.items()}
                 for variables in (whole.coords, whole.data_vars)
             )
-            yield number, Table(coords, results, whole.attrs)
+            yield number, xr.Dataset(results, coords, whole.attrs)
 
     return cut
 
@@ -198,7 +196,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Written]:
 def test_parts_give_the_bits_of_the_whole(name: str) -> None:
     plan = PLANS[name]().plan
     whole = solved(name)
-    empty = plan.empty()
+    empty = plan.template()
     assert [(one.dims, one.values.shape, one.values.dtype, one.attrs) for one in empty.data_vars.values()] == [
         (one.dims, one.values.shape, one.values.dtype, one.attrs) for one in whole.data_vars.values()
     ]

@@ -1,7 +1,6 @@
 """Chunks, and netCDF files: what they hold, and that they are complete or not there."""
 
 import errno
-import itertools
 import math
 import os
 import shutil
@@ -21,7 +20,6 @@ import slipsweep
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import netcdf, results, spec
 from slipsweep.grid import chunks, plans
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model import variables
 from slipsweep.runs import placed, solving, store
 from slipsweep.runs.jobs import sweep_job
@@ -137,27 +135,6 @@ def test_chunks_are_whole_along_the_last_dimensions() -> None:
         "case": 7,
     }
     assert chunks.chunk_lengths(shape, 400_000)["frequency"] == 1000
-
-
-@pytest.mark.parametrize("most", [7, 96, 1000])
-def test_chunks_are_solved_into_the_memory_of_the_last_but_one(most: int) -> None:
-    names = ", ".join(f'"{name}"' for name in variables.RESULTS if name != "amplitude")
-    plan = spec.parse(f"{GRID}[model]\nstructure_frequency = 2\n[output]\nvariables = [{names}]", "a.toml").plan()
-    cut = dict(enumerate(chunks.grid_chunks(plan.sizes, most)))
-    whole = plan.solve()
-    places: list[set[int]] = []
-    previous: tuple[int, Table] | None = None
-    for found in solving.solve_here(plan, cut):
-        # a chunk is as it was solved until the next but one is asked for, whatever their sizes
-        for number, table in filter(None, (previous, found)):
-            for name, result in table.data_vars.items():
-                expected = whole[name].values[tuple(cut[number][dim] for dim in result.dims)]
-                np.testing.assert_array_equal(result.values, expected, err_msg=name)
-        places.append({result.values.ctypes.data for result in found[1].data_vars.values()})
-        previous = found
-    assert len(places) == len(cut)
-    assert all(now == before for before, now in zip(places, places[2:], strict=False))
-    assert not any(now & before for before, now in itertools.pairwise(places))
 
 
 def test_workers_share_a_sweep_evenly_within_the_memory() -> None:
@@ -395,12 +372,12 @@ def test_the_tally_counts_modes_and_flags(tmp_path: Path) -> None:
 
 
 def test_tables_in_memory_are_written_by_the_same_rules(tmp_path: Path) -> None:
-    table = Table(
+    table = xr.Dataset(
+        {"relative_velocity": xr.Variable(("time",), np.array([0.0, 1.0]), variables.HISTORY["relative_velocity"])},
         {
-            "time": Variable(("time",), np.array([0.0, 0.1]), {"units": "s"}),
-            "theta": Variable((), np.array(5.0), variables.PARAMETERS["theta"]),
+            "time": xr.Variable(("time",), np.array([0.0, 0.1]), {"units": "s"}),
+            "theta": xr.Variable((), np.array(5.0), variables.PARAMETERS["theta"]),
         },
-        {"relative_velocity": Variable(("time",), np.array([0.0, 1.0]), variables.HISTORY["relative_velocity"])},
         {"permanent_displacement": 0.5},
     )
     netcdf.write_table(table, tmp_path / "a.nc", title="History", command="x")
@@ -470,7 +447,7 @@ def test_a_failed_run_leaves_nothing_but_finished_chunks(
     monkeypatch.undo()
     solved: list[int] = []
 
-    def counting(*arguments: Any) -> Iterator[tuple[int, Table]]:
+    def counting(*arguments: Any) -> Iterator[tuple[int, xr.Dataset]]:
         for number, table in solving.solve_here(*arguments):
             solved.append(number)
             yield number, table

@@ -13,7 +13,6 @@ from scipy.optimize import brentq
 import slipsweep
 from slipsweep.charts.limit_figures import limit_chart
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Variable
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 from slipsweep.studies.limit_scans import narrow
@@ -418,8 +417,8 @@ def test_cases_keep_their_names(tmp_path: Path) -> None:
     assert command(tmp_path, "limit", "b.toml", "-d", "5mm", "-o", "m.nc").returncode == 0
 
     zipped: dict[str, Any] = {
-        "theta": Variable(("case",), np.array([5.0, 8.0])),
-        "mu_s": Variable(("case",), np.array([0.38, 0.3])),
+        "theta": xr.Variable(("case",), np.array([5.0, 8.0])),
+        "mu_s": xr.Variable(("case",), np.array([0.38, 0.3])),
     }
     drawn = ["dry ± joint", r"_wet \$^joint^\$"]
     for frequency in ([1.0, 2.0, 3.0], 1.0):

@@ -14,7 +14,6 @@ import xarray as xr
 from slipsweep import InputError, Record, RunError, read_record, sweep
 from slipsweep.files import export, spec
 from slipsweep.grid import chunks
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
 from slipsweep.runs import solving, store
 from slipsweep.runs.jobs import sweep_job
@@ -170,7 +169,7 @@ def test_chunks_and_folders_give_what_one_piece_gives(folder: Path) -> None:
 
 
 def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) -> None:
-    def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
+    def failing(*arguments: Any) -> Iterator[tuple[int, xr.Dataset]]:
         for number, table in solving.solve_here(*arguments):
             if number == 3:
                 raise RunError("the power went")

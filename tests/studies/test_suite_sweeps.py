@@ -14,7 +14,6 @@ from slipsweep import InputError, RunError, Suite, read_suite, sweep
 from slipsweep.files import spec
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.results import result_file
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
 from slipsweep.motion.intensity import intensity_measures
 from slipsweep.runs import solving, store
@@ -160,7 +159,7 @@ def test_chunks_and_folders_give_what_one_piece_gives(folder: Path, text: str) -
 
 
 def test_an_interrupted_run_goes_on_but_not_with_other_motions(folder: Path) -> None:
-    def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
+    def failing(*arguments: Any) -> Iterator[tuple[int, xr.Dataset]]:
         for number, table in solving.solve_here(*arguments):
             if number == 3:
                 raise RunError("the power went")

@@ -5,13 +5,12 @@ that other choices of recoupling and friction decay give.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from slipsweep.grid.plans import plan_friction_parameters, plan_sweep
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
 from slipsweep.model.variables import PARAMETERS, WAVEFORM_INPUTS
 from slipsweep.motion.amplitude import peak_acceleration
@@ -27,33 +26,35 @@ _BLOCK = ("theta", "mu_s", "yield_acceleration")
 _FRICTION = ("decay_rate", "delta_mu", "minimum_friction")
 
 
-def amplitude_of(displacement_amplitude: Variable, frequency: Variable) -> Variable:
+def amplitude_of(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> xr.Variable:
     """The amplitude A = ω²d on a slice: files do not hold it where d and the frequency span a grid."""
     dims = (*displacement_amplitude.dims, *(dim for dim in frequency.dims if dim not in displacement_amplitude.dims))
     both = (
         variable.values.reshape([variable.sizes.get(dim, 1) for dim in dims])
         for variable in (displacement_amplitude, frequency)
     )
-    return Variable(dims, np.asarray(peak_acceleration(*both), np.float64), PARAMETERS["amplitude"])
+    return xr.Variable(dims, np.asarray(peak_acceleration(*both), np.float64), PARAMETERS["amplitude"])
 
 
-def solve(table: Table, names: Iterable[str], model: Model | None = None, **changed: Any) -> Mapping[str, Variable]:
+def solve(
+    table: xr.Dataset, names: Iterable[str], model: Model | None = None, **changed: Any
+) -> Mapping[str, xr.Variable]:
     """Solve the cells of a slice as the slice's result was solved.
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         Gives the parameters and, in its attributes, model, excitation and solver.
     names : iterable of str
         Results.
     model : Model, optional
         Another model.
-    changed : Variable, float or None
+    changed : xr.Variable, float or None
         Parameters that differ; None stands for the model's own estimate.
 
     Returns
     -------
-    mapping of str to Variable
+    mapping of str to xr.Variable
     """
     chosen = model or MODELS.from_attributes(table.attrs)
     wanted = [*_BLOCK, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS]
@@ -70,18 +71,18 @@ def solve(table: Table, names: Iterable[str], model: Model | None = None, **chan
     return plan.solve().data_vars
 
 
-def boundaries(table: Table, always: bool = False) -> dict[str, Variable]:
+def boundaries(table: xr.Dataset, always: bool = False) -> dict[str, xr.Variable]:
     """Yield acceleration and, but for Newmark's block, limiting acceleration (Eq. 7) of a slice, m/s².
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
     always : bool
         Return both for Newmark's block, too.
 
     Returns
     -------
-    dict of str to Variable
+    dict of str to xr.Variable
         ``yield_acceleration`` and ``limiting_acceleration`` along those dimensions of the slice that
         they depend on; NaN where the block slides under its own weight.
     """
@@ -94,34 +95,32 @@ def boundaries(table: Table, always: bool = False) -> dict[str, Variable]:
     limit = found["limiting_acceleration"]
     unstable = found["validity"].values != 0
     lines = {
-        "yield_acceleration": replace(
-            found["yield_acceleration"], values=np.where(slides_at_rest, np.nan, found["yield_acceleration"].values)
-        ),
-        "limiting_acceleration": replace(limit, values=np.where(unstable, np.nan, limit.values)),
+        "yield_acceleration": found["yield_acceleration"].variable.where(~slides_at_rest),
+        "limiting_acceleration": limit.variable.where(~unstable),
     }
     if table.attrs["model"] == "newmark" and not always:
         del lines["limiting_acceleration"]
     return lines
 
 
-def newmark(table: Table, **changed: Any) -> Variable:
+def newmark(table: xr.Dataset, **changed: Any) -> xr.Variable:
     """Permanent displacement of Newmark's block on the cells of a slice."""
     return solve(table, ["permanent_displacement"], Newmark(g=float(table.attrs["g"])), **changed)[
         "permanent_displacement"
     ]
 
 
-def sides_of(limit: Variable) -> dict[str, Any]:
+def sides_of(limit: xr.Variable) -> dict[str, Any]:
     """The amplitude on the mode limit, where the block still sticks and slips, and the next number above it.
 
     What to give to `solve` or `newmark` for the results on either side, along a dimension ``side``.
     """
     there = np.where(np.isfinite(limit.values), limit.values, 1.0)
     both = np.stack([there, np.nextafter(there, np.inf)], axis=-1)
-    return {"amplitude": Variable((*limit.dims, SIDE), both), "displacement_amplitude": None}
+    return {"amplitude": xr.Variable((*limit.dims, SIDE), both), "displacement_amplitude": None}
 
 
-def alternatives(table: Table) -> dict[str, tuple[Model, dict[str, Any]]]:
+def alternatives(table: xr.Dataset) -> dict[str, tuple[Model, dict[str, Any]]]:
     """The answers that an engineer has to choose from on a slice: what to change for `solve`, by what it is called.
 
     Newmark's block; the friction decay λ by Eq. 6, or as the paper measured it; the end of sliding by

@@ -1,10 +1,10 @@
 """Curves: a result over one axis of a slice, a curve for each value of another, or for each answer there is."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -26,7 +26,6 @@ from slipsweep.charts.sheet import (
     validity_has,
 )  # fmt: skip
 from slipsweep.charts.style import BLUE, VERMILION, value_text
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.variables import CAUTIONS, RESULTS, Validity
 
@@ -109,7 +108,7 @@ def dimensionless(sheet: Sheet) -> Figure:
         panel.axes.set_ylabel("permanent displacement, u ω² / A")
         log_axis(panel.axes, beyond, _LEAST_SCALED)
         found = _on_limit(panel, _DISPLACEMENT)
-        edges = dimensionless_curves(panel, found, _sides(panel)["amplitude"], SIDE) if found else {}
+        edges = dimensionless_curves(panel, found, _sides(panel)["amplitude"], SIDE) if found is not None else {}
         classical = panel.table.attrs["model"] != "newmark" and dimensionless_curves(panel, newmark(panel.table))
         members = len(curves) // frequencies.size
         for member, look in enumerate(curve_looks(members)):
@@ -149,7 +148,7 @@ def spread(sheet: Sheet) -> Figure:
     sheet.set_axis("x", sheet.x)
     for panel in sheet.panels:
         panel.lines = boundaries(panel.table, always=True)  # the others have a mode limit, whatever this one is
-    flags: list[Variable] = []
+    flags: list[xr.Variable] = []
     own_text = _own_text(sheet.table)  # one for all panels: the caption has what differs
     answers = [_answers(panel, own_text, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for _, ys in one.values()])
@@ -180,12 +179,12 @@ def spread(sheet: Sheet) -> Figure:
 
 
 def dimensionless_curves(
-    panel: Panel, displacement: Variable, amplitude: Variable | None = None, along: str | None = None
+    panel: Panel, displacement: xr.Variable, amplitude: xr.Variable | None = None, along: str | None = None
 ) -> dict[tuple[int, int], Curve]:
     """A/Üy and uω²/A of every curve of a panel and every frequency of its slice, by their numbers."""
     dims = (panel.y, "frequency", along or panel.x)
     variables = (
-        displacement, amplitude or panel.table["amplitude"], panel.table["frequency"],
+        displacement, panel.table["amplitude"] if amplitude is None else amplitude, panel.table["frequency"],
         panel.lines["yield_acceleration"],
     )  # fmt: skip
     u, a, frequency, threshold = (broadcast(one, panel.table, dims) for one in variables)
@@ -194,7 +193,7 @@ def dimensionless_curves(
     return {(i, j): (ratio[i, j], scaled[i, j]) for i in range(scaled.shape[0]) for j in range(scaled.shape[1])}
 
 
-def _answers(panel: Panel, own_text: str, flags: list[Variable]) -> dict[str, Curve]:
+def _answers(panel: Panel, own_text: str, flags: list[xr.Variable]) -> dict[str, Curve]:
     """The curves of a spread, mm, all over the same abscissae, the result's own last; their validity to `flags`."""
     found = {}
     for text, (model, changed) in alternatives(panel.table).items():
@@ -207,7 +206,7 @@ def _answers(panel: Panel, own_text: str, flags: list[Variable]) -> dict[str, Cu
     return {text: (xs, ys * 1000.0) for text, (xs, ys) in found.items()}
 
 
-def _own_text(table: Table) -> str:
+def _own_text(table: xr.Dataset) -> str:
     """What the answer of a result is called among those that there are."""
     model = MODELS.from_attributes(table.attrs)
     if model.name == "newmark":
@@ -224,14 +223,14 @@ def _sides(panel: Panel) -> dict[str, Any]:
     return sides_of(panel.lines["limiting_acceleration"])
 
 
-def _on_limit(panel: Panel, name: str, model: Model | None = None, **changed: Any) -> Variable | None:
+def _on_limit(panel: Panel, name: str, model: Model | None = None, **changed: Any) -> xr.Variable | None:
     """A result on both sides of the mode limit, if the curves are over the amplitude and there is a limit."""
     if "limiting_acceleration" not in panel.lines or panel.x not in DRIVES:
         return None
     return reliable(solve(panel.table, [name, "validity"], model, **changed, **_sides(panel)), name, panel.look)
 
 
-def _curves(panel: Panel, drawn: Variable, on_limit: Variable | None = None) -> list[Curve]:
+def _curves(panel: Panel, drawn: xr.Variable, on_limit: xr.Variable | None = None) -> list[Curve]:
     """The curves of a panel, broken where the amplitude passes the mode limit: the jump is no line.
 
     With the results on the limit they go there from either side.
@@ -246,7 +245,7 @@ def _curves(panel: Panel, drawn: Variable, on_limit: Variable | None = None) -> 
     scale = panel.look.scale(panel.x, panel.g)
     if panel.x == "displacement_amplitude":
         scale = scale / (2 * math.pi * panel.grid(panel.table["frequency"])) ** 2
-    edges = panel.grid(on_limit, SIDE) if on_limit else [None] * len(rows)
+    edges = panel.grid(on_limit, SIDE) if on_limit is not None else [None] * len(rows)
     return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, (limit * scale)[:, 0], edges, strict=True)]
 
 
@@ -291,7 +290,7 @@ def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> Non
     """Put a broad grey line under what a caution is about: in units of `factor`, without one dimensionless."""
     drawn = panel.result(name)
     flagged = broadcast(validity_has(panel.table["validity"], CAUTIONS), panel.table, drawn.dims)
-    cautious = replace(drawn, values=np.where(flagged & (drawn.values > 0), drawn.values, np.nan))
+    cautious = drawn.where(flagged & (drawn.values > 0))
     if factor:
         # the limit itself is cautious, and a jump there is no line
         curves = [(xs, ys * factor) for xs, ys in _curves(panel, cautious, _on_limit(panel, name))]

@@ -7,6 +7,7 @@ Figures are made without pyplot, hence without a window system or state between 
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -14,7 +15,6 @@ from matplotlib.patches import Patch
 from slipsweep.charts.answers import boundaries
 from slipsweep.charts.sheet import LINES, new_panels
 from slipsweep.charts.style import BLUE, VERMILION, caption
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import HISTORY, SlidingMode
 
 #: How the half waves of a record are drawn: told apart in grey, too.
@@ -29,12 +29,12 @@ _MODES: dict[SlidingMode, tuple[str, dict[str, Any]]] = {
 }  # fmt: skip
 
 
-def history(table: Table, axes: Axes | None = None) -> Figure:
+def history(table: xr.Dataset, axes: Axes | None = None) -> Figure:
     """Draw a time history in the manner of the paper's Figs. 5, 8 and 9.
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         What `slipsweep.studies.history.history_table` returns.
     axes : Axes, optional
         Refused: there are several panels.
@@ -87,7 +87,7 @@ def history(table: Table, axes: Axes | None = None) -> Figure:
     return figure
 
 
-def _draw_modes(panel: Axes, table: Table) -> None:
+def _draw_modes(panel: Axes, table: xr.Dataset) -> None:
     """A box for each positive half wave of the record, by the sliding mode that its peak decides."""
     start, end, mode = (table[f"half_wave_{name}"].values for name in ("start", "end", "mode"))
     entries = []
@@ -105,7 +105,7 @@ def _draw_modes(panel: Axes, table: Table) -> None:
     panel.margins(x=0)
 
 
-def _draw_thresholds(panel: Axes, table: Table) -> None:
+def _draw_thresholds(panel: Axes, table: xr.Dataset) -> None:
     """Lines of the accelerations of yield and, but for Newmark's block, of the mode limit."""
     if "theta" in table and "mu_s" in table:
         found = {name: one.values.item() for name, one in boundaries(table).items()}

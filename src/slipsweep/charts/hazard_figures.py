@@ -1,6 +1,7 @@
 """The chart of a displacement hazard: mean annual rate against displacement."""
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 from slipsweep.charts.sheet import add_caption, add_legend, curve_looks, new_panels
 from slipsweep.charts.style import model_text, plain
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table
 from slipsweep.studies.suite_statistics import point_names
 
 Floats = NDArray[np.float64]
@@ -20,12 +20,12 @@ _MOST_CURVES, _POINTS = 8, 121
 _MOST_MARKS = 20
 
 
-def drawn_thresholds(table: Table, asked: Floats) -> Floats:
+def drawn_thresholds(table: xr.Dataset, asked: Floats) -> Floats:
     """Displacements that a curve is drawn through: those asked for, and as many as a smooth one needs.
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         The displacements under the suite.
     asked : array
         Displacements, m, increasing.
@@ -35,12 +35,12 @@ def drawn_thresholds(table: Table, asked: Floats) -> Floats:
     return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], asked)
 
 
-def hazard_chart(rates: Table, axes: Axes | None = None, marked: Floats | None = None) -> Figure:
+def hazard_chart(rates: xr.Dataset, axes: Axes | None = None, marked: Floats | None = None) -> Figure:
     """Draw the mean annual rate of exceedance over the displacement.
 
     Parameters
     ----------
-    rates : Table
+    rates : xr.Dataset
         What `slipsweep.studies.hazard.hazard_table` returns.
     axes : Axes, optional
         What to draw in, instead of a new figure.

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from slipsweep.charts.sheet import add_caption, add_legend, curve_looks, new_panels, plot_curve, set_scale
 from slipsweep.charts.style import SYMBOLS, axis_label, length_text, model_text, plain, value_text
 from slipsweep.charts.suite_figures import QUANTILES, SUITE, draw_suite, suite_text
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
 from slipsweep.studies.suite_statistics import limit_quantiles
 
@@ -26,7 +26,7 @@ _CURVES = ("theta", "displacement", "mu_s")
 _TOLD = (*SYMBOLS, "displacement")
 
 
-def limit_chart(table: Table, axes: Axes | None = None) -> Figure:
+def limit_chart(table: xr.Dataset, axes: Axes | None = None) -> Figure:
     """Draw limit amplitudes, in g, over one dimension.
 
     The abscissa is frequency, else mu_s, theta or displacement; theta (else displacement or
@@ -37,7 +37,7 @@ def limit_chart(table: Table, axes: Axes | None = None) -> Figure:
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         What `slipsweep.studies.limits.limit_table` returns; names of its cases in its attribute ``labels``.
     axes : Axes, optional
         What to draw one panel in, instead of a new figure.
@@ -75,9 +75,9 @@ def limit_chart(table: Table, axes: Axes | None = None) -> Figure:
         panel = grid[i, j]
         where = {**fixed, **{dim: at for dim, at in ((rows, at_row), (columns, at_column)) if dim}}
         if suite:
-            _draw_motions(entries, panel, table.pick(where), abscissa, x)
+            _draw_motions(entries, panel, table.isel(where, missing_dims="ignore"), abscissa, x)
         for number, at_curve in enumerate(family if not suite else ()):
-            one = table.pick({**where, **({curves: at_curve} if curves else {})})
+            one = table.isel({**where, **({curves: at_curve} if curves else {})}, missing_dims="ignore")
             look = curve_looks(len(family))[number]
             line = _draw_curve(panel, one, x, number / len(family), look)
             if curves:
@@ -101,7 +101,7 @@ def limit_chart(table: Table, axes: Axes | None = None) -> Figure:
     return figure
 
 
-def _draw_curve(panel: Axes, table: Table, x: np.ndarray, offset: float, look: dict[str, Any]) -> Any:
+def _draw_curve(panel: Axes, table: xr.Dataset, x: np.ndarray, offset: float, look: dict[str, Any]) -> Any:
     """A curve of a family, on grey disks where a discontinuity of the model sets the limit."""
     y = np.atleast_1d(table["limit_amplitude"].values) / float(table.attrs["g"])
     line = plot_curve(panel, x, y, offset, **look)
@@ -111,7 +111,7 @@ def _draw_curve(panel: Axes, table: Table, x: np.ndarray, offset: float, look: d
     return line
 
 
-def _draw_motions(entries: dict[str, Any], panel: Axes, table: Table, abscissa: str | None, x: np.ndarray) -> None:
+def _draw_motions(entries: dict[str, Any], panel: Axes, table: xr.Dataset, abscissa: str | None, x: np.ndarray) -> None:
     """The limits of the motions of a suite, with their median and band."""
     limits, g = table["limit_amplitude"], float(table.attrs["g"])
     quantiles = limit_quantiles(table, QUANTILES)["limit_quantile"].values.T / g
@@ -137,14 +137,14 @@ def _spread(size: int, most: int) -> list[int]:
     return sorted({int(index) for index in np.linspace(0, size - 1, min(size, most)).round()})
 
 
-def _values(table: Table, dim: str, sizes: dict[str, int]) -> np.ndarray:
+def _values(table: xr.Dataset, dim: str, sizes: dict[str, int]) -> np.ndarray:
     """Coordinates along a dimension; numbers from 1 where it has none (cases), or labels (motions)."""
     if dim in table.coords and table[dim].values.dtype.kind not in "OU":
         return table[dim].values
     return np.arange(1, sizes[dim] + 1)
 
 
-def _names(table: Table, dim: str, labels: Sequence[str]) -> Sequence[str]:
+def _names(table: xr.Dataset, dim: str, labels: Sequence[str]) -> Sequence[str]:
     """What the places along a dimension are called, where that is no number."""
     if dim == "case":
         return labels
@@ -158,7 +158,7 @@ def _text(name: str, value: float) -> str:
     return value_text(name, value) if name in SYMBOLS else f"{name} {value:.4g}"
 
 
-def _label(table: Table, name: str, index: int, labels: Sequence[str]) -> str:
+def _label(table: xr.Dataset, name: str, index: int, labels: Sequence[str]) -> str:
     if names := _names(table, name, labels):
         return f"{name} {plain(names[index])}"
     return _text(name, _values(table, name, table["limit_amplitude"].sizes)[index])
@@ -172,7 +172,7 @@ def _axis_label(name: str | None) -> str:
     return axis_label(name) if name in SYMBOLS else name
 
 
-def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], labels: Sequence[str]) -> list[str]:
+def _caption(table: xr.Dataset, shown: dict[str, list[int]], fixed: dict[str, int], labels: Sequence[str]) -> list[str]:
     """Parameters, model, and what of the table is not shown."""
     sizes, attributes = table["limit_amplitude"].sizes, table.attrs
     single = [_text(name, value.item()) for name, value in table.coords.items() if not value.dims and name in _TOLD]
@@ -196,7 +196,7 @@ def _caption(table: Table, shown: dict[str, list[int]], fixed: dict[str, int], l
     return [line for line in lines if line]
 
 
-def _suite_text(table: Table) -> str:
+def _suite_text(table: xr.Dataset) -> str:
     """What the median is of, and the motions that have no limit."""
     status = table["limit_status"].values
     beyond, invalid = (int(np.count_nonzero(status == one)) for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID))

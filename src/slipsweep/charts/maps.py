@@ -9,6 +9,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import xarray as xr
 from matplotlib.colors import BoundaryNorm, Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -30,7 +31,6 @@ from slipsweep.charts.sheet import (
     validity_has,
 )  # fmt: skip
 from slipsweep.charts.style import length_text, unit
-from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import RESULTS, SlidingMode, Validity
 
 Floats = NDArray[np.float64]
@@ -97,7 +97,7 @@ def contours(sheet: Sheet, name: str) -> Figure:
         norm = BoundaryNorm(places, colours.N, extend="min")
     texts = {place: _value_label(name, level) for place, level in zip(places, levels, strict=True)}
 
-    def at_limit(panel: Panel) -> Variable:
+    def at_limit(panel: Panel) -> xr.Variable:
         found = solve(panel.table, [name, "validity"], **sides_of(panel.lines["limiting_acceleration"]))
         return reliable(found, name, panel.look)
 
@@ -145,10 +145,10 @@ def newmark_ratio(sheet: Sheet) -> Figure:
     norm = BoundaryNorm(places, colours.N, extend="both")
     texts = {place: f"{level:.2g}" if level < 1 else f"{level:g}" for place, level in zip(places, levels, strict=True)}
 
-    def at_limit(panel: Panel) -> Variable:
+    def at_limit(panel: Panel) -> xr.Variable:
         sides = sides_of(panel.lines["limiting_acceleration"])
         found = reliable(solve(panel.table, [name, "validity"], **sides), name, panel.look)
-        return Variable(found.dims, ratios(found, newmark(panel.table, **sides), panel.table))
+        return xr.Variable(found.dims, ratios(found, newmark(panel.table, **sides), panel.table))
 
     def logarithms(values: Floats) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -157,7 +157,7 @@ def newmark_ratio(sheet: Sheet) -> Figure:
     areas = None
     for panel in sheet.panels:
         ours = panel.result(name)
-        quotient = Variable(ours.dims, ratios(ours, newmark(panel.table), panel.table))
+        quotient = xr.Variable(ours.dims, ratios(ours, newmark(panel.table), panel.table))
         areas = _fill(panel, quotient, at_limit, logarithms, colours, norm, texts) or areas
     _colour_bar(sheet, areas, places, texts, "displacement over that of Newmark's block")
     sheet.note_newmark()
@@ -169,7 +169,7 @@ def newmark_ratio(sheet: Sheet) -> Figure:
 
 
 def _fill(
-    panel: Panel, drawn: Variable, at_limit: Any, logarithms: Any, colours: Colormap, norm: BoundaryNorm,
+    panel: Panel, drawn: xr.Variable, at_limit: Any, logarithms: Any, colours: Colormap, norm: BoundaryNorm,
     texts: dict[float, str],
 ) -> Any:  # fmt: skip
     """Fill between contours and label them; both end on the mode limit, where the result jumps."""
@@ -187,7 +187,7 @@ def _fill(
     return areas
 
 
-def _sides(panel: Panel, drawn: Variable, at_limit: Any) -> list[tuple[Floats, Floats, Floats]]:
+def _sides(panel: Panel, drawn: xr.Variable, at_limit: Any) -> list[tuple[Floats, Floats, Floats]]:
     """x, y and values of the cells below and beyond the mode limit, as grids that end on the limit.
 
     Cells on the other side are moved onto the limit and have the result there.

@@ -7,12 +7,13 @@ Figures are made without pyplot, hence without a window system or state between 
 import itertools
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,7 +23,6 @@ from numpy.typing import NDArray
 from slipsweep.charts.answers import boundaries, newmark
 from slipsweep.charts.style import SYMBOLS, Look, axis_label, caption, is_acceleration, length_text, plain, value_text
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import Validity
 
 Floats = NDArray[np.float64]
@@ -72,20 +72,20 @@ class Panel:
     Attributes
     ----------
     axes : Axes
-    table : Table
+    table : xr.Dataset
     x, y : str
         The axes of a map; of curves `y` is the curve parameter, or None.
     look : Look
     """
 
     axes: Axes
-    table: Table
+    table: xr.Dataset
     x: str
     y: str | None
     look: Look
 
     @cached_property
-    def lines(self) -> Mapping[str, Variable]:
+    def lines(self) -> Mapping[str, xr.Variable]:
         """Yield and limiting acceleration."""
         return boundaries(self.table)
 
@@ -98,11 +98,11 @@ class Panel:
         """The values along an axis, in the units that they are drawn in."""
         return np.asarray(self.table[name].values * self.look.scale(name, self.g))
 
-    def grid(self, variable: Variable, along: str | None = None) -> Any:
+    def grid(self, variable: Any, along: str | None = None) -> Any:
         """A variable over (y, x), or over (y, `along`); without y of one row."""
         return broadcast(variable, self.table, (self.y, along or self.x))
 
-    def result(self, name: str) -> Variable:
+    def result(self, name: str) -> xr.Variable:
         """A result of the slice as it may be drawn."""
         return reliable(self.table.data_vars, name, self.look)
 
@@ -111,23 +111,23 @@ class Panel:
         return "" if self.y is None else member_text(self.table, self.y, index, self.look)
 
 
-def reliable(results: Mapping[str, Variable], name: str, look: Look) -> Variable:
+def reliable(results: Mapping[Any, Any], name: str, look: Look) -> xr.Variable:
     """A result as it may be drawn: NaN where it is upslope, or left out for its flags."""
     values = results[name]
     left_out = values.values < 0
     if "validity" in results and not look.show_cautions:
         # another program, or a result solved anew beside one that was read, may have another order of dimensions
         flagged = validity_has(results["validity"], LEFT_OUT)
-        left_out = left_out | broadcast(flagged, Table({}, {name: values}, {}), values.dims)
-    return replace(values, values=np.where(left_out, np.nan, values.values))
+        left_out = left_out | broadcast(flagged, xr.Dataset({name: values}), values.dims)
+    return xr.Variable(values.dims, np.where(left_out, np.nan, values.values), values.attrs)
 
 
-def validity_has(validity: Variable, flags: Validity) -> Variable:
+def validity_has(validity: Any, flags: Validity) -> xr.Variable:
     """Where any of some flags is set."""
-    return replace(validity, values=(validity.values.astype(np.int64) & int(flags)) != 0)
+    return xr.Variable(validity.dims, (validity.values.astype(np.int64) & int(flags)) != 0)
 
 
-def member_text(table: Table, dim: str, index: int, look: Look) -> str:
+def member_text(table: xr.Dataset, dim: str, index: int, look: Look) -> str:
     """A value of an axis that tells curves or panels apart: ``θ = 5°``, or a case by its label."""
     if dim in table.attrs["labels"]:
         return plain(table.attrs["labels"][dim][index])
@@ -137,10 +137,10 @@ def member_text(table: Table, dim: str, index: int, look: Look) -> str:
     return value_text(dim, value * look.scale(dim, float(table.attrs["g"])), look.unit(dim))
 
 
-def broadcast(variable: Variable, table: Table, dims: Sequence[str | None]) -> Any:
+def broadcast(variable: Any, table: xr.Dataset, dims: Sequence[Any]) -> Any:
     """A variable over `dims`, in that order, broadcast along those it does not vary along; None has length 1."""
     own = variable.values.transpose([variable.dims.index(dim) for dim in dims if dim in variable.dims])
-    sizes = table.sizes | variable.sizes
+    sizes = {**table.sizes, **variable.sizes}
     return np.broadcast_to(
         own.reshape([variable.sizes.get(dim, 1) if dim else 1 for dim in dims]),
         [sizes.get(dim, 1) if dim else 1 for dim in dims],
@@ -153,7 +153,7 @@ class Sheet:
 
     Attributes
     ----------
-    table : Table
+    table : xr.Dataset
         The slice of all panels.
     axes : Axes, optional
         What to draw the one panel in, instead of a new figure.
@@ -165,7 +165,7 @@ class Sheet:
         Sentences for the caption.
     """
 
-    table: Table
+    table: xr.Dataset
     x: str
     y: str | None
     look: Look
@@ -185,7 +185,7 @@ class Sheet:
         self.panels = []
         for (row, column), axes in np.ndenumerate(grid):
             where = {dim: at for dim, at in ((self.across, column), (self.down, row)) if dim}
-            self.panels.append(Panel(axes, self.table.pick(where), self.x, self.y, self.look))
+            self.panels.append(Panel(axes, self.table.isel(where, missing_dims="ignore"), self.x, self.y, self.look))
             title = ", ".join(member_text(self.table, dim, at, self.look) for dim, at in where.items())
             if title:
                 axes.set_title(title, fontsize="medium")
@@ -203,7 +203,7 @@ class Sheet:
             if is_acceleration(name) and outer:
                 second_scale(panel.axes, side, g, self.look)
 
-    def note_left_out(self, name: str, *others: Variable) -> None:
+    def note_left_out(self, name: str, *others: xr.Variable) -> None:
         """Say which values of a result are left out, and which are drawn on request: by the slice's flags and others.
 
         No scale shows what is below zero: displacements upslope are left out in any case.
@@ -306,7 +306,7 @@ def add_caption(figure: Figure, axes: Axes | None, texts: Sequence[str]) -> None
     )  # fmt: skip
 
 
-def ratios(ours: Variable, theirs: Variable, table: Table) -> Floats:
+def ratios(ours: xr.Variable, theirs: xr.Variable, table: xr.Dataset) -> Floats:
     """One result over another, on the cells of the first; NaN where either is missing or both are zero."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(ours.values / broadcast(theirs, table, ours.dims))

@@ -13,13 +13,13 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.charts.answers import amplitude_of, solve
 from slipsweep.charts.style import drawn_text
 from slipsweep.errors import InputError
 from slipsweep.files.results import ResultFile, Where, result_file
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import (
     HISTORY,
@@ -272,7 +272,7 @@ class Result:
 
     def select(
         self, names: Iterable[str], keep: Mapping[str, slice | Sequence[int] | Floats], at: Mapping[str, Cut]
-    ) -> Table:
+    ) -> xr.Dataset:
         """Read a slice, or solve it where it is not in the file.
 
         Parameters
@@ -287,7 +287,7 @@ class Result:
 
         Returns
         -------
-        Table
+        xr.Dataset
             With every parameter as a coordinate: along the axes kept, or of one value.
 
         Raises
@@ -317,13 +317,13 @@ class Result:
                 found = np.searchsorted(values[:-1], found).tolist()
             where[dim] = found if dim in keep or isinstance(found, slice) else found[0]
 
-        def variable(name: str) -> Variable:
+        def variable(name: str) -> xr.Variable:
             dims = self.dims(name)
             attrs = _COORDINATES[name] if name in self.coordinates else _RESULTS[name]
-            return Variable(tuple(dim for dim in dims if dim in keep), self.read(name, where), attrs)
+            return xr.Variable(tuple(dim for dim in dims if dim in keep), self.read(name, where), attrs)
 
         coords = {name: variable(name) for name in self.coordinates}
-        coords |= {dim: Variable(coords[dim].dims, values, coords[dim].attrs) for dim, values in exact.items()}
+        coords |= {dim: xr.Variable(coords[dim].dims, values, coords[dim].attrs) for dim, values in exact.items()}
         if {"displacement_amplitude", "frequency"} <= coords.keys() and ("amplitude" not in coords or exact):
             coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
         attrs: dict[str, Any] = {**self.attrs, "labels": {}, "picked": {}}
@@ -331,13 +331,14 @@ class Result:
             names_there = self.labels.get(dim, [])
             if dim in keep and dim in self.axes:
                 numbers = self.axes[dim][where[dim]]
-                coords[dim] = Variable((dim,), numbers)
+                coords[dim] = xr.Variable((dim,), numbers)
                 attrs["labels"][dim] = [names_there[int(n) - 1] if names_there else f"{n:g}" for n in numbers]
             elif names_there:
                 attrs["picked"][dim] = names_there[where[dim]]
         anew = [name for name in names if exact or name not in self.variables]
-        solved = solve(Table(coords, {}, attrs), anew) if anew else {}
-        return Table(coords, {name: solved[name] if name in solved else variable(name) for name in names}, attrs)
+        solved = solve(xr.Dataset({}, coords, attrs), anew) if anew else {}
+        results = {name: solved[name] if name in solved else variable(name) for name in names}
+        return xr.Dataset(results, coords, attrs)
 
     def members(self, dim: str, number: int, at: Mapping[str, Cut]) -> list[int] | Floats:
         """The values that tell curves or panels apart: those asked for, or `number` at most from end to end."""

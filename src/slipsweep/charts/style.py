@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import xarray as xr
+
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS
 from slipsweep.motion.waveforms import WAVEFORMS
@@ -106,7 +107,7 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def caption(table: Table, look: Look | None = None) -> str:
+def caption(table: xr.Dataset, look: Look | None = None) -> str:
     """The parameters that have one value, the model and the shaking, on two lines."""
     look = look or Look()
     single = [name for name in SYMBOLS if name in table.coords and table[name].values.size == 1]

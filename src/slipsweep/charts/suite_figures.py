@@ -1,9 +1,10 @@
 """Charts of recorded motions: a curve for each, with the suite's median and band; scatter; histogram; fragility."""
 
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -24,7 +25,6 @@ from slipsweep.charts.sheet import (
     validity_has,
 )  # fmt: skip
 from slipsweep.charts.style import BLUE, VERMILION, unit_text
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, Validity
 from slipsweep.studies.suite_statistics import suite_table
 
@@ -253,21 +253,21 @@ def draw_suite(
     legend["a motion"] = Line2D([], [], **_THIN)
 
 
-def suite_text(sizes: dict[str, int]) -> str:
+def suite_text(sizes: Mapping[Any, int]) -> str:
     """How many motions there are: ``8 motions in 2 polarities``."""
     polarities = f" in {sizes['polarity']} polarities" if sizes.get("polarity", 1) > 1 else ""
     return f"{sizes['motion']} motions{polarities}"
 
 
-def _statistics(table: Table) -> Table:
+def _statistics(table: xr.Dataset) -> xr.Dataset:
     return suite_table(table, thresholds=0.0, quantiles=QUANTILES, zero=0.0, over=None)
 
 
-def _as_newmark(table: Table) -> Table:
-    return replace(table, data_vars={**table.data_vars, "permanent_displacement": table["newmark_displacement"]})
+def _as_newmark(table: xr.Dataset) -> xr.Dataset:
+    return table.assign(permanent_displacement=table["newmark_displacement"])
 
 
-def _millimetres(table: Table) -> Floats:
+def _millimetres(table: xr.Dataset) -> Floats:
     values = table["permanent_displacement"].values.ravel() * 1000.0
     return np.asarray(values[np.isfinite(values)], np.float64)
 
@@ -296,7 +296,7 @@ def _scattered(panel: Panel, measure: str) -> tuple[Floats, Floats, NDArray[np.b
     return xs[there], ys[there], turned[there]
 
 
-def _scaling_text(table: Table, measure: str) -> str:
+def _scaling_text(table: xr.Dataset, measure: str) -> str:
     power, time_power = SCALING[measure]
     times = {1: "the motion's factor", 2: "the square of the motion's factor"}.get(power)
     stretched = "time_scale" in table and np.any(table["time_scale"].values != 1.0) and time_power
@@ -307,7 +307,7 @@ def _scaling_text(table: Table, measure: str) -> str:
     return f"Abscissa: as recorded, times {by}." if by else "Abscissa: as recorded; no factor changes it."
 
 
-def _note_suite(notes: list[str], table: Table, what: str) -> None:
+def _note_suite(notes: list[str], table: xr.Dataset, what: str) -> None:
     """How many motions there are, and how many of them have no value, and why."""
     statistics = _statistics(table)
     text = f"{what} {suite_text(table['permanent_displacement'].sizes)}"
@@ -323,7 +323,7 @@ def _note_suite(notes: list[str], table: Table, what: str) -> None:
         notes.append(f"{text}; all have a value.")
 
 
-def _note_zeros(notes: list[str], table: Table, where: str) -> None:
+def _note_zeros(notes: list[str], table: xr.Dataset, where: str) -> None:
     """How many displacements are zero, and where they are."""
     statistics = _statistics(table)
     counts = statistics["value_count"].values
@@ -334,7 +334,7 @@ def _note_zeros(notes: list[str], table: Table, where: str) -> None:
         notes.append(f"Zero displacement: {up_to}{round(zeros[at])} of {counts[at]}; {where}.")
 
 
-def _note_cautions(notes: list[str], table: Table) -> None:
+def _note_cautions(notes: list[str], table: xr.Dataset) -> None:
     """Which cautions the statistics have in them."""
     validity = table["validity"]
     texts = []

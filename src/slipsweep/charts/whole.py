@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -11,7 +12,6 @@ from slipsweep.charts import calibration_figures, figures, hazard_figures, limit
 from slipsweep.charts.slices import check_units
 from slipsweep.errors import InputError
 from slipsweep.files.results import ResultFile, read_table
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import (
     CALIBRATION_SERIES,
     HALF_WAVES,
@@ -24,7 +24,7 @@ from slipsweep.model.variables import (
 )
 
 #: A variable that only a result of the kind has, and what draws it.
-DRAWN_WHOLE: dict[str, tuple[str, Callable[[Table, Axes | None], Figure]]] = {
+DRAWN_WHOLE: dict[str, tuple[str, Callable[[xr.Dataset, Axes | None], Figure]]] = {
     "limit": ("limit_amplitude", limit_figures.limit_chart),
     "calibration": ("computed_ground_acceleration", calibration_figures.calibration),
     "friction": ("friction_ratio", calibration_figures.friction),

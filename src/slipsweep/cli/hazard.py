@@ -10,7 +10,7 @@ from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
-    from slipsweep.grid.tables import Table
+    import xarray as xr
 
 #: The group of options that only this command has.
 HAZARD = Panel("Hazard")
@@ -61,7 +61,7 @@ def hazard(
     lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
     check_values("displacement", lengths, "--displacement")
     given = read_hazard_curve(curve, g)
-    table = table.pick({name: int(found[0]) for name, found in places.items()})
+    table = table.isel({name: int(found[0]) for name, found in places.items()}, missing_dims="ignore")
     rates = hazard_table(table, given, thresholds=lengths)
     if paths:
         from slipsweep.charts import hazard_figures
@@ -77,7 +77,7 @@ def hazard(
             typer.echo(path)
 
 
-def _summarize(rates: "Table", g: float) -> None:
+def _summarize(rates: "xr.Dataset", g: float) -> None:
     import numpy as np
 
     from slipsweep.studies.suite_statistics import point_names

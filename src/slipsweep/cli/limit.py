@@ -1,6 +1,5 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,9 +29,10 @@ from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from slipsweep.files.spec import SweepSpec
     from slipsweep.files.zarr_store import Place
-    from slipsweep.grid.tables import Table
 
 #: The group of options that only this command has.
 LIMIT = Panel("Limit")
@@ -110,7 +110,7 @@ def limit(
     if figures:
         from slipsweep.charts.limit_figures import limit_chart
 
-        figure = limit_chart(replace(table, attrs={**table.attrs, "labels": {"case": job.labels}}))
+        figure = limit_chart(table.assign_attrs(labels={"case": job.labels}))
         for path in figures:
             write_figure(figure, path, overwrite)
     if not quiet:
@@ -134,13 +134,13 @@ def _asked(
     return (lengths if len(displacement) > 1 else lengths[0]), highest
 
 
-def _summarize(table: "Table") -> None:
+def _summarize(table: "xr.Dataset") -> None:
     import numpy as np
 
     from slipsweep.grid.resources import grid_text
 
     limits, status = table["limit_amplitude"], table["limit_status"].values
-    grid = grid_text(limits.sizes) or "one cell"
+    grid = grid_text({str(dim): size for dim, size in limits.sizes.items()}) or "one cell"
     typer.echo(f"{limits.values.size} limits ({grid})")
     g = float(table.attrs["g"])
     found = limits.values[~np.isnan(limits.values)]
@@ -160,7 +160,7 @@ def _summarize(table: "Table") -> None:
             typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
 
 
-def _summarize_suite(table: "Table", g: float) -> None:
+def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     """Print the limit of each motion, and the suite's quantiles, at every grid point."""
     from slipsweep.studies.suite_statistics import limit_quantiles, point_names
 

@@ -92,7 +92,7 @@ def run(
     if quiet:
         return
     grid = grid_text(job.plan.sizes) or "no axes"
-    about = job.plan.empty().attrs
+    about = job.plan.template().attrs
     if report.found:
         echo_found(report.path)
     else:

@@ -36,7 +36,8 @@ from slipsweep.model.variables import (
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.tables import Table
+    import xarray as xr
+
     from slipsweep.motion.records import Record
 
 EXAMPLE = examples(
@@ -88,7 +89,7 @@ def simulate(
     quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    writers: dict[str, Callable[[Table, Path, bool, Waveform | Record], None]] = {
+    writers: dict[str, Callable[[xr.Dataset, Path, bool, Waveform | Record], None]] = {
         ".nc": _write_netcdf,
         ".csv": _write_csv,
         **dict.fromkeys(FIGURES, _write_figure),
@@ -142,7 +143,7 @@ def simulate(
         typer.echo(path)
 
 
-def _summarize(table: "Table") -> None:
+def _summarize(table: "xr.Dataset") -> None:
     typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
@@ -169,7 +170,7 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
     return read_record(record, **reading)
 
 
-def _write_netcdf(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
+def _write_netcdf(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import netcdf
 
     netcdf.write_table(
@@ -182,7 +183,7 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool, motion: "Waveform
     )
 
 
-def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
+def _write_csv(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import outputs
 
     columns = {name: table[name] for name in ("time", *HISTORY) if name in table}
@@ -195,7 +196,7 @@ def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | 
         writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
 
 
-def _write_figure(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
+def _write_figure(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.charts import figures
 
     write_figure(figures.history(table), path, overwrite)

@@ -85,7 +85,9 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     scale = np.full((*left.values(), len(_COLUMNS)), np.nan, np.float32)
     for at in np.ndindex(*left.values()):
         cell = {dim: int(keep[dim][i]) for dim, i in zip(keep, at, strict=True)}
-        given: dict[str, Any] = {name: variable.pick(cell).item() for name, variable in inputs.items()}
+        given: dict[str, Any] = {
+            name: variable.isel(cell, missing_dims="ignore").item() for name, variable in inputs.items()
+        }
         history = history_table(times=phase, excitation=motion, model=model, frequency=1.0 / (2.0 * math.pi), **given)
         columns = np.array([history[name].values for name in _COLUMNS])
         if np.isfinite(columns).all():

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.files.motions import embedded
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.variables import RECORD_COUNTS, SlidingMode
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
@@ -115,13 +115,13 @@ def storable(text: str) -> str:
     return text.encode(errors="backslashreplace").decode()
 
 
-def contents_of(head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]], history: str) -> Contents:
+def contents_of(head: Head, table: xr.Dataset, dtype: Callable[[str], np.dtype[Any]], history: str) -> Contents:
     """What a file holds: the coordinates and attributes of a table, its results with the data type that `dtype` says.
 
     Parameters
     ----------
     head : Head
-    table : Table
+    table : xr.Dataset
         Of its results only dimensions and attributes are looked at.
     dtype : callable
         Data type of a result in the file, by its name.
@@ -133,7 +133,7 @@ def contents_of(head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]],
     if head.labels:
         labels = np.array(head.labels, dtype=object)
         beside["label"] = Stored(("case",), labels.dtype, {"long_name": "name of the case"}, None, labels)
-    sizes = table.sizes
+    sizes = {str(dim): size for dim, size in table.sizes.items()}
     # in the order of the results, which that of the coordinates need not be
     widest = max((result.dims for result in table.data_vars.values()), key=len, default=())
     sizes = {dim: sizes[dim] for dim in (*widest, *sizes)}
@@ -152,13 +152,13 @@ def contents_of(head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]],
     if head.recorded is not None:
         for name, one in embedded(head.recorded).items():
             beside[name] = _stored(one)
-            sizes |= one.sizes
+            sizes |= {str(dim): size for dim, size in one.sizes.items()}
     attrs = {**table.attrs, "title": head.title, "Conventions": "CF-1.11", "history": history}
     attrs |= {} if head.sweep is None else {"sweep": head.sweep}
     return Contents(sizes, {**coordinates, **results, **beside}, attrs)
 
 
-def _stored(one: Variable) -> Stored:
+def _stored(one: xr.Variable) -> Stored:
     """An array whose values are known."""
     values = one.values.astype(object) if one.values.dtype.kind == "U" else one.values
     return Stored(one.dims, values.dtype, one.attrs, None, values)

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import RECORD_SAMPLES
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Pair, Suite
@@ -47,14 +47,14 @@ _ABOUT: dict[str, dict[str, Any]] = {
 }
 
 
-def embedded(motion: Record | Suite) -> dict[str, Variable]:
+def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     """The variables that hold a record or a suite."""
     records = motion.components if isinstance(motion, Suite) else (motion,)
     samples = {
         "record_time": np.concatenate([one.times for one in records]),
         "record_acceleration": np.concatenate([one.acceleration for one in records]),
     }
-    found = {name: Variable((RECORD_DIM,), samples[name], about) for name, about in RECORD_SAMPLES.items()}
+    found = {name: xr.Variable((RECORD_DIM,), samples[name], about) for name, about in RECORD_SAMPLES.items()}
     if isinstance(motion, Record):
         return found
     each = 2 if motion.has_pairs else 1
@@ -68,7 +68,7 @@ def embedded(motion: Record | Suite) -> dict[str, Variable]:
         texts = [one.attrs.get(key, "") for one in records]
         if any(texts):
             columns[name] = np.array(texts, dtype=object)
-    return found | {name: Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
+    return found | {name: xr.Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
 
 
 def read_embedded(file: Any, path: Path) -> Record | Suite | None:

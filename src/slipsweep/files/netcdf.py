@@ -8,6 +8,7 @@ from typing import Any
 
 import netCDF4
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -25,7 +26,6 @@ from slipsweep.files.contents import (
 )
 from slipsweep.files.names import open_netcdf
 from slipsweep.files.outputs import complete_or_absent, writing
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 
@@ -160,7 +160,7 @@ def rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[An
 
 
 def write_table(
-    table: Table,
+    table: xr.Dataset,
     path: Path,
     *,
     title: str,
@@ -184,7 +184,7 @@ def write_table(
             file[name][...] = array.values
 
 
-def without_time_axis(table: Table) -> Table:
+def without_time_axis(table: xr.Dataset) -> xr.Dataset:
     """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
 
     A dimension `time` is a time axis of the CF conventions (4.4), whose values are dates.  Seconds
@@ -193,9 +193,9 @@ def without_time_axis(table: Table) -> Table:
     dims = {"time": "instant"}
     coords, data_vars = (
         {
-            name: Variable(tuple(dims.get(dim, dim) for dim in array.dims), array.values, array.attrs)
+            name: xr.Variable(tuple(dims.get(dim, dim) for dim in array.dims), array.values, array.attrs)
             for name, array in arrays.items()
         }
         for arrays in (table.coords, table.data_vars)
     )
-    return Table(coords, data_vars, table.attrs)
+    return xr.Dataset(data_vars, coords, table.attrs)

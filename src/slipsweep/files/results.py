@@ -16,6 +16,7 @@ from typing import Any
 
 import netCDF4
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -26,7 +27,6 @@ from slipsweep.files.names import open_netcdf
 from slipsweep.files.zarr_store import StoreFile, is_finished, nbytes
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import available_memory, size_text
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.grid.tally import Indices, Tally
 from slipsweep.model.variables import (
     HISTORY,
@@ -501,7 +501,7 @@ def cut_chunks(
         yield part, {dim: one.stop - one.start for dim, one in chunk.items()}
 
 
-def read_table(file: ResultFile, names: Sequence[str]) -> Table:
+def read_table(file: ResultFile, names: Sequence[str]) -> xr.Dataset:
     """Read some results, and all coordinates along their dimensions.
 
     Raises
@@ -514,14 +514,14 @@ def read_table(file: ResultFile, names: Sequence[str]) -> Table:
             raise InputError(f"{file.path}: {name}: not in this file, which has {', '.join(file.results) or 'nothing'}")
     dims = {dim for name in names for dim in file[name].dims}
 
-    def read(name: str) -> Variable:
+    def read(name: str) -> xr.Variable:
         one = file[name]
         if name == "validity":
-            return Variable(one.dims, one.read_codes({}, 0), one.attrs)
-        return Variable(one.dims, np.asarray(one.read({}).data if one.is_text else one.read_floats({})), one.attrs)
+            return xr.Variable(one.dims, one.read_codes({}, 0), one.attrs)
+        return xr.Variable(one.dims, np.asarray(one.read({}).data if one.is_text else one.read_floats({})), one.attrs)
 
     coords = {name: read(name) for name in file.coordinates if dims.issuperset(file[name].dims)}
-    return Table(coords, {name: read(name) for name in names}, dict(file.attrs))
+    return xr.Dataset({name: read(name) for name in names}, coords, dict(file.attrs))
 
 
 # ------------------------------------------------------------------------------ what it holds

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
@@ -24,7 +25,6 @@ from slipsweep.files.motions import read_embedded
 from slipsweep.files.outputs import Read
 from slipsweep.files.zarr_store import is_finished
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.tables import Variable
 from slipsweep.model.choices import Family, declared
 from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
 from slipsweep.model.parameters import BOUNDS
@@ -331,7 +331,7 @@ class SweepSpec:
             elif dim == name:
                 arguments[name] = values
             else:
-                arguments[name] = Variable((dim,), values)
+                arguments[name] = xr.Variable((dim,), values)
         return arguments | {
             "excitation": self.excitation,
             "model": self.model,

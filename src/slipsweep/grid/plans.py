@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
@@ -18,7 +19,6 @@ from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, places
 from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
 from slipsweep.grid.resources import check_memory, grid_text
-from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.model.estimates import friction_inputs
 from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Step
@@ -96,10 +96,10 @@ class Task:
             np.dtype(RESULT_DTYPES.get(name, "float64")).itemsize for name in self.names
         )
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Arrays:
-        """Compute the results; `progress` is told of cells as they are finished, `empty` makes the arrays."""
+    def solve(self, progress: Callable[[int], None] | None = None) -> Arrays:
+        """Compute the results; `progress` is told of cells as they are finished."""
         shape = tuple(self.sizes.values())
-        return self.solver(Request(self.problem, shape, self.inputs, self.names, progress, empty))
+        return self.solver(Request(self.problem, shape, self.inputs, self.names, progress))
 
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
@@ -116,7 +116,7 @@ class Plan:
     ----------
     sizes : dict of str to int
         Dimensions of the grid in the order of the results, and their lengths.
-    coords : dict of str to Variable
+    coords : dict of str to xr.Variable
         The parameters.
     tasks : tuple of Task
     names : tuple of str
@@ -130,7 +130,7 @@ class Plan:
     """
 
     sizes: dict[str, int]
-    coords: dict[str, Variable]
+    coords: dict[str, xr.Variable]
     tasks: tuple[Task, ...]
     names: tuple[str, ...]
     attrs: dict[str, Any]
@@ -153,9 +153,8 @@ class Plan:
         """The plan cut to a chunk of its grid."""
         tasks = tuple(task.part(tuple(places(chunk, task.sizes).values())) for task in self.tasks)
         sizes = {dim: cut.stop - cut.start for dim, cut in places(chunk, self.sizes).items()}
-        return replace(
-            self, sizes=sizes, coords={name: one.cut(chunk) for name, one in self.coords.items()}, tasks=tasks
-        )
+        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
+        return replace(self, sizes=sizes, coords=coords, tasks=tasks)
 
     def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
         """Modes and flags in a chunk of results."""
@@ -163,8 +162,8 @@ class Plan:
         tally.add(results)
         return tally
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
-        """Compute everything at once; `progress` and `empty` as in `engine.solve`.
+    def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
+        """Compute everything at once; `progress` is told of cells as they are finished, from any thread.
 
         Raises
         ------
@@ -181,12 +180,10 @@ class Plan:
             sum(task.nbytes for task in self.tasks) + cells * self.cell_memory,
             _ADVICE,
         )
-        for task in self.tasks:
-            engine.expect_kernels(task.solver, task.problem)
         # all tasks cover the same cells: one of them counts
-        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
+        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None))
 
-    def empty(self) -> Table:
+    def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
 
         def zeros(task: Task) -> dict[str, np.ndarray]:
@@ -195,14 +192,14 @@ class Plan:
 
         return self.table(zeros)
 
-    def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> Table:
+    def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> xr.Dataset:
         """The results, with `evaluate` giving a task's arrays."""
         found = {
-            name: Variable(tuple(task.sizes), values, self.described[name])
+            name: xr.Variable(tuple(task.sizes), values, self.described[name])
             for task in self.tasks
             for name, values in evaluate(task).items()
         }
-        return Table(self.coords, {name: found[name] for name in self.names}, self.attrs)
+        return xr.Dataset({name: found[name] for name in self.names}, self.coords, self.attrs)
 
 
 def plan_sweep(
@@ -214,7 +211,7 @@ def plan_sweep(
     ----------
     excitation, model, solver, variables, given
         Keyword arguments of `slipsweep.sweep` but for `chunks` and `progress`; arrays with
-        dimensions of their own are `Variable` instead of DataArray.
+        dimensions of their own are `xr.Variable` instead of DataArray.
 
     Raises
     ------
@@ -228,7 +225,7 @@ def plan_sweep(
     return _plan_waveform(problem, parameters, variables)
 
 
-def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, Variable]:
+def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, xr.Variable]:
     """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
     motion = problem.excitation
     parameters = {name: values for name, values in given.items() if values is not None}
@@ -278,32 +275,32 @@ def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
             raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
 
 
-def motion_coordinates(motion: Record | Suite, coords: Mapping[str, Variable]) -> dict[str, Variable]:
+def motion_coordinates(motion: Record | Suite, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
     if not isinstance(motion, Suite):
         return {}
-    found = {"motion": Variable(("motion",), np.array(motion.labels), MOTION)}
-    found |= {name: Variable(("motion",), one, MOTION_COORDINATES[name]) for name, one in motion.measures.items()}
+    found = {"motion": xr.Variable(("motion",), np.array(motion.labels), MOTION)}
+    found |= {name: xr.Variable(("motion",), one, MOTION_COORDINATES[name]) for name, one in motion.measures.items()}
     if motion.has_pairs:
-        azimuth, places = coords["azimuth"], Variable(("motion",), np.arange(len(motion)))
+        azimuth, places = coords["azimuth"], xr.Variable(("motion",), np.arange(len(motion)))
         sizes = grid_sizes({"azimuth": azimuth, "motion": places})
         values = aligned({"azimuth": azimuth}, sizes)["azimuth"]
         for name, one in motion.intensities(np.broadcast_to(values, tuple(sizes.values()))).items():
-            found[name] = Variable(tuple(sizes), one, MOTION_COORDINATES[name])
+            found[name] = xr.Variable(tuple(sizes), one, MOTION_COORDINATES[name])
     return found
 
 
-def inputs_of(problem: Problem, coords: Mapping[str, Variable]) -> dict[str, Variable]:
+def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The coordinates that cells are solved for: of a motion its place in the suite, and no more."""
     suite = problem.excitation
     if not isinstance(suite, Suite):
         return dict(coords)
     places = np.array([suite.index(str(label)) for label in coords["motion"].values], np.float64)
     own = {name: one for name, one in coords.items() if name not in MOTION_COORDINATES}
-    return own | {"motion": Variable(("motion",), places)}
+    return own | {"motion": xr.Variable(("motion",), places)}
 
 
-def _check_moving(motion: Record | Suite, coords: Mapping[str, Variable], strength: str) -> None:
+def _check_moving(motion: Record | Suite, coords: Mapping[str, xr.Variable], strength: str) -> None:
     """Refuse to scale a motion that has no acceleration."""
     if isinstance(motion, Record):
         if not motion.peak > 0.0:
@@ -313,11 +310,11 @@ def _check_moving(motion: Record | Suite, coords: Mapping[str, Variable], streng
     still = np.argwhere(~(peaks.values > 0.0))
     if still.size:
         at = dict(zip(peaks.dims, still[0], strict=True))
-        where = f" at azimuth {coords['azimuth'].pick(at).item():g}" if motion.has_pairs else ""
+        where = f" at azimuth {float(coords['azimuth'].isel(at, missing_dims='ignore')):g}" if motion.has_pairs else ""
         raise InputError(f"{strength}: {motion.labels[at['motion']]}{where} has no acceleration to scale; give scale")
 
 
-def _polarity(given: Any) -> Variable:
+def _polarity(given: Any) -> xr.Variable:
     """The signs asked for: 1, -1, both."""
     both = isinstance(given, str) and given == "both"
     try:
@@ -327,10 +324,10 @@ def _polarity(given: Any) -> Variable:
     if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
         raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
     dims = ("polarity",) if values.ndim else ()
-    return Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
+    return xr.Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
 
 
-def _plan_records(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+def _plan_records(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a record or a suite; `coords` as `check_parameters` gives them."""
     is_suite = isinstance(problem.excitation, Suite)
     default = DEFAULT_SUITE_RESULTS if is_suite else DEFAULT_RECORD_RESULTS
@@ -355,7 +352,7 @@ def _plan_records(problem: Problem, coords: dict[str, Variable], variables: Any)
     )
 
 
-def _factor_task(problem: Problem, inputs: Mapping[str, Variable]) -> Task:
+def _factor_task(problem: Problem, inputs: Mapping[str, xr.Variable]) -> Task:
     """The factor on each motion, on the dimensions it depends on."""
     strength = next(name for name in STRENGTHS if name in inputs)
     names = [strength, *(["time_scale"] if strength in ("pgv", "arias_intensity") else []), "azimuth", "motion"]
@@ -377,11 +374,11 @@ def _motion_tasks(
     return tasks
 
 
-def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a waveform; `coords` as `check_parameters` gives them."""
     wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
     sizes, inputs = grid_sizes(coords), dict(coords)
-    drive: dict[str, Variable] = {
+    drive: dict[str, xr.Variable] = {
         name: coords[name] for name in ("displacement_amplitude", "frequency") if name in coords
     }
     if len(drive) == 2:
@@ -390,7 +387,8 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
         # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
         if any(dims.keys() == set(variable.dims) for variable in drive.values()):
             both = aligned(drive, dims)
-            coords = coords | {"amplitude": Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])}
+            amplitudes = xr.Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])
+            coords = coords | {"amplitude": amplitudes}
 
     tasks = list(_motion_tasks(problem, wanted, MOTION_RESULTS, sizes, aligned(inputs, sizes)))
     if tasks and isinstance(problem.solver, Step):
@@ -455,12 +453,12 @@ def check_inputs(given: Collection[str], shaking: Collection[str], what: str) ->
             raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
 
 
-def checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
+def checked(parameters: Mapping[str, Any]) -> dict[str, xr.Variable]:
     """Every parameter as a float64 array with named dimensions, within its bounds, described."""
     checked = {}
     for name, given in parameters.items():
-        if isinstance(given, Variable):
-            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
+        if isinstance(given, (xr.Variable, xr.DataArray)):
+            variable = xr.Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
             if len(set(given.dims)) < len(given.dims):
                 raise InputError(f"{name}: dimensions {', '.join(given.dims)}: must be named each once")
         else:
@@ -470,14 +468,14 @@ def checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
                     f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
                     "that names its dimensions"
                 )
-            variable = Variable((name,) if values.ndim else (), values, PARAMETERS[name])
+            variable = xr.Variable((name,) if values.ndim else (), values, PARAMETERS[name])
         if variable.values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = variable
     return checked
 
 
-def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> None:
+def _check_amplitudes(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> None:
     """Refuse peak displacements that make an amplitude out of its bounds at a frequency of theirs."""
     shared = set(displacement_amplitude.dims) & set(frequency.dims)
     # A grows with both: their extremes, apart along dimensions of their own, have those of A
@@ -486,7 +484,7 @@ def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> 
         for name, variable in (("displacement_amplitude", displacement_amplitude), ("frequency", frequency)):
             own = tuple(at for at, dim in enumerate(variable.dims) if dim not in shared)
             left = tuple(dim for dim in variable.dims if dim in shared)
-            reduced[name] = Variable(left, np.asarray(extreme(variable.values, axis=own)))
+            reduced[name] = xr.Variable(left, np.asarray(extreme(variable.values, axis=own)))
         both = aligned(reduced, grid_sizes(reduced))
         wrong = ~BOUNDS["amplitude"].holds(peak_acceleration(**both))
         if wrong.any():
@@ -497,7 +495,7 @@ def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> 
             )
 
 
-def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, Variable], results: Collection[str]) -> None:
+def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, xr.Variable], results: Collection[str]) -> None:
     """Refuse dimensions, which DataArrays name as they like, that no dataset can have beside what is in it."""
     for dim in sizes:
         if dim in results:
@@ -506,7 +504,7 @@ def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, Variable], r
             raise InputError(f"{dim}: is a dimension of another parameter: must have values along it")
 
 
-def grid_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
+def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
     """Dimensions of the grid in the order of the results, and their lengths."""
     sizes: dict[str, int] = {}
     for name, variable in variables.items():
@@ -517,7 +515,7 @@ def grid_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
     return {dim: sizes[dim] for dim in ordered}
 
 
-def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arrays:
+def aligned(variables: Mapping[str, xr.Variable], sizes: Mapping[str, int]) -> Arrays:
     """Plain arrays with all dimensions, of length 1 where they do not vary."""
     aligned = {}
     for name, variable in variables.items():
@@ -526,7 +524,7 @@ def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arra
     return aligned
 
 
-def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, Variable]) -> Task:
+def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, xr.Variable]) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
     made = ("displacement_amplitude", "frequency") if "displacement_amplitude" in variables else ()
     own = {name: variable for name, variable in variables.items() if name in (*_FRICTION_INPUTS, *made)}
@@ -538,7 +536,7 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
 
 
-def ordinary(problem: Problem, coords: Mapping[str, Variable]) -> bool:
+def ordinary(problem: Problem, coords: Mapping[str, xr.Variable]) -> bool:
     """Whether no result can be too large for double precision."""
     own = {name: one for name, one in coords.items() if name not in ("motion", *MOTION_COORDINATES)}
     return engine.are_ordinary(problem, {name: one.values for name, one in own.items()})

@@ -70,11 +70,11 @@ class Job:
     @cached_property
     def dims(self) -> dict[str, tuple[str, ...]]:
         """Dimensions of the results."""
-        return {name: one.dims for name, one in self.plan.empty().data_vars.items()}
+        return {name: one.dims for name, one in self.plan.template().data_vars.items()}
 
     def contents(self, history: str) -> Contents:
         """What the file of the whole result holds beside the values of the results."""
-        return contents_of(replace(self.head, labels=self.labels), self.plan.empty(), self.dtype, history)
+        return contents_of(replace(self.head, labels=self.labels), self.plan.template(), self.dtype, history)
 
     @contextmanager
     def named(self) -> Iterator[None]:

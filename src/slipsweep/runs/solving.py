@@ -1,25 +1,22 @@
 """How large the chunks of a run are, and how they are solved in this process."""
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.grid import chunks
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import Chunk
 from slipsweep.grid.resources import size_text
-from slipsweep.grid.tables import Table
 
 #: Called with a number of cells just solved, from any thread.
 Progress: TypeAlias = Callable[[int], None]
 
 #: What becomes of a chunk where it is solved: called with its plan, number and place and its results.
-Deliver: TypeAlias = Callable[[AnyPlan, int, Chunk, Table], Any]
+Deliver: TypeAlias = Callable[[AnyPlan, int, Chunk, xr.Dataset], Any]
 
 #: What solves chunks of a plan, given with their numbers: yields each with its number, in any order; or what came of
 #: it, where a `Deliver` is given last.  A chunk's results are let go of before the next is asked for, but for one:
@@ -95,14 +92,14 @@ def _cell_memory(plan: AnyPlan, count: int = 2) -> int:
     """Bytes that a cell of the grid takes in so many chunks."""
     own = (
         result.values.dtype.itemsize * math.prod(size for dim, size in result.sizes.items() if dim not in plan.sizes)
-        for result in plan.empty().data_vars.values()
+        for result in plan.template().data_vars.values()
     )
     return count * sum(own) + plan.cell_memory + 8
 
 
 def solve_here(
     plan: AnyPlan, missing: Mapping[int, Chunk], progress: Progress | None = None
-) -> Iterator[tuple[int, Table]]:
+) -> Iterator[tuple[int, xr.Dataset]]:
     """Solve chunks one after the other in this process.
 
     Parameters
@@ -114,13 +111,12 @@ def solve_here(
 
     Yields
     ------
-    int, Table
+    int, xr.Dataset
         The number of a chunk, and its results with their coordinates: its own until the next but
         one is asked for, whose arrays take their memory.
     """
-    # one set of arrays is being written while the other is solved into
-    for (number, chunk), memory in zip(missing.items(), itertools.cycle((_Memory(), _Memory())), strict=False):
-        yield number, plan.part(chunk).solve(progress, memory.rewound().empty)
+    for number, chunk in missing.items():
+        yield number, plan.part(chunk).solve(progress)
 
 
 def try_out(plan: AnyPlan) -> None:
@@ -134,26 +130,3 @@ def try_out(plan: AnyPlan) -> None:
     parts = chunks.grid_chunks(plan.sizes, default_cells(plan), plan.together)
     for _ in solve_here(plan, dict(enumerate(parts))):
         pass
-
-
-class _Memory:
-    """Memory that is used again for each chunk: the system takes 0.2 to 1 µs for every 4 KB that are new."""
-
-    def __init__(self) -> None:
-        self.pieces: list[NDArray[np.uint8]] = []
-        self.used = 0
-
-    def rewound(self) -> "_Memory":
-        """Itself, with nothing of it in use."""
-        self.used = 0
-        return self
-
-    def empty(self, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
-        """As `np.empty`; what an earlier chunk had at this place is overwritten."""
-        nbytes = math.prod(shape) * np.dtype(dtype).itemsize
-        if self.used == len(self.pieces):
-            self.pieces.append(np.empty(nbytes, np.uint8))
-        elif self.pieces[self.used].nbytes < nbytes:
-            self.pieces[self.used] = np.empty(nbytes, np.uint8)
-        self.used += 1
-        return self.pieces[self.used - 1][:nbytes].view(dtype).reshape(shape)

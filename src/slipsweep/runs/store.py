@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
+
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import zarr_store
 from slipsweep.files.netcdf import TooLarge, history_of
@@ -22,7 +24,6 @@ from slipsweep.files.zarr_store import Place, names_store
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import Chunk, chunk_lengths, grid_chunks
 from slipsweep.grid.resources import available_memory, grid_text, size_text
-from slipsweep.grid.tables import Table
 from slipsweep.grid.tally import Tally
 from slipsweep.runs import parts
 from slipsweep.runs.jobs import Job
@@ -169,7 +170,7 @@ def _carry_out(
             delivery = Delivery(target.writer, {name: job.dtype(name) for name in plan.names}, job.dims)
             found = solved(plan, missing, progress, *([delivery] if target.shared else []))
 
-            def deliver(number: int, table: Table) -> Delivered:
+            def deliver(number: int, table: xr.Dataset) -> Delivered:
                 return delivery(plan, number, cut[number], table)
 
             _write_chunks(work, target, _named(job, found), deliver, tally)
@@ -306,8 +307,8 @@ def _ready(
 def _write_chunks(
     work: parts.Folder,
     target: Target,
-    found: Iterator[tuple[int, Table | Delivered]],
-    deliver: Callable[[int, Table], Delivered],
+    found: Iterator[tuple[int, xr.Dataset | Delivered]],
+    deliver: Callable[[int, xr.Dataset], Delivered],
     tally: Tally,
 ) -> None:
     """Put chunks on record that are written, and write the others, each while the next is being solved.
@@ -318,7 +319,7 @@ def _write_chunks(
     syncing: Future[None] | None = None
     synced = time.monotonic()
 
-    def take(number: int, one: Table | Delivered) -> None:
+    def take(number: int, one: xr.Dataset | Delivered) -> None:
         nonlocal syncing, synced
         with writing(work.output):
             work.check()
@@ -352,7 +353,7 @@ def _write_chunks(
 def _check_size(job: Job, path: Place, chunk_cells: int, written: int) -> None:
     """Refuse a grid whose file cannot fit on the disk, or whose chunks cannot fit in memory."""
     plan = job.plan
-    results = plan.empty().data_vars
+    results = plan.template().data_vars
     nbytes = sum(result.values.size * job.dtype(name).itemsize for name, result in results.items())
     free = shutil.disk_usage(path.parent).free if isinstance(path, Path) else math.inf
     if isinstance(path, Path) and nbytes > free + written and not job.compression:

@@ -2,11 +2,11 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.files import zarr_store
@@ -15,7 +15,6 @@ from slipsweep.files.results import result_file
 from slipsweep.files.zarr_store import Place, StoreFile, names_store
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import Chunk, grid_chunks, places
-from slipsweep.grid.tables import Table
 from slipsweep.runs.targets.splitfiles import chunk_name
 
 
@@ -53,7 +52,7 @@ def global_attributes(file: Any) -> dict[str, Any]:
 
 def stored_chunks(plan: AnyPlan, path: Place, chunk_cells: int) -> Iterator[tuple[Chunk, dict[str, NDArray[Any]]]]:
     """Read the chunks of a result, and the arrays of their results."""
-    sizes = {name: result.sizes for name, result in plan.empty().data_vars.items()}
+    sizes = {name: result.sizes for name, result in plan.template().data_vars.items()}
     cut = grid_chunks(plan.sizes, chunk_cells, plan.together)
     if not names_store(path) and Path(path).is_dir():
         for number, chunk in enumerate(cut):
@@ -66,18 +65,18 @@ def stored_chunks(plan: AnyPlan, path: Place, chunk_cells: int) -> Iterator[tupl
             yield chunk, {name: np.asarray(file[name][where[name] or ...]) for name in sizes}
 
 
-def stored_table(plan: AnyPlan, path: Place, chunk_cells: int, names: Collection[str]) -> Table:
+def stored_table(plan: AnyPlan, path: Place, chunk_cells: int, names: Collection[str]) -> xr.Dataset:
     """Read some results of a plan that were written as `slipsweep.runs.store.run` told."""
-    table = plan.empty()
+    table = plan.template()
     found = {
-        name: replace(one, values=np.empty(one.values.shape, one.values.dtype))
+        name: xr.Variable(one.dims, np.empty(one.shape, one.dtype), one.attrs)
         for name, one in table.data_vars.items()
         if name in names
     }
     for chunk, arrays in stored_chunks(plan, path, chunk_cells) if found else ():
         for name, one in found.items():
             one.values[tuple(places(chunk, one.sizes).values())] = arrays[name]
-    return Table(table.coords, found, table.attrs)
+    return xr.Dataset(found, table.coords, table.attrs)
 
 
 def nbytes(path: Place) -> int:

@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid.plans import plan_sweep
-from slipsweep.grid.tables import Table
 from slipsweep.model.options import MODELS, Mendez
 from slipsweep.model.parameters import check_finite, check_single, shown
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
@@ -52,7 +52,7 @@ def calibration_table(
     drift: Any = (),
     noise: Mapping[str, float] | None = None,
     cycles: bool = True,
-) -> Table:
+) -> xr.Dataset:
     """Calibration of a test; arguments, results and errors of `slipsweep.calibrate`."""
     theta, mu_s = check_single("theta", theta), check_single("mu_s", mu_s)
     chosen = MODELS.of(model)
@@ -413,7 +413,7 @@ def _limit(fit: Fit, parameters: Floats) -> float:
     return float(plan.solve()["limiting_acceleration"].item())
 
 
-def _summary(fit: Fit, solution: Solution) -> Table:
+def _summary(fit: Fit, solution: Solution) -> xr.Dataset:
     """The results of a sweep for what was found."""
     given = dict(zip(SOUGHT, map(float, solution.parameters), strict=True))
     plan = plan_sweep(

@@ -16,7 +16,6 @@ from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
 from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS, Model, Solver
 from slipsweep.model.parameters import computed, shown
 from slipsweep.model.variables import PARAMETERS, RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
@@ -563,9 +562,9 @@ def _inputs(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters without xarray: its arrays (computed, where they are lazy) as `Variable`."""
+    """The parameters without xarray: its arrays (computed, where they are lazy) as `xr.Variable`."""
     return {
-        name: Variable(tuple(map(str, values.dims)), computed(values), {str(key): x for key, x in values.attrs.items()})
+        name: xr.Variable(tuple(map(str, values.dims)), computed(values), values.attrs)
         if isinstance(values, (xr.DataArray, xr.Variable))
         else values
         for name, values in given.items()
@@ -573,7 +572,7 @@ def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _brought(
-    given: Mapping[str, Any], coords: Mapping[str, Variable], results: Collection[str]
+    given: Mapping[str, Any], coords: Mapping[str, xr.Variable], results: Collection[str]
 ) -> dict[Hashable, xr.Variable]:
     """Coordinates that the DataArrays among the parameters brought along; they must agree.
 
@@ -604,16 +603,16 @@ def _brought(
     return {name: variable for name, variable in brought.items() if name not in coords}
 
 
-def _dataset(table: Table, brought: Mapping[Hashable, xr.Variable]) -> xr.Dataset:
+def _dataset(table: xr.Dataset, brought: Mapping[Hashable, xr.Variable]) -> xr.Dataset:
     """A table as a Dataset; no array is copied."""
 
-    def labelled(variables: Mapping[str, Variable]) -> dict[Hashable, xr.Variable]:
+    def labelled(variables: Mapping[str, xr.Variable]) -> dict[Hashable, xr.Variable]:
         return {name: xr.Variable(part.dims, part.values, part.attrs) for name, part in variables.items()}
 
     return xr.Dataset(labelled(table.data_vars), {**brought, **labelled(table.coords)}, table.attrs)
 
 
-def _lazy(plan: Plan, chunks: Any) -> Table:
+def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
     """The results as dask arrays."""
     lengths = _chunk_lengths(chunks, plan.sizes)
     return plan.table(lambda task: _lazy_arrays(task, {dim: lengths[dim] for dim in task.sizes}))

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import unit_factor
 from slipsweep.model.variables import HAZARD_RESULTS
@@ -182,7 +182,7 @@ def _straight(x: Floats, known: Floats, values: Floats) -> Floats:
     return np.asarray(values[at] + np.clip(share, 0.0, 1.0) * (values[at + 1] - values[at]))
 
 
-def hazard_table(table: Table, curve: HazardCurve, *, thresholds: Any, over: Any = None) -> Table:
+def hazard_table(table: xr.Dataset, curve: HazardCurve, *, thresholds: Any, over: Any = None) -> xr.Dataset:
     """What `slipsweep.displacement_hazard` returns, of a table that holds `permanent_displacement` and `validity`.
 
     Raises
@@ -217,8 +217,8 @@ def hazard_table(table: Table, curve: HazardCurve, *, thresholds: Any, over: Any
         raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
     names = {"annual_rate": "rate", "held_rate": "held", "omitted_rate": "omitted"}
     results = {
-        name: Variable((*grid, "threshold"), found[own], HAZARD_RESULTS[name]) for name, own in names.items()
-    } | {"valueless_share": Variable(grid, shares.max(axis=-1), HAZARD_RESULTS["valueless_share"])}
+        name: xr.Variable((*grid, "threshold"), found[own], HAZARD_RESULTS[name]) for name, own in names.items()
+    } | {"valueless_share": xr.Variable(grid, shares.max(axis=-1), HAZARD_RESULTS["valueless_share"])}
     coords = {
         name: one
         for name, one in statistics.coords.items()
@@ -232,7 +232,7 @@ def hazard_table(table: Table, curve: HazardCurve, *, thresholds: Any, over: Any
         "hazard_curve_range": curve.amplitude[[0, -1]],
         "amplitude_range": amplitude[[0, -1]],
     }
-    return Table(coords, results, attrs)
+    return xr.Dataset(results, coords, attrs)
 
 
 def read_hazard_curve(path: str | Path, g: float) -> HazardCurve:

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -15,7 +16,6 @@ from slipsweep.grid.engine import Problem, Request
 from slipsweep.grid.plans import Plan, check_problem, plan_sweep
 from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history, record_history
 from slipsweep.model.options import Newmark
@@ -47,7 +47,7 @@ def history_table(
     excitation: Any = "sine",
     model: Any = "mendez",
     **given: Any,
-) -> Table:
+) -> xr.Dataset:
     """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
     problem = check_problem(excitation, model, "cycle")
     if isinstance(problem.excitation, Suite):
@@ -74,9 +74,9 @@ def history_table(
         if not np.isfinite(phases[[0, -1]]).all():
             raise InputError(f"times = ..., {number_text(float(grid[-1]))}: too many cycles for double precision")
     columns = one.columns(phases) | one.half_waves()
-    return Table(
-        {**summary.coords, "time": Variable(("time",), grid, {"units": "s", "long_name": "time"})},
-        columns | summary.data_vars,
+    return xr.Dataset(
+        {**columns, **summary.data_vars},
+        {**summary.coords, "time": xr.Variable(("time",), grid, {"units": "s", "long_name": "time"})},
         summary.attrs | {"title": "Time history of a rigid block"},
     )
 
@@ -107,7 +107,7 @@ class _History:
         return {name: variable.values for name, variable in self.plan.coords.items()}
 
     @cached_property
-    def summary(self) -> Table:
+    def summary(self) -> xr.Dataset:
         """Its results as a sweep gives them.
 
         The first history of all waits for two kernels: where there are two processors, not for one after the other.
@@ -149,7 +149,7 @@ class _History:
             table[:, 1:] = math.nan
         return table
 
-    def columns(self, phases: Floats) -> dict[str, Variable]:
+    def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """The variables of a history."""
         table, unit = self.sampled(phases), self.unit
         # Eq. 1 needs θ and μs
@@ -162,11 +162,10 @@ class _History:
         if not self._valueless:
             moved = {name: table[:, at] for name, at in known.items()}
             check_served(self.problem.model.g, self.inputs, moved, np.zeros(len(table), np.int16))
-        return {
-            name: Variable(("time",), np.ascontiguousarray(table[:, at]), HISTORY[name]) for name, at in known.items()
-        }
+        columns = {name: np.ascontiguousarray(table[:, at]) for name, at in known.items()}
+        return {name: xr.Variable(("time",), values, HISTORY[name]) for name, values in columns.items()}
 
-    def half_waves(self) -> dict[str, Variable]:
+    def half_waves(self) -> dict[str, xr.Variable]:
         """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
         record = self.problem.excitation
         if not isinstance(record, Record):
@@ -189,7 +188,7 @@ class _History:
             "half_wave_peak": peak,
             "half_wave_mode": mode.astype(np.int8),
         }
-        return {name: Variable(("half_wave",), values, HALF_WAVES[name]) for name, values in found.items()}
+        return {name: xr.Variable(("half_wave",), values, HALF_WAVES[name]) for name, values in found.items()}
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""

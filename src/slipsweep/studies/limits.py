@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -22,7 +23,6 @@ from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Problem, Request
 from slipsweep.grid.plans import Plan, ordinary, plan_sweep
-from slipsweep.grid.tables import Variable
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (
@@ -88,14 +88,14 @@ def plan_limits(
 ) -> Plan:
     """Plan of limit amplitudes; keyword arguments, results and errors of `slipsweep.limit_amplitude`.
 
-    Arrays with dimensions of their own are `Variable`.
+    Arrays with dimensions of their own are `xr.Variable`.
     """
-    values = displacement.values if isinstance(displacement, Variable) else displacement
+    values = displacement.values if isinstance(displacement, xr.Variable) else displacement
     checked = check_values("displacement", values)
-    if isinstance(displacement, Variable):
-        target = Variable(displacement.dims, checked)
+    if isinstance(displacement, xr.Variable):
+        target = xr.Variable(displacement.dims, checked)
     elif checked.ndim <= 1:
-        target = Variable(("displacement",) * checked.ndim, checked)
+        target = xr.Variable(("displacement",) * checked.ndim, checked)
     else:
         raise InputError(f"displacement: an array of {checked.ndim} dimensions; must be a scalar or a 1-D array")
     if checked.size == 0:
@@ -116,7 +116,7 @@ def plan_limits(
     names = (*LIMIT_RESULTS, *_codes(task.problem), "validity")
     return Plan(
         plan.sizes,
-        coords | {"displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
+        coords | {"displacement": xr.Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
         (replace(task, solver=partial(solve, highest, steps), names=names, inputs=inputs),),
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
@@ -126,7 +126,7 @@ def plan_limits(
         memory=plan.memory,
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
-        is_ordinary=ordinary(task.problem, {**coords, "amplitude": Variable((), np.array(highest))}),
+        is_ordinary=ordinary(task.problem, {**coords, "amplitude": xr.Variable((), np.array(highest))}),
         described=RESULTS | RECORD_COUNTS | LIMIT_RESULTS,
     )
 

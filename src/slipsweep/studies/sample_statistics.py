@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import threads
-from slipsweep.grid.tables import Variable
 from slipsweep.model.parameters import number_text
 from slipsweep.model.variables import STATISTIC_COORDINATES, SlidingMode, Validity
 from slipsweep.studies.sampling import Sampling
@@ -61,7 +61,7 @@ class SampleStatistics:
         }
 
     @property
-    def coords(self) -> dict[str, Variable]:
+    def coords(self) -> dict[str, xr.Variable]:
         """Quantiles, thresholds, modes and flags."""
         values: dict[str, NDArray[Any]] = {
             "quantile": self._sampling.quantiles,
@@ -70,7 +70,7 @@ class SampleStatistics:
             "flag": np.array([int(flag) for flag in Validity], np.int16),
         }
         own = {dim for dims in self.results.values() for dim in dims}
-        return {dim: Variable((dim,), one, STATISTIC_COORDINATES[dim]) for dim, one in values.items() if dim in own}
+        return {dim: xr.Variable((dim,), one, STATISTIC_COORDINATES[dim]) for dim, one in values.items() if dim in own}
 
     def reduce(self, solved: Mapping[str, NDArray[Any]], frequency: Floats) -> dict[str, NDArray[Any]]:
         """Statistics of the samples of each cell (rows), for each of its frequencies (columns)."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Variable
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choice,
@@ -312,7 +312,7 @@ def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tup
 
 
 def check_draws(
-    sampling: Sampling, draws: Mapping[str, Floats], names: Sequence[str], coords: Mapping[str, Variable]
+    sampling: Sampling, draws: Mapping[str, Floats], names: Sequence[str], coords: Mapping[str, xr.Variable]
 ) -> None:
     """Refuse draws of some parameters that no physics allows, anywhere on the grid."""
     for name in names:

@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.grid import threads
-from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import STATISTIC_COORDINATES, SensitivityStatus
 from slipsweep.studies.sampling import Sampling
 
@@ -81,13 +81,13 @@ class Sensitivity:
         return 64 * self.runs + 32 * RESAMPLES * _PARTS + 8 * _ROWS * (2 + 2 * len(self.inputs)) * (_PARTS + RESAMPLES)
 
     @property
-    def coords(self) -> dict[str, Variable]:
+    def coords(self) -> dict[str, xr.Variable]:
         """The inputs, and the ends of the intervals."""
         values: dict[str, NDArray[Any]] = {
             "input": np.array(["+".join(one) for one in self.inputs]),
             "bound": np.array(ENDS),
         }
-        return {name: Variable((name,), one, STATISTIC_COORDINATES[name]) for name, one in values.items()}
+        return {name: xr.Variable((name,), one, STATISTIC_COORDINATES[name]) for name, one in values.items()}
 
     @functools.cached_property
     def _weights(self) -> Floats:

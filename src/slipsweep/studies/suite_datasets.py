@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.parameters import shown
 from slipsweep.studies.datasets import _dataset
 from slipsweep.studies.hazard import HazardCurve, hazard_table, read_hazard_curve
@@ -154,16 +153,16 @@ def displacement_hazard(
     return _dataset(hazard_table(table, curve, thresholds=thresholds, over=over), {})
 
 
-def _table(result: Any) -> Table:
+def _table(result: Any) -> xr.Dataset:
     """What is needed of a dataset, computed."""
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result = {shown(result)}: must be a Dataset")
     names = [name for name in ("permanent_displacement", "validity") if name in result.data_vars]
 
-    def plain(one: xr.DataArray) -> Variable:
-        return Variable(tuple(map(str, one.dims)), one.values, {str(key): x for key, x in one.attrs.items()})
+    def plain(one: xr.DataArray) -> xr.Variable:
+        return xr.Variable(tuple(map(str, one.dims)), one.values, {str(key): x for key, x in one.attrs.items()})
 
     dims = {dim for name in names for dim in result[name].dims}
     coords = {str(name): plain(one) for name, one in result.coords.items() if dims.issuperset(one.dims)}
     attrs = {str(name): value for name, value in result.attrs.items()}
-    return Table(coords, {name: plain(result[name]) for name in names}, attrs)
+    return xr.Dataset(coords, {name: plain(result[name]) for name in names}, attrs)

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.parameters import check_list, shown
 from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
 from slipsweep.studies.sampling import check_quantiles, check_thresholds
@@ -24,7 +24,7 @@ _SUITE = ("motion", "polarity")
 REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
 
 
-def suite_table(table: Table, *, thresholds: Any, quantiles: Any, zero: Any, over: Any) -> Table:
+def suite_table(table: xr.Dataset, *, thresholds: Any, quantiles: Any, zero: Any, over: Any) -> xr.Dataset:
     """What `slipsweep.suite_statistics` returns, of a table that holds `permanent_displacement` and `validity`."""
     for name in ("permanent_displacement", "validity"):
         if name not in table.data_vars:
@@ -54,19 +54,19 @@ def suite_table(table: Table, *, thresholds: Any, quantiles: Any, zero: Any, ove
     flag = {**STATISTIC_COORDINATES["flag"], "flag_values": bits.tolist(), "flag_meanings": names}
     coords = {
         **{name: one for name, one in table.coords.items() if not {*dims, *own.values()} & {*one.dims, name}},
-        "quantile": Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"]),
-        "threshold": Variable(("threshold",), limits, STATISTIC_COORDINATES["threshold"]),
-        "flag": Variable(("flag",), bits, flag),
+        "quantile": xr.Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"]),
+        "threshold": xr.Variable(("threshold",), limits, STATISTIC_COORDINATES["threshold"]),
+        "flag": xr.Variable(("flag",), bits, flag),
     }
     results = {
-        name: Variable((*grid, *([own[name]] if name in own else [])), found[name], about)
+        name: xr.Variable((*grid, *([own[name]] if name in own else [])), found[name], about)
         for name, about in SUITE_STATISTICS.items()
     }
     attrs = {**table.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
-    return Table(coords, results, attrs)
+    return xr.Dataset(results, coords, attrs)
 
 
-def limit_quantiles(table: Table, quantiles: Any) -> Table:
+def limit_quantiles(table: xr.Dataset, quantiles: Any) -> xr.Dataset:
     """Quantiles of the limit amplitudes of a suite's motions, at every other grid point.
 
     A motion that does not reach the displacement up to the maximum amplitude has a limit above all others.  Motions
@@ -74,13 +74,13 @@ def limit_quantiles(table: Table, quantiles: Any) -> Table:
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         Limit amplitudes with the dimension `motion`, and their status.
     quantiles : float or array
 
     Returns
     -------
-    Table
+    xr.Dataset
         `limit_quantile` (m/s², dimension `quantile`; infinite where so many motions do not reach it, NaN where none has
         a value), `value_count` and `not_reached_count`.
     """
@@ -99,14 +99,14 @@ def limit_quantiles(table: Table, quantiles: Any) -> Table:
     found = _quantiles(ordered, np.zeros_like(count), count, wanted)
     coords = {name: one for name, one in table.coords.items() if not {*dims} & {*one.dims, name}}
     results = {
-        "limit_quantile": Variable((*grid, "quantile"), found, {"units": "m s-2"}),
-        "value_count": Variable(tuple(grid), count),
-        "not_reached_count": Variable(tuple(grid), np.count_nonzero(beyond, axis=-1)),
+        "limit_quantile": xr.Variable((*grid, "quantile"), found, {"units": "m s-2"}),
+        "value_count": xr.Variable(tuple(grid), count),
+        "not_reached_count": xr.Variable(tuple(grid), np.count_nonzero(beyond, axis=-1)),
     }
-    return Table({**coords, "quantile": Variable(("quantile",), wanted)}, results, table.attrs)
+    return xr.Dataset(results, {**coords, "quantile": xr.Variable(("quantile",), wanted)}, table.attrs)
 
 
-def point_names(table: Table, sizes: Mapping[str, int]) -> list[str]:
+def point_names(table: xr.Dataset, sizes: Mapping[Any, int]) -> list[str]:
     """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
 
     def names(dim: str) -> Iterator[str]:
@@ -122,7 +122,7 @@ def point_names(table: Table, sizes: Mapping[str, int]) -> list[str]:
     return [", ".join(parts) for parts in itertools.product(*(names(dim) for dim in sizes))]
 
 
-def _suite_dims(displacement: Variable, over: Any) -> tuple[str, ...]:
+def _suite_dims(displacement: xr.Variable, over: Any) -> tuple[str, ...]:
     """The dimensions that the statistics are taken over."""
     there = displacement.dims
     if "motion" not in there:
@@ -140,7 +140,7 @@ def _suite_dims(displacement: Variable, over: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(dims))
 
 
-def _spread(variable: Variable, dims: Sequence[str]) -> NDArray[Any]:
+def _spread(variable: xr.Variable, dims: Sequence[str]) -> NDArray[Any]:
     """Values along `dims`, of length 1 where the variable does not have one."""
     values = variable.values
     if values.dtype.kind == "f":  # codes that a file's reader has made numbers with NaN of

@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -22,7 +23,6 @@ from slipsweep.grid.chunks import Chunk, slabs
 from slipsweep.grid.engine import Problem, Request
 from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes, inputs_of, memory_of, plan_sweep
 from slipsweep.grid.resources import check_memory, grid_text
-from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Indices, Tally
 from slipsweep.model.estimates import friction_inputs
 from slipsweep.model.options import MODELS, Model, Newmark
@@ -70,7 +70,7 @@ class Study(Protocol):
         """Results, and the dimensions that they have beside those of the grid."""
 
     @property
-    def coords(self) -> Mapping[str, Variable]:
+    def coords(self) -> Mapping[str, xr.Variable]:
         """Coordinates of these dimensions."""
 
     @property
@@ -159,7 +159,7 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], recorded: bool, model
             )
 
 
-def _pooled_text(sampling: Sampling, coords: Mapping[str, Variable], clock: str) -> str:
+def _pooled_text(sampling: Sampling, coords: Mapping[str, xr.Variable], clock: str) -> str:
     """What is pooled, in words: ``8 motion x 2 polarity``; refuse what cannot be."""
     sizes = grid_sizes(coords)
     for dim in sampling.over:
@@ -188,7 +188,7 @@ class SamplePlan:
         sampling: Sampling,
         studies: tuple[Study, ...],
         problem: Problem,
-        coords: dict[str, Variable],
+        coords: dict[str, xr.Variable],
         attrs: dict[str, Any],
     ) -> None:
         self.sampling, self.studies, self.problem = sampling, studies, problem
@@ -220,7 +220,7 @@ class SamplePlan:
         )
 
         dims = (*self.solved, *self.scaled)
-        frequency = coords.get(clock, Variable((), np.ones(())))
+        frequency = coords.get(clock, xr.Variable((), np.ones(())))
         shape = (*self.solved.values(), math.prod(self.scaled.values()))
         lengths = [frequency.sizes.get(dim, 1) for dim in dims]
         axes = [frequency.dims.index(dim) for dim in dims if dim in frequency.dims]
@@ -278,45 +278,43 @@ class SamplePlan:
 
     def part(self, chunk: Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
-        coords = {name: one.cut(chunk) for name, one in self.coords.items()}
+        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
         inputs = {name: one.values for name, one in inputs_of(self.problem, coords).items() if name == "motion"}
         problem, _ = engine.narrowed(self.problem, inputs)
         return SamplePlan(self.sampling, self.studies, problem, coords, self.attrs)
 
-    def empty(self) -> Table:
+    def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
         return self._table(lambda shape, dtype: np.broadcast_to(np.zeros((), dtype), shape))
 
-    def _table(self, empty: Empty) -> Table:
-        """The statistics, in arrays that `empty` makes."""
+    def _table(self, array: Callable[[tuple[int, ...], str], NDArray[Any]]) -> xr.Dataset:
+        """The statistics, in arrays of a shape and a type that `array` makes."""
         results = {}
         coords = {name: one for name, one in self.coords.items() if not {*self.pooled} & {*one.dims}}
         for study in self.studies:
             for name, own in study.results.items():
                 over = [dim for dim in self.sizes if name in study.by_frequency or dim in self.solved]
                 shape = (*(self.sizes[dim] for dim in over), *(study.coords[dim].values.size for dim in own))
-                values = empty(shape, RESULT_DTYPES.get(name, "float64"))
-                results[name] = Variable((*over, *own), values, STATISTICS[name])
+                values = array(shape, RESULT_DTYPES.get(name, "float64"))
+                results[name] = xr.Variable((*over, *own), values, STATISTICS[name])
             coords |= study.coords
-        return Table(coords, results, self.attrs)
+        return xr.Dataset(results, coords, self.attrs)
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
+    def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
         """Solve the samples slab by slab, and reduce them to what `slipsweep.sample` returns.
 
         Parameters
         ----------
         progress : callable, optional
             Called with a number of samples just solved, from any thread.
-        empty : callable, optional
-            Makes the arrays of the statistics.
         """
         check_progress(progress)
         check_memory(
             f"grid of {grid_text(self.sizes) or 'one point'}, {sum(map(self._runs, self.studies))} samples",
-            self.memory + sum(one.values.size * 8 for one in self.empty().data_vars.values()),
+            self.memory + sum(one.values.size * 8 for one in self.template().data_vars.values()),
             "ask for fewer samples, grid points, quantiles or thresholds",
         )
-        table = self._table(empty)
+        table = self._table(np.empty)
         # cells first, their frequencies after them, wherever these have their places among the others
         order = [*self.solved, *self.scaled]
         for study in self.studies:
@@ -339,7 +337,7 @@ class SamplePlan:
         indices = None
         if "sensitivity_status" in results:
             indices = Indices.counted(
-                self.empty()["input"].values.tolist(),
+                self.template()["input"].values.tolist(),
                 *(results[name] for name in ("first_order_index", "total_index", "sensitivity_status")),
             )
         shares = [name for name in ("mode_share", "flag_share", "valueless_share") if name in self.names]
@@ -409,7 +407,7 @@ class SamplePlan:
 
 
 def _drawn_again(
-    sampling: Sampling, problem: Problem, coords: dict[str, Variable], attrs: dict[str, Any]
+    sampling: Sampling, problem: Problem, coords: dict[str, xr.Variable], attrs: dict[str, Any]
 ) -> SamplePlan:
     """The plan that another process has sent."""
     studies = _studies_again(pickle.dumps(sampling), isinstance(problem.excitation, (Record, Suite)))

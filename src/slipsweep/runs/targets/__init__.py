@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.files.netcdf import rounded
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import Chunk
-from slipsweep.grid.tables import Table
 from slipsweep.grid.tally import Tally
 from slipsweep.runs.parts import Manifest
 
@@ -22,7 +22,7 @@ Arrays = Mapping[str, NDArray[Any]]
 class Writer(Protocol):
     """Writes chunks, in this process, or sent to another."""
 
-    def write(self, number: int, chunk: Chunk, table: Table, arrays: Arrays) -> str:
+    def write(self, number: int, chunk: Chunk, table: xr.Dataset, arrays: Arrays) -> str:
         """Write a chunk, with its values as they are to be stored; return what is to go on record."""
 
 
@@ -104,7 +104,7 @@ class Delivery:
     dtypes: Mapping[str, np.dtype[Any]]
     dims: Mapping[str, tuple[str, ...]]
 
-    def __call__(self, plan: AnyPlan, number: int, chunk: Chunk, table: Table) -> Delivered:
+    def __call__(self, plan: AnyPlan, number: int, chunk: Chunk, table: xr.Dataset) -> Delivered:
         """Deliver a chunk of a plan, or of the whole of which the plan is a part."""
         arrays = {name: rounded(name, one.values, self.dtypes[name]) for name, one in table.data_vars.items()}
         with ThreadPoolExecutor(1) as counter:

@@ -5,13 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.files.checksums import checksum
 from slipsweep.files.contents import CHECKSUMS, with_run
 from slipsweep.files.outputs import sync
 from slipsweep.grid.chunks import Chunk, places
-from slipsweep.grid.tables import Table
 from slipsweep.runs import parts
 from slipsweep.runs.jobs import Job
 from slipsweep.runs.placed import PlacedFile, file_checksum, make_file, runs_of
@@ -27,7 +27,7 @@ class OneFile(Renamed):
 
     def __init__(self, job: Job, path: Path, work: parts.Folder) -> None:
         self.job, self.path, self.data = job, path, work.path / "data.nc"
-        self.results = {name: one.sizes for name, one in job.plan.empty().data_vars.items()}
+        self.results = {name: one.sizes for name, one in job.plan.template().data_vars.items()}
         self.file: PlacedFile | None = None
 
     @property
@@ -76,7 +76,7 @@ class OneFile(Renamed):
             arrays[name] = values.reshape(shape)
         return arrays if checksum(arrays) == digest else None
 
-    def write(self, number: int, chunk: Chunk, table: Table, arrays: Arrays) -> str:
+    def write(self, number: int, chunk: Chunk, table: xr.Dataset, arrays: Arrays) -> str:
         """Write a chunk, with its values as they are to be stored; return what is to go on record."""
         assert self.file is not None
         for name, sizes in self.results.items():

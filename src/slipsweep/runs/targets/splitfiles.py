@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 import xxhash
 from numpy.typing import NDArray
 
@@ -16,7 +17,6 @@ from slipsweep.files.names import open_netcdf
 from slipsweep.files.netcdf import new_file, write_head
 from slipsweep.files.outputs import sync
 from slipsweep.grid.chunks import Chunk
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.runs import parts
 from slipsweep.runs.jobs import Job
 from slipsweep.runs.placed import PlacedFile, file_checksum, make_file
@@ -44,17 +44,18 @@ class FileWriter:
     manifest: parts.Manifest
     compression: int
 
-    def write(self, number: int, chunk: Chunk, table: Table, arrays: Arrays) -> str:
+    def write(self, number: int, chunk: Chunk, table: xr.Dataset, arrays: Arrays) -> str:
         """Write it, and bring it to the disk itself; return the checksum of the file."""
-        coords, labels = dict(table.coords), self.head.labels
+        coords: dict[Any, Any] = dict(table.coords)
+        labels = self.head.labels
         if "case" in chunk:
             # files are put together by the coordinates of their dimensions, which rows of [[cases]] lack
             rows = np.arange(chunk["case"].start, chunk["case"].stop, dtype=np.int32) + 1
-            coords["case"] = Variable(("case",), rows, {"long_name": "row of [[cases]]", "units": "1"})
+            coords["case"] = xr.Variable(("case",), rows, {"long_name": "row of [[cases]]", "units": "1"})
             labels = labels[chunk["case"]]
         contents = contents_of(
             replace(self.head, labels=labels),
-            replace(table, coords=coords),
+            xr.Dataset(table.data_vars, coords, table.attrs),
             lambda name: arrays[name].dtype,
             self.manifest.history,
         )

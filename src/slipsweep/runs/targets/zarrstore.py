@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -16,7 +17,6 @@ from slipsweep.files.contents import CHECKSUMS, with_run
 from slipsweep.files.outputs import appear, sync
 from slipsweep.files.zarr_store import Place
 from slipsweep.grid.chunks import Chunk, places
-from slipsweep.grid.tables import Table
 from slipsweep.runs import parts
 from slipsweep.runs.jobs import Job
 from slipsweep.runs.targets import Arrays
@@ -31,7 +31,7 @@ class StoreWriter:
     results: Mapping[str, Mapping[str, int]]
     key: str
 
-    def write(self, number: int, chunk: Chunk, table: Table, arrays: Arrays) -> str:
+    def write(self, number: int, chunk: Chunk, table: xr.Dataset, arrays: Arrays) -> str:
         """Write a chunk, with its values as they are to be stored; return what is to go on record."""
         zarr_store.write(
             self.place, self.key, {name: (self.where(chunk, name), values) for name, values in arrays.items()}
@@ -53,7 +53,7 @@ class ZarrStore:
             **({} if isinstance(output, Path) else {"output": output}),
         }
         self.place = work.path / "data.zarr" if isinstance(output, Path) else output
-        self.results = {name: one.sizes for name, one in job.plan.empty().data_vars.items()}
+        self.results = {name: one.sizes for name, one in job.plan.template().data_vars.items()}
 
     def close(self) -> None:
         """Nothing stays open."""
