@@ -910,7 +910,7 @@ def test_the_dataset_draws_what_the_file_does(lined: Path) -> None:
     for ours, theirs in zip(figure.axes[0].lines, expected.axes[0].lines, strict=True):
         np.testing.assert_array_equal(ours.get_xydata(), theirs.get_xydata())
     solved = slipsweep.sweep([8.0, 11.0], 0.3, [1.0, 2.0, 3.0], 1.0)
-    assert solved.slipsweep.chart("contours", x="theta").axes[0].get_xlabel() == "plane inclination θ (°)"
+    assert solved.slipsweep.chart("contours", x="theta").axes[0].get_xlabel() == "base inclination θ (°)"
     xr.testing.assert_identical(solved.slipsweep.flags(), slipsweep.flags(solved))
     with pytest.raises(InputError, match='did you mean "modes"'):
         solved.slipsweep.chart("mode")
@@ -930,7 +930,7 @@ def test_all_of_a_file_is_a_pdf_with_a_title_page(
     for one in title.texts:
         assert one.get_window_extent().x1 < 0.95 * title.bbox.width, one.get_text()
     text = "\n".join(one.get_text() for one in title.texts)
-    assert "plane inclination θ: 8 to 14°, 3 values" in text
+    assert "base inclination θ: 8 to 14°, 3 values" in text
     assert "Permanent displacement" in text
     assert f"slipsweep {slipsweep.__version__}" in text
     for flag in maps.HATCHES:

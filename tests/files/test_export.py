@@ -309,7 +309,7 @@ def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
     assert [row[-1] for row in rows[1:]] == ["statically_unstable", "yield_governs"]
     assert book["permanent_displacement"].cell(2, book["permanent_displacement"].max_column).value is None
     about = {str(name): text for name, text in book["about"].iter_rows(values_only=True) if name}
-    assert about["plane inclination"] == "2 values, 5 to 25 degree"
+    assert about["base inclination"] == "2 values, 5 to 25 degree"
     assert about["friction parameters"] == "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"
     assert about["1 statically_unstable"].startswith("no value: 50.00% of 6 cells; ")
     assert about["file"] == str(folder / "cases.nc")

@@ -70,7 +70,7 @@ def simulate(
     frequency: Annotated[str | None, SHAKING("Excitation frequency, Hz; not with a record.", metavar="VALUE")] = None,
     excitation: Waveform | None = None,
     record: Annotated[
-        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, COSMOS or ESM text.", metavar="FILE")
+        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", metavar="FILE")
     ] = None,
     reading: Mapping[str, Any],
     scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = None,
@@ -137,6 +137,8 @@ def simulate(
         writers[path.suffix](table, path, overwrite, motion)
     if quiet:
         return
+    if not isinstance(motion, Waveform):
+        typer.echo(f"record                  {motion.summary()}")
     _summarize(table)
     typer.echo(f"{'taken as':<24}{taken_as(given, model.g)}")
     for path in paths:

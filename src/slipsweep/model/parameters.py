@@ -15,6 +15,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError
+from slipsweep.model.variables import PARAMETERS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,6 +59,7 @@ _POSITIVE_FACTOR = Bound(
 BOUNDS: dict[str, Bound] = {
     "theta": Bound(0.0, True, 90.0, "0 <= theta < 90 degrees", includes_high=False),
     "mu_s": _POSITIVE_FACTOR,
+    "phi": Bound(0.0, False, 90.0, "0 < phi < 90 degrees", includes_high=False),
     "amplitude": _AMOUNT,
     "displacement_amplitude": _AMOUNT,
     "frequency": _POSITIVE_FACTOR,
@@ -75,6 +77,7 @@ BOUNDS: dict[str, Bound] = {
     "pgv": _AMOUNT,
     "arias_intensity": _AMOUNT,
     "time_scale": _POSITIVE_FACTOR,
+    "interval": Bound(0.0, False, LARGEST, f"a finite number > 0 and at most {LARGEST:g}"),
     "azimuth": Bound(0.0, True, 360.0, "0 <= azimuth <= 360 degrees"),
     "g": Bound(1.0 / LARGEST, True, LARGEST, f"a finite number > 0, from {1.0 / LARGEST:g} to {LARGEST:g}"),
     "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1", includes_high=False),
@@ -177,6 +180,57 @@ def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.f
     if wrong.any():
         raise InputError(f"{key or name} = {number_text(float(array[wrong].flat[0]))}: must be {bound.text}")
     return array
+
+
+def friction_coefficient(phi: Any) -> Any:
+    """Static friction coefficient of a friction angle, mu_s = tan phi.
+
+    This is the one place where a friction angle becomes what the model takes: `sweep`, `sample`, `simulate`, sweep
+    files and commands that are given `phi` call it, with PARAMETERS["phi"] and BOUNDS["phi"].
+
+    Parameters
+    ----------
+    phi : float, array-like, DataArray or Variable
+        Friction angle, degrees, 0 < phi < 90.
+
+    Returns
+    -------
+    DataArray or Variable
+        Along the dimensions of `phi`, or along the dimension "phi"; a DataArray has the angles as its coordinate
+        "phi", which results keep.
+
+    Raises
+    ------
+    InputError
+        Angles that are not allowed; an array of several dimensions that are not named.
+
+    Examples
+    --------
+    >>> friction_coefficient([20.0, 45.0]).values.round(3).tolist()
+    [0.364, 1.0]
+    """
+    import numpy as np
+    import xarray as xr
+
+    values = check_values("phi", phi)
+    tangents = np.tan(np.radians(values))
+    if isinstance(phi, xr.Variable):
+        return xr.Variable(phi.dims, tangents)
+    if values.ndim > 1 and not isinstance(phi, xr.DataArray):
+        raise InputError(f"phi: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray")
+    dims = phi.dims if isinstance(phi, xr.DataArray) else ("phi",) * values.ndim
+    coords = dict(phi.coords) if isinstance(phi, xr.DataArray) else {}
+    return xr.DataArray(tangents, coords | {"phi": (dims, values, PARAMETERS["phi"])}, dims)
+
+
+def with_friction_coefficient(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters in which `mu_s` = tan phi stands in place of `phi` (InputError: both are given); None is not given."""
+    given = {name: value for name, value in parameters.items() if name != "phi"}
+    if parameters.get("phi") is None:
+        return given
+    if given.get("mu_s") is not None:
+        raise InputError("phi, mu_s: must not both be given; mu_s = tan(phi)")
+    return given | {"mu_s": friction_coefficient(parameters["phi"])}
 
 
 def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:

@@ -174,6 +174,7 @@ VALIDITY_TEXT: dict[Validity, str] = {
 DIMENSION_ORDER = (
     "theta",
     "mu_s",
+    "phi",
     "amplitude",
     "displacement_amplitude",
     "frequency",
@@ -194,8 +195,9 @@ DIMENSION_ORDER = (
 
 #: Inputs: attributes of their coordinates.
 PARAMETERS: dict[str, dict[str, Any]] = {
-    "theta": {"units": "degree", "long_name": "plane inclination"},
+    "theta": {"units": "degree", "long_name": "base inclination"},
     "mu_s": {"units": "1", "long_name": "static friction coefficient"},
+    "phi": {"units": "degree", "long_name": "friction angle, in place of mu_s = tan(phi)"},
     "amplitude": {"units": "m s-2", "long_name": "peak ground acceleration"},
     "displacement_amplitude": {"units": "m", "long_name": "peak ground displacement"},
     "frequency": {"units": "Hz", "long_name": "excitation frequency"},
@@ -214,7 +216,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 }
 
 #: Inputs of the interface, in place of which Newmark's block may have its yield coefficient alone.
-INTERFACE_INPUTS = ("theta", "mu_s", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
+INTERFACE_INPUTS = ("theta", "mu_s", "phi", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
 
 #: Inputs that the shaking has if it is a waveform, and if it is a record.
 WAVEFORM_INPUTS = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")

@@ -2,10 +2,11 @@
 
 import glob
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,7 +19,7 @@ from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import INTENSITY_MEASURES, MOTION_COORDINATES
 from slipsweep.motion.intensity import intensity_measures
 from slipsweep.motion.reading import Reading
-from slipsweep.motion.records import Record, read_record
+from slipsweep.motion.records import Record, record_of
 
 Floats = NDArray[np.float64]
 
@@ -183,7 +184,7 @@ class Suite:
         return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(shown_labels)})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _received, (self.motions, self.labels, self.name)
+        return _same_suite, (self.motions, self.labels, self.name)
 
     def __len__(self) -> int:
         return len(self.motions)
@@ -275,20 +276,15 @@ class Suite:
             about["duplicate_motions"] = "; ".join(", ".join(labels) for labels in self.duplicates)
         return about
 
+    def summary(self) -> str:
+        """One line a motion, as `Record.summary`."""
+        return "\n".join(one.summary() for one in self.components)
 
-#: The last suites that other processes have sent: with every chunk comes the same again, and the tables of pieces that
-#: are made of a record are found by which object it is.
-_RECEIVED: deque[Suite] = deque(maxlen=4)
 
-
-def _received(motions: tuple[Motion, ...], labels: tuple[str, ...], name: str) -> Suite:
-    """A suite that was pickled: the one that came before, if it is the same."""
-    suite = Suite(motions, labels, name)
-    for known in tuple(_RECEIVED):
-        if known == suite:
-            return known
-    _RECEIVED.append(suite)
-    return suite
+@lru_cache(maxsize=4)
+def _same_suite(motions: tuple[Motion, ...], labels: tuple[str, ...], name: str) -> Suite:
+    """A suite that was pickled: with every chunk the same comes again, and tables are made once of a record."""
+    return Suite(motions, labels, name)
 
 
 def read_suite(
@@ -296,7 +292,10 @@ def read_suite(
     *,
     pairs: Sequence[str] | None = None,
     units: str | None = None,
+    interval: float | None = None,
     baseline: str = "none",
+    gaps: str = "refuse",
+    implausible: str = "refuse",
     format: str = "auto",
     channel: int | None = None,
 ) -> Suite:
@@ -312,7 +311,7 @@ def read_suite(
     pairs : (str, str), optional
         Two endings of the files' stems, such as ``("_NS", "_EW")``: files that differ in these alone are the two
         components of one motion, the first ending's at azimuth 0 and the second's at 90 degrees.
-    units, baseline, format, channel
+    units, interval, baseline, gaps, implausible, format, channel
         As `read_record`, for every file.
 
     Returns
@@ -338,113 +337,115 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    return suite_in(Path(), paths, pairs, Reading(units, baseline, format, channel))  # type: ignore[arg-type]
+    reading = Reading(
+        units=units,  # type: ignore[arg-type]
+        interval=interval,
+        baseline=baseline,  # type: ignore[arg-type]
+        gaps=gaps,  # type: ignore[arg-type]
+        implausible=implausible,  # type: ignore[arg-type]
+        format=format,  # type: ignore[arg-type]
+        channel=channel,
+    )
+    return suite_in(Path(), paths, pairs, reading)
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
     """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
-    options = reading.options
     sources = _sources(paths, folder)
     if pairs is not None:
         sources = _paired(sources, pairs)
-    files = [one for source in sources for one in (source if isinstance(source, tuple) else (source,))]
+    files = dict.fromkeys(part for source in sources for part in _parts(source) if isinstance(part, Path))
     records, reasons = {}, {}
     for file in files:
-        if isinstance(file, Path) and file not in records:
-            try:
-                records[file] = read_record(file, **options)
-            except InputError as error:
-                reasons[file] = str(error).removeprefix(f"{file}: ")
+        try:
+            records[file] = record_of(file, reading)
+        except InputError as error:
+            reasons[file] = str(error).removeprefix(f"{file}: ")
     if reasons:
-        raise _unreadable(reasons, len({*files}))
-
-    def read(file: "Path | Record") -> Record:
-        return file if isinstance(file, Record) else records[file]
-
-    motions = tuple(
-        source if isinstance(source, Pair) else Pair(*map(read, source)) if isinstance(source, tuple) else read(source)
-        for source in sources
-    )
-    named = [source[0] if isinstance(source, tuple) else source for source in sources]
-    stems = [one if isinstance(one, Path) else _path_of(one) for one in named]
-    if pairs is not None:
-        stems = [stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem) for stem in stems]
-    entries = [paths] if isinstance(paths, (str, Path)) else paths
-    is_named = isinstance(entries, Sequence) and all(isinstance(one, (str, Path)) for one in entries)
-    text = ", ".join(map(str, entries)) if is_named else ""
-    return Suite(motions, _labels(stems), _printable(text) if 0 < len(text) <= _LONGEST_NAME else "suite")
+        raise _unreadable(reasons, len(files))
+    motions, stems = [], []
+    for source in sources:
+        parts = [records[part] if isinstance(part, Path) else part for part in _parts(source)]
+        motions.append(Pair(*parts) if isinstance(source, tuple) else parts[0])
+        first = _parts(source)[0]
+        stem = first if isinstance(first, Path) else _path_of(first)
+        if pairs is not None:
+            stem = stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem)
+        stems.append(stem)
+    entries = paths if isinstance(paths, (list, tuple)) else [paths]
+    name = ", ".join(map(str, entries)) if all(isinstance(one, (str, Path)) for one in entries) else ""
+    return Suite(tuple(motions), _labels(stems), _printable(name) if 0 < len(name) <= _LONGEST_NAME else "suite")
 
 
-_Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, ...]
+_Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, Path | Record]
+
+
+def _parts(source: _Source) -> tuple[Any, ...]:
+    """A source, or the two of a pair."""
+    return source if isinstance(source, tuple) else (source,)
 
 
 def _sources(given: Any, folder: Path) -> list[_Source]:
     """What entries name, each file once: files, records, pairs of either."""
-    key = "paths"
-    if isinstance(given, (str, Path, Record, Pair)):
-        given = [given]
     if isinstance(given, Suite):
         return list(given.motions)
-    if not isinstance(given, (Sequence, Iterator)) or isinstance(given, (bytes, Mapping)):
-        raise InputError(f"{key} = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
+    if isinstance(given, (str, Path, Record, Pair)):
+        given = [given]
+    if not isinstance(given, (Sequence, Iterator)) or isinstance(given, bytes):
+        raise InputError(f"paths = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
     found: list[_Source] = []
     for entry in given:
         if isinstance(entry, (Record, Pair)):
             found.append(entry)
         elif isinstance(entry, (list, tuple)):
             if len(entry) != 2 or not all(isinstance(part, (str, Path, Record)) for part in entry):
-                raise InputError(f"{key}: {shown(entry)}: must be two files, the components of one motion")
-            found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
+                raise InputError(f"paths: {shown(entry)}: must be two files, the components of one motion")
+            first, second = (part if isinstance(part, Record) else folder / part for part in entry)
+            found.append((first, second))
         elif isinstance(entry, (str, Path)):
-            found += [file for file in _matching(folder, entry, key) if file not in found]
+            found += [file for file in _matching(folder, entry) if file not in found]
         else:
-            raise InputError(f"{key}: {shown(entry)}: must be a file, a folder, a pattern or a Record")
+            raise InputError(f"paths: {shown(entry)}: must be a file, a folder, a pattern or a Record")
     if not found:
-        raise InputError(f"{key} = []: must name one motion at least")
+        raise InputError("paths = []: must name one motion at least")
     return found
 
 
-def _matching(folder: Path, entry: str | Path, key: str) -> list[Path]:
+def _matching(folder: Path, entry: str | Path) -> list[Path]:
     """The files that an entry names."""
-    if not str(entry).strip():
-        raise InputError(f"{key}: {shown(entry)}: must be a file, a folder or a pattern")
+    text = _printable(str(entry))
+    if not text.strip():
+        raise InputError(f"paths: {shown(entry)}: must be a file, a folder or a pattern")
     path = folder / entry
     try:
-        if path.is_dir():
-            files = sorted(one for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
-            if not files:
-                raise InputError(f"{key}: {_printable(str(entry))}: a folder without files")
-            return files
-        if path.exists() or not glob.has_magic(str(entry)):
+        if not path.is_dir() and (path.exists() or not glob.has_magic(str(entry))):
             return [path]
-        found = (folder / one for one in glob.iglob(str(entry), root_dir=folder, recursive=True))
+        pattern = f"{glob.escape(str(entry))}/*" if path.is_dir() else str(entry)
+        found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
         files = sorted(one for one in found if one.is_file())
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{key}: {_printable(str(entry))}: cannot be read: {reason}") from None
+        raise InputError(f"paths: {text}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not files:
-        raise InputError(f"{key}: {_printable(str(entry))}: no file fits this pattern")
+        raise InputError(f"paths: {text}: {'a folder without files' if path.is_dir() else 'no file fits this pattern'}")
     return files
 
 
 def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]:
     """Files put together two by two."""
     endings = check_list("pairs", endings, "two endings of names, such as ('_NS', '_EW')")
-    if len(endings) != 2 or not all(isinstance(one, str) and one for one in endings):
-        raise InputError(f"pairs = {shown(endings)}: must be two endings of names, such as ('_NS', '_EW')")
-    if endings[0] == endings[1]:
-        raise InputError(f"pairs = {shown(endings)}: must be two different endings")
+    if len(set(map(str, endings))) != 2 or not all(isinstance(one, str) and one for one in endings):
+        raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
     components: dict[Path, dict[str, Path]] = {}
-    alone = []
+    single: list[_Source] = []
     for one in sources:
         ending = next((end for end in endings if isinstance(one, Path) and one.stem.endswith(end)), None)
-        if not isinstance(one, Path) or ending is None:
-            alone.append(one)
-            continue
-        components.setdefault(one.with_name(one.stem.removesuffix(ending) + one.suffix), {})[ending] = one
-    alone += [one for both in components.values() if len(both) < 2 for one in both.values()]
-    if alone:
-        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in alone)
+        if isinstance(one, Path) and ending is not None:
+            components.setdefault(one.with_name(one.stem.removesuffix(ending) + one.suffix), {})[ending] = one
+        else:
+            single.append(one)
+    single += [one for both in components.values() if len(both) < 2 for one in both.values()]
+    if single:
+        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in single)
         raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
     return [(both[endings[0]], both[endings[1]]) for both in components.values()]
 
@@ -464,19 +465,16 @@ def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
     """The stems of files; more of the path of those whose stems are alike, and a number where that does not help."""
     stems = Counter(path.stem for path in paths)
     ways = Counter(path.as_posix() for path in paths)
-    parents = [path.parent.parts for path in paths]
-    shared = 0
-    while parents and all(len(one) > shared and one[shared] == parents[0][shared] for one in parents):
-        shared += 1
+    levels = zip(*(path.parent.parts for path in paths), strict=False)
+    shared = len(list(takewhile(lambda parts: len({*parts}) == 1, levels)))
     labels: list[str] = []
     taken = {path.stem for path in paths if stems[path.stem] == 1}
     for path in paths:
-        label = path.stem
-        if stems[label] > 1:
-            label = "/".join(path.parts[shared:]) if ways[path.as_posix()] == 1 else path.stem
-        label, number = _printable(label).strip() or "motion", 1
-        unique = label
-        while (stems[path.stem] > 1 and unique in taken) or unique in labels:
+        is_single = stems[path.stem] == 1
+        label = path.stem if is_single or ways[path.as_posix()] > 1 else "/".join(path.parts[shared:])
+        label = unique = _printable(label).strip() or "motion"
+        number = 1
+        while unique in labels or (not is_single and unique in taken):
             number += 1
             unique = f"{label} ({number})"
         labels.append(unique)
