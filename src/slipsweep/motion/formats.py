@@ -132,7 +132,7 @@ def _read_values(path: Path, lines: list[str], interval: float | None) -> Sample
 
 
 def _header(lines: list[str]) -> tuple[str, list[tuple[int, str]]]:
-    """The text before the numbers, and the numbered lines from the first that begins with one; no comments, no blanks."""
+    """The text before the numbers, and the numbered lines from the first that begins with one; no comments."""
     for at, line in enumerate(lines):
         if any(re.fullmatch(_NUMBER, cell) for cell in _cells(line)[:1]):
             numbered = enumerate(lines[at:], at + 1)

@@ -4,17 +4,12 @@ What is found is refused, with the time and the value, unless the user accepts i
 `implausible="accept"`.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.motion.intensity import peak_displacement, peak_velocity
+from slipsweep.motion.intensity import Motion, peak_displacement, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
-
-if TYPE_CHECKING:
-    from slipsweep.motion.records import Record
 
 Floats = NDArray[np.float64]
 
@@ -83,12 +78,12 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     return times[~missing], values[~missing], found
 
 
-def check_plausible(record: "Record", unit: str, implausible: str, has_gaps: bool) -> str:
+def check_plausible(record: Motion, unit: str, implausible: str, has_gaps: bool) -> str:
     """What no ground does, in words; empty if the record is plausible.
 
     Parameters
     ----------
-    record : Record
+    record : Motion
         With its baseline taken off.
     unit : str
         The unit that the file was read in.
@@ -141,7 +136,7 @@ def _held(times: Floats, values: Floats) -> list[tuple[float, float, float]]:
     return found
 
 
-def _odd_peak(record: "Record", unit: str) -> str:
+def _odd_peak(record: Motion, unit: str) -> str:
     """A peak that was never recorded, and the unit that would explain it; a few samples typed by hand may be weak."""
     at = int(np.abs(record.acceleration).argmax())
     peak = record.peak / STANDARD_GRAVITY
@@ -156,7 +151,7 @@ def _odd_peak(record: "Record", unit: str) -> str:
     return f"{read}: {limit}, check units"
 
 
-def _drift(record: "Record") -> str:
+def _drift(record: Motion) -> str:
     """A ground that moves away, as the integral of an offset does; a few corners typed by hand may end in motion."""
     if record.times.size <= _FEWEST:
         return ""

@@ -9,7 +9,7 @@ displacement have it.  "g" is standard gravity.
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,21 @@ from slipsweep.motion.reading import STANDARD_GRAVITY
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-    from slipsweep.motion.records import Record
-
 Floats = NDArray[np.float64]
+
+
+class Motion(Protocol):
+    """A record, as far as measures are taken of it."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def times(self) -> Floats: ...
+    @property
+    def acceleration(self) -> Floats: ...
+    @property
+    def peak(self) -> float: ...
+
 
 #: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
 _LOWEST, _HIGHEST, _SPACING = 0.25, 20.0, 0.05
@@ -34,7 +46,7 @@ _RESAMPLED, _MOST_SAMPLES = 0.005, 2**22
 _ARIAS = math.pi / (2.0 * STANDARD_GRAVITY)
 
 
-def intensity_measures(record: "Record") -> dict[str, float]:
+def intensity_measures(record: Motion) -> dict[str, float]:
     """All measures of `variables.INTENSITY_MEASURES` of a record; NaN where one is not defined."""
     found = {
         "pga": record.peak,
@@ -48,7 +60,7 @@ def intensity_measures(record: "Record") -> dict[str, float]:
     return {name: found[name] for name in INTENSITY_MEASURES}
 
 
-def strength_factor(record: "Record", given: Mapping[str, Floats]) -> Floats:
+def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
     """What the acceleration of a record is multiplied by, for the strength that is given.
 
     Parameters
@@ -70,31 +82,31 @@ def strength_factor(record: "Record", given: Mapping[str, Floats]) -> Floats:
         return np.sqrt(given["arias_intensity"]) / np.sqrt(given["time_scale"]) / root
 
 
-def peak_velocity(record: "Record") -> float:
+def peak_velocity(record: Motion) -> float:
     """Peak ground velocity, max |∫ Üg dt|, m/s."""
     acceleration = _shape(record)
     return record.peak * _largest(acceleration.antiderivative(), _zeros(acceleration))
 
 
-def peak_displacement(record: "Record") -> float:
+def peak_displacement(record: Motion) -> float:
     """Peak ground displacement, max |∫∫ Üg dt dt|, m."""
     velocity = _shape(record).antiderivative()
     return record.peak * _largest(velocity.antiderivative(), _zeros(velocity))
 
 
-def arias_intensity(record: "Record") -> float:
+def arias_intensity(record: Motion) -> float:
     """Arias intensity π/(2g) ∫ Üg² dt, m/s (Arias 1970)."""
     return _ARIAS * float(_energy(record)[-1]) * record.peak * record.peak
 
 
-def cumulative_absolute_velocity(record: "Record") -> float:
+def cumulative_absolute_velocity(record: Motion) -> float:
     """Cumulative absolute velocity ∫ |Üg| dt, m/s (EPRI 1988; Kramer 1996, section 3.3)."""
     times = np.union1d(record.times, _zeros(_shape(record)))
     size = np.abs(np.interp(times, record.times, record.acceleration))
     return float(np.trapezoid(size, times))
 
 
-def significant_duration(record: "Record", low: float = 0.05, high: float = 0.95) -> float:
+def significant_duration(record: Motion, low: float = 0.05, high: float = 0.95) -> float:
     """Time between 5 % and 95 % of the Arias intensity, s (Trifunac and Brady 1975)."""
     from scipy.optimize import brentq
 
@@ -116,7 +128,7 @@ def significant_duration(record: "Record", low: float = 0.05, high: float = 0.95
     return times[1] - times[0]
 
 
-def mean_period(record: "Record") -> float:
+def mean_period(record: Motion) -> float:
     """Mean period Tm = Σ Cᵢ²/fᵢ / Σ Cᵢ², s, over 0.25 Hz ≤ fᵢ ≤ 20 Hz (Rathje, Abrahamson and Bray 1998).
 
     Cᵢ are the amplitudes of the discrete Fourier transform, at frequencies at most 0.05 Hz apart: a motion shorter
@@ -136,7 +148,7 @@ def mean_period(record: "Record") -> float:
     return float((power / frequency[chosen]).sum() / total) if total > 0.0 else math.nan
 
 
-def _evenly_sampled(record: "Record") -> tuple[Floats, float]:
+def _evenly_sampled(record: Motion) -> tuple[Floats, float]:
     """A record of peak 1 at an even interval, and that."""
     duration = float(record.times[-1] - record.times[0])
     own = np.diff(record.times)
@@ -152,7 +164,7 @@ def _evenly_sampled(record: "Record") -> tuple[Floats, float]:
     return np.interp(times, record.times, record.acceleration) / record.peak, step
 
 
-def _shape(record: "Record") -> "PPoly":
+def _shape(record: Motion) -> "PPoly":
     """The straight lines between the samples, of a motion of peak 1: its square may be too large."""
     from scipy.interpolate import PPoly  # here: a sweep under a waveform does not wait for it
 
@@ -172,7 +184,7 @@ def _largest(curve: "PPoly", extremes: Floats) -> float:
     return float(np.abs(curve(np.concatenate([curve.x, extremes]))).max())
 
 
-def _energy(record: "Record") -> Floats:
+def _energy(record: Motion) -> Floats:
     """∫ Üg² dt up to every sample, with the peak as the unit."""
     values = record.acceleration / (record.peak or 1.0)
     first, last = values[:-1], values[1:]
