@@ -150,7 +150,7 @@ WRONG: dict[str, tuple[Any, Any, dict[str, Any], str]] = {
     "gap": (TIMES[OUT], SHAKING[OUT], {"gaps": "linear"}, "no samples from t = 3.99 to 6 s (201 times"),
     "-999": (TIMES, changed(-999, 500), {"gaps": "linear"}, "1 fill value (-999), first at t = 5 s"),
     "9999": (TIMES, changed(9999, 7, 500, 501), {"gaps": "linear"}, "3 fill values (9999), first at t = 0.07 s"),
-    "blank": (TIMES, changed(np.nan, 500), {"gaps": "linear"}, "1 fill value (nan), first at t = 5 s"),
+    "blank": (TIMES, changed(np.nan, 500), {"gaps": "linear"}, "1 fill value (blank), first at t = 5 s"),
     "repeated": (TIMES, changed(-1e5, 500, 700), {"gaps": "linear"}, "2 fill values (-100000), first at t = 5 s"),
     "held": (TIMES, changed(0.1, *range(500, 600)), {"gaps": "linear"}, "the value 0.1 is held from t = 5 to 5.99 s"),
     "peak": (TIMES, changed(4.0, 500), {"implausible": "accept"}, "peak acceleration 4 g at t = 5 s"),
@@ -215,7 +215,7 @@ def test_a_trace_of_obspy() -> None:
     np.testing.assert_allclose(record.times, TIMES, rtol=1e-15)
     assert (record.name, record.attrs["record_units"]) == ("XX.ABC..HNE", "cm/s2")
     masked = np.ma.masked_array(SHAKING, np.arange(1001) == 500)
-    with pytest.raises(InputError, match=r"XX\.ABC\.\.HNE: 1 fill value \(nan\), first at t = 5 s"):
+    with pytest.raises(InputError, match=r"XX\.ABC\.\.HNE: 1 fill value \(blank\), first at t = 5 s"):
         Record.from_obspy(trace(masked), "m/s2")
     assert Record.from_obspy(trace(masked), "m/s2", gaps="linear").times.size == 1000
     with pytest.raises(InputError, match="whole numbers, counts of a digitizer"):

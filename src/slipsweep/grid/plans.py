@@ -284,8 +284,9 @@ def motion_coordinates(motion: Record | Suite, coords: Mapping[str, xr.Variable]
     if motion.has_pairs:
         azimuth, places = coords["azimuth"], xr.Variable(("motion",), np.arange(len(motion)))
         sizes = grid_sizes({"azimuth": azimuth, "motion": places})
-        values = aligned({"azimuth": azimuth}, sizes)["azimuth"]
-        for name, one in motion.intensities(np.broadcast_to(values, tuple(sizes.values()))).items():
+        both = aligned({"motion": places, "azimuth": azimuth}, sizes)
+        at = np.broadcast_arrays(both["motion"], both["azimuth"], np.empty(tuple(sizes.values())))
+        for name, one in motion.intensities(at[0], at[1]).items():
             found[name] = xr.Variable(tuple(sizes), one, MOTION_COORDINATES[name])
     return found
 

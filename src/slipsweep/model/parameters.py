@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Set
+from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
@@ -102,8 +102,11 @@ def shown(value: Any) -> str:
     """A value as an error shows it: one line, and not a long one."""
     import numpy as np
 
-    with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
-        text = " ".join(repr(value).split())
+    try:
+        with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
+            text = " ".join(repr(value).split())
+    except ValueError:  # Python writes no integer of thousands of digits
+        return "an integer of thousands of digits"
     return text if len(text) <= 160 else f"{text[:157]}..."
 
 
@@ -117,8 +120,6 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     """
     import numpy as np
 
-    if type(values) is float:  # as most are, and none needs what follows
-        return np.asarray(values)
     array: Any = computed(values)
     among = array if isinstance(array, (list, tuple)) else [array]
     masked = sum(int(np.ma.count_masked(one)) for one in among if isinstance(one, np.ma.MaskedArray))
@@ -266,29 +267,24 @@ def check_list(key: str, values: Any, what: str) -> list[Any]:
     raise InputError(f"{key} = {shown(values)}: must be a list of {what}")
 
 
-def check_progress(progress: Any) -> Callable[[int], None] | None:
-    """Return what is to be told of progress, if it can be called."""
+def check_progress(progress: Any) -> Any:
+    """Return the function that is called with numbers of cells as they are solved, if there is one."""
     if progress is not None and not callable(progress):
         raise InputError(f"progress = {shown(progress)}: must be a function of a number of cells")
-    told: Callable[[int], None] | None = progress
-    return told
+    return progress
 
 
 def check_whole(name: str, value: Any, least: int, most: int | None = None, multiple_of: int = 1) -> int:
     """Return `value` as an int if it is a whole number from `least` to `most`, and a multiple of `multiple_of`."""
     kind = "a whole number" if multiple_of == 1 else f"a multiple of {multiple_of}"
-    if isinstance(value, int) and not isinstance(value, bool):
-        whole = value  # which may have more digits than a double
-    else:
-        try:
-            number = check_finite(name, value)
-        except InputError:
-            number = math.nan
-        if not number.is_integer():
-            raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
-        whole = int(number)
-    if whole < least or whole % multiple_of:
+    # an integer may have more digits than a double
+    is_integer = isinstance(value, int) and not isinstance(value, bool)
+    try:
+        number = value if is_integer else check_finite(name, value)
+    except InputError:
+        number = math.nan
+    if not number >= least or number % multiple_of or number % 1:
         raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
-    if most is not None and whole > most:
+    if most is not None and number > most:
         raise InputError(f"{name} = {shown(value)}: must be {kind} <= {most}")
-    return whole
+    return int(number)

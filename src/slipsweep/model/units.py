@@ -19,6 +19,7 @@ _OWN_UNITS = {
 
 #: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
 _FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
+_LONGEST = 60
 _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
 
 
@@ -42,7 +43,7 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
     refusal = InputError(f"{key} = {show(units)}: must be a unit that converts to {own}")
     # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
     text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
-    if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
+    if own == "1" or len(text) > _LONGEST or not _UNIT_GRAMMAR.fullmatch(text):
         raise refusal
 
     import pint  # only here: it takes 0.2 s to import
@@ -64,23 +65,9 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
 
 
 def quantity(key: str, text: str, parameter: str, g: float) -> float:
-    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit.
+    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit (InputError: it is none).
 
-    Parameters
-    ----------
-    key : str
-        What to call it in errors.
-    text : str
-        A number and, unless it is in the parameter's own unit, a unit as in the axes of sweep files.
-    parameter : str
-        A parameter (`slipsweep.model.variables.PARAMETERS`) of the same unit.
-    g : float
-        What "g" as a unit of acceleration stands for, m/s².
-
-    Raises
-    ------
-    InputError
-        It is not a number, or its unit does not convert.
+    `key` is what it is called in errors, `g` what "g" as a unit of acceleration stands for, m/s².
     """
     return quantity_in(key, text, PARAMETERS[parameter]["units"], g)
 
@@ -99,5 +86,8 @@ def quantity_in(key: str, text: str, own: str, g: float) -> float:
 
 def show(value: object) -> str:
     """Write a value as TOML would, on one line of bearable length."""
-    text = json.dumps(value, ensure_ascii=False, default=str)
+    try:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except ValueError:  # Python writes no integer of thousands of digits
+        return "an integer of thousands of digits"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -55,7 +55,8 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     missing = _is_fill(values)
     findings = []
     if missing.any():
-        first, shown = times[missing][0], ", ".join(f"{value:g}" for value in np.unique(values[missing])[:3])
+        first, kinds = times[missing][0], np.unique(values[missing])[:3]
+        shown = ", ".join("blank" if np.isnan(value) else f"{value:g}" for value in kinds)
         count = f"{missing.sum()} fill value{'s' if missing.sum() > 1 else ''}"
         findings.append(f"{count} ({shown}), first at t = {first:.6g} s")
     intervals = np.diff(times)

@@ -248,15 +248,15 @@ class Suite:
             ),
         }
         if not self.has_pairs:
-            found |= self.intensities(np.zeros(len(self)))
+            found |= self.intensities(np.arange(len(self)), np.zeros(len(self)))
         return {name: found[name] for name in MOTION_COORDINATES if name in found}
 
-    def intensities(self, azimuth: Floats) -> dict[str, Floats]:
-        """Intensity measures of every motion (along the last dimension) at its azimuths."""
-        found = {f"motion_{name}": np.empty(azimuth.shape) for name in INTENSITY_MEASURES}
-        for place in np.ndindex(azimuth.shape):
-            for name, value in intensity_measures(self.record(place[-1], float(azimuth[place]))).items():
-                found[f"motion_{name}"][place] = value
+    def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
+        """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
+        found = {f"motion_{name}": np.empty(azimuths.shape) for name in INTENSITY_MEASURES}
+        for cell in np.ndindex(azimuths.shape):
+            for name, value in intensity_measures(self.record(int(places[cell]), float(azimuths[cell]))).items():
+                found[f"motion_{name}"][cell] = value
         return found
 
     def record(self, at: int, azimuth: float) -> Record:
