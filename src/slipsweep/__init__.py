@@ -20,11 +20,11 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.model.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
+    from slipsweep.files.opening import open_result
     from slipsweep.model.options import Cycle, Mendez, Newmark, Step
     from slipsweep.motion.records import Record, read_record
     from slipsweep.motion.suites import Pair, Suite, read_suite
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
-    from slipsweep.runs.opening import open_result
     from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
     from slipsweep.studies.hazard import HazardCurve
@@ -76,7 +76,7 @@ _LAZY = {
         ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
     ),
     "flags": "slipsweep.studies.decoding",
-    "open_result": "slipsweep.runs.opening",
+    "open_result": "slipsweep.files.opening",
     "HazardCurve": "slipsweep.studies.hazard",
     **dict.fromkeys(("displacement_hazard", "suite_statistics"), "slipsweep.studies.suite_datasets"),
     **dict.fromkeys(("calibrate", "measured_friction"), "slipsweep.studies.shaking_tests"),

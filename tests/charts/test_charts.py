@@ -27,12 +27,10 @@ from slipsweep.errors import InputError
 from slipsweep.explore.excerpt import read_excerpt
 from slipsweep.explore.page import cell_arrays, page
 from slipsweep.files import spec
+from slipsweep.files import storing as store
+from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import NOTES
-from slipsweep.runs import store
-from slipsweep.runs.jobs import sweep_job
 from tests.support.commands import command
-
-pytestmark = pytest.mark.usefixtures("tried_here")
 
 SWEEP = """
 [axes.theta]

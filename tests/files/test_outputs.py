@@ -16,8 +16,6 @@ from slipsweep.files import outputs
 from tests.support.commands import command as run
 from tests.support.processes import slipsweep
 
-pytestmark = pytest.mark.usefixtures("tried_here")
-
 CELL = "".join(
     f"[axes.{name}]\nvalues = {values}\n"
     for name, values in (("theta", [0, 5]), ("mu_s", [0.4]), ("amplitude", [3, 6]), ("frequency", [1, 2]))

@@ -10,7 +10,39 @@ from slipsweep import Cycle, Mendez, Newmark, Sine, Step
 from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.model import variables
-from tests.support.sweep_files import CASES, GOOD
+
+GOOD = """
+[axes.theta]
+start = 0
+stop = 20
+num = 5
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.amplitude]
+start = 0.1
+stop = 1
+num = 4
+units = "g"
+[axes.frequency]
+start = 0.1
+stop = 10
+num = 3
+spacing = "log"
+"""
+
+CASES = """
+[[cases]]
+label = "first"
+theta = 5
+amplitude = 3
+[[cases]]
+theta = 6
+amplitude = 5
+[axes.mu_s]
+values = [0.3, 0.5, 0.7]
+[axes.frequency]
+values = [1, 2]
+"""
 
 MU_S = "[axes.mu_s]\nvalues = [0.3, 0.5]"
 FREQUENCY = '[axes.frequency]\nstart = 0.1\nstop = 10\nnum = 3\nspacing = "log"'

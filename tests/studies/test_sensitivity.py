@@ -11,7 +11,8 @@ from scipy import stats
 import slipsweep
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.files.results import read_contents
+from slipsweep.files.contents import tally_in
+from slipsweep.files.opening import read_result
 from slipsweep.model.variables import SensitivityStatus
 from slipsweep.studies.sampling import MOST_SAMPLES, Sampling, check_sampling
 from slipsweep.studies.sensitivity import RESAMPLES, Sensitivity
@@ -366,7 +367,7 @@ def test_info_counts_what_other_programs_have_turned_about(tmp_path: Path, resul
         changed = file.load().transpose(..., "input", "theta")
         changed.attrs.pop("slipsweep_run")
         changed.to_netcdf(tmp_path / "b.nc")
-    ours, theirs = read_contents(result).tally, read_contents(tmp_path / "b.nc").tally
+    ours, theirs = tally_in(read_result(result)), tally_in(read_result(tmp_path / "b.nc"))
     assert ours is not None
     assert theirs is not None
     assert ours.indices is not None

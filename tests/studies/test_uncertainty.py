@@ -19,9 +19,9 @@ from slipsweep.charts.style import Look
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
+from slipsweep.files import storing as store
+from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import DRAWN, RECORD_INPUTS, WAVEFORM_INPUTS, Validity
-from slipsweep.runs import store
-from slipsweep.runs.jobs import sweep_job
 from slipsweep.studies.sampling import check_sampling
 from tests.support.commands import command
 

@@ -28,7 +28,6 @@ from slipsweep.cli import (
     run,
     simulate,
     streams,
-    verify,
 )
 from slipsweep.cli.help import WIDTH, Command, Group
 from slipsweep.cli.signals import Interrupted, interrupting
@@ -67,10 +66,9 @@ _COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
         (hazard.hazard, hazard.EXAMPLE),
     ],
     "Draw": [(chart.chart, chart.EXAMPLE), (report.report, report.EXAMPLE), (explore.explore, explore.EXAMPLE)],
-    "Read and check results": [
+    "Read results": [
         (info.info, info.EXAMPLE),
         (export.export, export.EXAMPLE),
-        (verify.verify, verify.EXAMPLE),
     ],
     "Tests on a shaking table": [
         (calibrate.friction, calibrate.FRICTION_EXAMPLE),

@@ -4,7 +4,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,10 +28,9 @@ from slipsweep.model.variables import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from slipsweep.files.zarr_store import Place
+    from slipsweep.files.jobs import Job
+    from slipsweep.files.storing import Place, Report
     from slipsweep.grid.tally import Indices, Tally
-    from slipsweep.runs.jobs import Job
-    from slipsweep.runs.store import Report
 
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
@@ -45,8 +44,6 @@ Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrit
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
 
 Resume = Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", "--resume")]
-Split = Annotated[bool, LARGE("Write a folder with a netCDF file for each chunk.", "--split")]
-Shared = Annotated[bool, LARGE("The workers of --scheduler write the output themselves.", "--shared")]
 Memory = Annotated[str | None, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", metavar="SIZE")]
 Workers = Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", metavar="N")]
 Scheduler = Annotated[str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")]
@@ -97,7 +94,7 @@ def _echo_indices(indices: "Indices") -> None:
 
 def place_of(text: str) -> "Place":
     """An output as typed: a path, or the address of a store."""
-    from slipsweep.files.zarr_store import is_address
+    from slipsweep.files.opening import is_address
 
     return text if is_address(text) else Path(text)
 
@@ -209,15 +206,11 @@ class Chunks:
 
     overwrite: bool
     resume: bool
-    split: bool
     memory: str | None
     workers: int | None
     scheduler: str | None
-    shared: bool = False
 
     def __post_init__(self) -> None:
-        if self.shared and self.scheduler is None:
-            raise InputError("--shared: is for the workers of --scheduler only")
         if self.resume and self.overwrite:
             raise InputError(
                 "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
@@ -228,33 +221,19 @@ class Chunks:
         others = {**asdict(self), "overwrite": None}
         return [f"--{name}" for name, value in others.items() if value not in (None, False)]
 
-    def run(self, job: "Job", path: "Path | str", quiet: bool, unit: str = "cells") -> "Report":
+    def run(self, job: "Job", path: "Place", quiet: bool, unit: str = "cells") -> "Report":
         """Solve and write what a command asks for."""
+        from slipsweep.files import storing
         from slipsweep.grid.resources import parse_size
-        from slipsweep.runs import solving, store
 
-        store.check_output(job, path, overwrite=self.overwrite or self.resume, split=self.split)
         memory = None if self.memory is None else parse_size("--memory", self.memory)
-        with ExitStack() as stack:
-            solved: solving.Solved = solving.solve_here
-            shared = None
-            if self.workers is not None or self.scheduler is not None:
-                from slipsweep.runs.cluster import cluster
-
-                solved = stack.enter_context(cluster(workers=self.workers, scheduler=self.scheduler))
-                shared = solving.cells_shared(job.plan, self.workers)
-            return store.run(
+        with progress_bar(job.plan.cells, quiet, unit) as progress:
+            return storing.run(
                 job,
                 path,
                 command=typed_command(),
                 overwrite=self.overwrite,
                 resume=self.resume,
-                split=self.split,
-                shared=self.workers is not None
-                or self.shared
-                or (self.scheduler is not None and isinstance(path, str)),
-                chunk_cells=None if memory is None else solving.cells_within(memory, job.plan, self.workers or 0),
-                shared_cells=shared,
-                progress=stack.enter_context(progress_bar(job.plan.cells, quiet, unit)),
-                solved=solved,
+                means=storing.Means(memory, self.workers, self.scheduler),
+                progress=progress,
             )

@@ -40,18 +40,23 @@ def hazard(
     paths = output or []
     for path in paths:
         check_ending(path, FIGURES)
-    from slipsweep.files import outputs, results
-    from slipsweep.files.cuts import stored_places
+    from slipsweep.files import outputs
+    from slipsweep.files.opening import read_result
+    from slipsweep.files.selection import places_at
 
     outputs.check_outputs(paths, overwrite, reads=[file, curve])
     from slipsweep.model.parameters import check_values
     from slipsweep.model.units import quantity
     from slipsweep.studies.hazard import hazard_table, read_hazard_curve
 
-    with results.result_file(file) as opened:
-        table = results.read_table(opened, ("permanent_displacement", "validity"))
-        axes = [dim for dim in table["permanent_displacement"].dims if dim not in ("amplitude", "motion")]
-        places = stored_places(opened, cuts(at), axes)
+    table = read_result(file)
+    names = ["permanent_displacement", "validity"]
+    for name in names:
+        if name not in table.data_vars:
+            raise InputError(f"{file}: {name}: not in this file, which has {', '.join(map(str, table.data_vars))}")
+    table = table[names].load()
+    axes = [str(dim) for dim in table["permanent_displacement"].dims if dim not in ("amplitude", "motion")]
+    places = places_at(table, file, cuts(at), axes)
     for name, found in places.items():
         if found.size > 1:
             raise InputError(f"{file}: --at {name}: {found.size} values; must be one")

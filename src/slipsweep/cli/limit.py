@@ -14,8 +14,6 @@ from slipsweep.cli.common import (
     Quiet,
     Resume,
     Scheduler,
-    Shared,
-    Split,
     Workers,
     check_ending,
     echo_found,
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from slipsweep.files.spec import SweepSpec
-    from slipsweep.files.zarr_store import Place
+    from slipsweep.files.storing import Place
 
 #: The group of options that only this command has.
 LIMIT = Panel("Limit")
@@ -61,23 +59,20 @@ def limit(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     resume: Resume = False,
-    split: Split = False,
     memory: Memory = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    shared: Shared = False,
 ) -> None:
     """Find the limiting PGA for a tolerable displacement.
 
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
-    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler, shared)
+    chunks = Chunks(overwrite, resume, memory, workers, scheduler)
     results: list[Place] = []
     figures: list[Path] = []
     for text in output or []:
         path = Path(text)
-        if not (split and not path.suffix):  # the folder of a split result needs no ending
-            check_ending(path, (".nc", ".zarr", *FIGURES))
+        check_ending(path, (".nc", ".zarr", *FIGURES))
         if path.suffix in FIGURES:
             figures.append(path)
         else:
@@ -86,7 +81,7 @@ def limit(
         raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
 
     from slipsweep.files import outputs, spec
-    from slipsweep.runs.jobs import limit_job
+    from slipsweep.files.jobs import limit_job
 
     if len(results) > 1:
         files = [one for one in results if isinstance(one, Path)]
@@ -96,14 +91,12 @@ def limit(
     outputs.check_outputs(figures, overwrite, reads=checked.files)
     job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
     if results:
-        from slipsweep.runs.stored import stored_table
+        from slipsweep.files.opening import read_result
 
         report = chunks.run(job, results[0], quiet)
         if report.found and not quiet:
             echo_found(report.path)
-        # all of it for a figure only
-        names = job.plan.names if figures else () if quiet else ("limit_amplitude", "limit_status")
-        table = stored_table(job.plan, report.path, report.chunk_cells, names)
+        table = read_result(report.path)
     else:
         with job.named(), progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)

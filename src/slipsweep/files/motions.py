@@ -71,12 +71,13 @@ def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     return found | {name: xr.Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
 
 
-def read_embedded(file: Any, path: Path) -> Record | Suite | None:
+def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
     """The motion that a file of results holds, if it holds one.
 
     Parameters
     ----------
-    file : ResultFile
+    file : Dataset
+        As `slipsweep.files.opening.read_result` gives it.
     path : Path
         What the file is called in errors.
 
@@ -87,7 +88,7 @@ def read_embedded(file: Any, path: Path) -> Record | Suite | None:
     """
     if any(name not in file for name in RECORD_SAMPLES):
         return None
-    times, acceleration = (file[name].read_floats({}) for name in RECORD_SAMPLES)
+    times, acceleration = (file[name].values.astype(np.float64) for name in RECORD_SAMPLES)
     about = {key: str(text) for key, text in file.attrs.items() if key == "baseline" or key.startswith("record")}
     name = about.get("record", str(path))
     try:
@@ -98,12 +99,12 @@ def read_embedded(file: Any, path: Path) -> Record | Suite | None:
         raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
 
 
-def _suite(file: Any, times: NDArray[Any], acceleration: NDArray[Any]) -> Suite:
-    counts = file[_COUNT].read_codes({}, -1)
+def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) -> Suite:
+    counts = file[_COUNT].values.astype(np.int64)
     columns: dict[str, list[str]] = {
-        key: [str(text) for text in file[one].read({}).data]
+        key: [str(text) for text in file[one].values]
         for key, one in ({"label": _LABEL} | _READING).items()
-        if one in file and file[one].is_text
+        if one in file and file[one].dtype.kind in "OU"
     }
     ends = np.cumsum(counts)
     whole = counts.ndim == 1 and counts.size and (counts > 0).all() and ends[-1] == times.size

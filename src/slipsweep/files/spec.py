@@ -23,7 +23,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from slipsweep.errors import InputError
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.outputs import Read
-from slipsweep.files.zarr_store import is_finished
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.model.choices import Family, declared
 from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
@@ -365,8 +364,8 @@ def load(path: str | Path) -> SweepSpec:
         the file, the key, its value and what is allowed.
     """
     path = Path(path)
-    if is_finished(path):
-        return replace(_load_result(path), files=(path, path / "zarr.json"))
+    if (path / "zarr.json").is_file():
+        return replace(_load_result(path), files=(path,))
     try:
         stream = is_stream(path)
         read: Read = 0 if path == _STANDARD_INPUT else path
@@ -398,9 +397,9 @@ def is_stream(path: Path) -> bool:
 
 
 def _load_result(path: Path) -> SweepSpec:
-    from slipsweep.files.results import result_file  # brings along the netCDF library
+    from slipsweep.files.opening import read_result
 
-    with result_file(path) as file:
+    with read_result(path) as file:
         attributes = file.attrs
         recorded = read_embedded(file, path)
     if "sweep" not in attributes:

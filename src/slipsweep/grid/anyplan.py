@@ -41,10 +41,6 @@ class AnyPlan(Protocol):
     def cell_memory(self) -> int:
         """Bytes for each cell of the grid that it takes beside them."""
 
-    @property
-    def is_ordinary(self) -> bool:
-        """Whether no result can be too large for double precision; else only solving can tell."""
-
     def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
 

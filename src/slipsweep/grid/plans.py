@@ -123,7 +123,7 @@ class Plan:
         Results in the order they are returned in.
     attrs : dict
         What the results say of themselves.
-    cost, together, memory, cell_memory, is_ordinary
+    cost, together, memory, cell_memory
         As in `anyplan.AnyPlan`.
     described : mapping of str to dict
         Attributes of the results.
@@ -138,7 +138,6 @@ class Plan:
     together: tuple[str, ...] = ()
     memory: int = 0
     cell_memory: int = 0
-    is_ordinary: bool = True
     described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: RESULTS | RECORD_RESULTS)
 
     def __post_init__(self) -> None:
@@ -158,9 +157,7 @@ class Plan:
 
     def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
         """Modes and flags in a chunk of results."""
-        tally = Tally()
-        tally.add(results)
-        return tally
+        return Tally.of(results)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
         """Compute everything at once; `progress` is told of cells as they are finished, from any thread.
@@ -341,16 +338,7 @@ def _plan_records(problem: Problem, coords: dict[str, xr.Variable], variables: A
         tasks.append(_factor_task(problem, inputs))
     motions = "suite of recorded motions" if is_suite else "recorded motion"
     attrs = about(f"Response of a rigid block to a {motions}", problem, coords)
-    return Plan(
-        sizes,
-        coords,
-        tuple(tasks),
-        wanted,
-        attrs,
-        cost,
-        memory=memory_of(problem),
-        is_ordinary=ordinary(problem, coords),
-    )
+    return Plan(sizes, coords, tuple(tasks), wanted, attrs, cost, memory=memory_of(problem))
 
 
 def _factor_task(problem: Problem, inputs: Mapping[str, xr.Variable]) -> Task:
@@ -412,7 +400,6 @@ def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: 
         tuple(name for name in wanted if any(name in task.names for task in tasks)),
         about("Permanent displacement of a rigid block, swept", problem, coords),
         cost,
-        is_ordinary=ordinary(problem, coords),
     )
 
 
@@ -461,7 +448,7 @@ def checked(parameters: Mapping[str, Any]) -> dict[str, xr.Variable]:
         if isinstance(given, (xr.Variable, xr.DataArray)):
             variable = xr.Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
             if len(set(given.dims)) < len(given.dims):
-                raise InputError(f"{name}: dimensions {', '.join(given.dims)}: must be named each once")
+                raise InputError(f"{name}: dimensions {', '.join(map(str, given.dims))}: must be named each once")
         else:
             values = check_values(name, given)
             if values.ndim > 1:
@@ -509,7 +496,7 @@ def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
     """Dimensions of the grid in the order of the results, and their lengths."""
     sizes: dict[str, int] = {}
     for name, variable in variables.items():
-        for dim, size in variable.sizes.items():
+        for dim, size in zip(map(str, variable.dims), variable.shape, strict=True):
             if sizes.setdefault(dim, size) != size:
                 raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
     ordered = [dim for dim in DIMENSION_ORDER if dim in sizes] + [dim for dim in sizes if dim not in DIMENSION_ORDER]
@@ -535,12 +522,6 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
             raise InputError(f"{drive} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
     sizes = grid_sizes(own)
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
-
-
-def ordinary(problem: Problem, coords: Mapping[str, xr.Variable]) -> bool:
-    """Whether no result can be too large for double precision."""
-    own = {name: one for name, one in coords.items() if name not in ("motion", *MOTION_COORDINATES)}
-    return engine.are_ordinary(problem, {name: one.values for name, one in own.items()})
 
 
 def memory_of(problem: Problem) -> int:

@@ -23,7 +23,7 @@ from slipsweep.jit.garbage import no_collections
 PACKAGE = Path(__file__).parents[1]
 
 #: How the sources begin that results come from, or are written by, and those that machine code comes from.
-RESULTS: tuple[str, ...] = ("files/spec.py", "files/checksums.py", "files/netcdf.py", "files/zarr_store.py")
+RESULTS: tuple[str, ...] = ("files/spec.py", "files/netcdf.py")
 MACHINE_CODE = "kernels/"
 
 #: Where statements lie in other statements.

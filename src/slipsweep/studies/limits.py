@@ -22,7 +22,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Problem, Request
-from slipsweep.grid.plans import Plan, ordinary, plan_sweep
+from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (
@@ -126,7 +126,6 @@ def plan_limits(
         memory=plan.memory,
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
-        is_ordinary=ordinary(task.problem, {**coords, "amplitude": xr.Variable((), np.array(highest))}),
         described=RESULTS | RECORD_COUNTS | LIMIT_RESULTS,
     )
 

@@ -245,19 +245,6 @@ class SamplePlan:
         return max(_CELLS // self._runs(study), 1)
 
     @property
-    def is_ordinary(self) -> bool:
-        """Whether no statistic can be too large for double precision."""
-        return all(map(self._is_ordinary, self.studies))
-
-    def _is_ordinary(self, study: Study) -> bool:
-        given = {name: one.values for name, one in inputs_of(self.problem, self.coords).items()}
-        for name, one in self.sampling.distributions.items():
-            base = given.get(name, np.ones(1)).reshape(-1, 1)
-            ends = np.array([[base.min()], [base.max()]])
-            given[name] = one.applied(ends, study.draws[name])
-        return engine.are_ordinary(self.problem, given)
-
-    @property
     def cost(self) -> float:
         """What a grid point takes, in cells of the cycle solver."""
         cells = sum(cost_of(self.problem) * self._runs(study) + study.work for study in self.studies)
