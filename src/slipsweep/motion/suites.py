@@ -165,14 +165,14 @@ class Suite:
             raise InputError("motions = []: must hold one motion at least")
         if len({type(motion) for motion in motions}) > 1:
             raise InputError("motions: must be all Records, or all Pairs")
-        labels = tuple(check_list("labels", self.labels, "texts")) or _labels([_path_of(one) for one in motions])
+        labels = tuple(check_list("labels", self.labels, "texts")) or _labels(
+            [Path(_parts(one)[0].name) for one in motions]
+        )
         for label in labels:
             if not isinstance(label, str) or not label.strip() or not label.isprintable():
                 raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
-        twice = [label for label, count in Counter(labels).items() if count > 1]
-        if twice or len(labels) != len(motions):
-            wrong = f"{shown(twice[0])} is there twice" if twice else f"{len(labels)} for {len(motions)} motions"
-            raise InputError(f"labels: {wrong}: must be one for each motion, and all different")
+        if len(labels) != len(motions) or len({*labels}) < len(labels):
+            raise InputError(f"labels = {shown(labels)}: must be one for each of {len(motions)}, and all different")
         if not isinstance(self.name, str):
             raise InputError(f"name = {shown(self.name)}: must be a text")
         object.__setattr__(self, "motions", motions)
@@ -201,18 +201,13 @@ class Suite:
 
     def index(self, label: str) -> int:
         """The place of a motion (InputError: there is none of that label)."""
-        try:
-            return self._places[label]
-        except KeyError:
-            raise InputError(f"motion = {shown(label)}: not in the suite; {did_you_mean(label, self.labels)}") from None
+        if label not in self.labels:
+            raise InputError(f"motion = {shown(label)}: not in the suite; {did_you_mean(label, self.labels)}")
+        return self.labels.index(label)
 
     def only(self, labels: Sequence[str]) -> "Suite":
         """The suite of some of the motions."""
         return Suite(tuple(self.motions[self.index(label)] for label in labels), tuple(labels), self.name)
-
-    @cached_property
-    def _places(self) -> dict[str, int]:
-        return {label: at for at, label in enumerate(self.labels)}
 
     @property
     def has_pairs(self) -> bool:
@@ -222,17 +217,14 @@ class Suite:
     @property
     def components(self) -> tuple[Record, ...]:
         """All records: the motions, or the components of one after the other."""
-        return tuple(
-            one for motion in self for one in ((motion.first, motion.second) if isinstance(motion, Pair) else (motion,))
-        )
+        return tuple(part for motion in self for part in _parts(motion))
 
     @cached_property
     def duplicates(self) -> tuple[tuple[str, ...], ...]:
         """Labels of motions that have the same samples, such as one file under two names."""
         alike: dict[bytes, list[str]] = {}
         for label, motion in zip(self.labels, self, strict=True):
-            own = (motion.first, motion.second) if isinstance(motion, Pair) else (motion,)
-            samples = b"".join(part.acceleration.tobytes() + part.times.tobytes() for part in own)
+            samples = b"".join(part.acceleration.tobytes() + part.times.tobytes() for part in _parts(motion))
             alike.setdefault(samples, []).append(label)
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
@@ -365,13 +357,13 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         raise _unreadable(reasons, len(files))
     motions, stems = [], []
     for source in sources:
-        parts = [records[part] if isinstance(part, Path) else part for part in _parts(source)]
-        motions.append(Pair(*parts) if isinstance(source, tuple) else parts[0])
-        first = _parts(source)[0]
-        stem = first if isinstance(first, Path) else _path_of(first)
+        first, *second = _parts(source)
+        stem = first if isinstance(first, Path) else Path(first.name)
         if pairs is not None:
             stem = stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem)
         stems.append(stem)
+        record = records.get(first, first)
+        motions.append(Pair(record, records.get(second[0], second[0])) if second else record)
     entries = paths if isinstance(paths, (list, tuple)) else [paths]
     name = ", ".join(map(str, entries)) if all(isinstance(one, (str, Path)) for one in entries) else ""
     return Suite(tuple(motions), _labels(stems), _printable(name) if 0 < len(name) <= _LONGEST_NAME else "suite")
@@ -381,7 +373,9 @@ _Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, Path | Record]
 
 
 def _parts(source: _Source) -> tuple[Any, ...]:
-    """A source, or the two of a pair."""
+    """The two components of a pair, or what is none."""
+    if isinstance(source, Pair):
+        return source.first, source.second
     return source if isinstance(source, tuple) else (source,)
 
 
@@ -435,19 +429,18 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]
     endings = check_list("pairs", endings, "two endings of names, such as ('_NS', '_EW')")
     if len(set(map(str, endings))) != 2 or not all(isinstance(one, str) and one for one in endings):
         raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
-    components: dict[Path, dict[str, Path]] = {}
-    single: list[_Source] = []
-    for one in sources:
-        ending = next((end for end in endings if isinstance(one, Path) and one.stem.endswith(end)), None)
-        if isinstance(one, Path) and ending is not None:
-            components.setdefault(one.with_name(one.stem.removesuffix(ending) + one.suffix), {})[ending] = one
-        else:
-            single.append(one)
-    single += [one for both in components.values() if len(both) < 2 for one in both.values()]
-    if single:
-        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in single)
+    first, second = endings
+    pairs = {
+        one: one.with_name(one.stem.removesuffix(first) + second + one.suffix)
+        for one in sources
+        if isinstance(one, Path) and one.stem.endswith(first)
+    }
+    incomplete = [one for one in sources if one not in pairs and one not in pairs.values()]
+    incomplete += [one for one, other in pairs.items() if other not in sources]
+    if incomplete:
+        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in incomplete)
         raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
-    return [(both[endings[0]], both[endings[1]]) for both in components.values()]
+    return list(pairs.items())
 
 
 def _unreadable(reasons: Mapping[Path, str], count: int) -> InputError:
@@ -463,27 +456,19 @@ def _unreadable(reasons: Mapping[Path, str], count: int) -> InputError:
 
 def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
     """The stems of files; more of the path of those whose stems are alike, and a number where that does not help."""
-    stems = Counter(path.stem for path in paths)
-    ways = Counter(path.as_posix() for path in paths)
+    stems, ways = Counter(path.stem for path in paths), Counter(paths)
     levels = zip(*(path.parent.parts for path in paths), strict=False)
     shared = len(list(takewhile(lambda parts: len({*parts}) == 1, levels)))
     labels: list[str] = []
-    taken = {path.stem for path in paths if stems[path.stem] == 1}
     for path in paths:
-        is_single = stems[path.stem] == 1
-        label = path.stem if is_single or ways[path.as_posix()] > 1 else "/".join(path.parts[shared:])
-        label = unique = _printable(label).strip() or "motion"
+        needs_path = stems[path.stem] > 1 and ways[path] == 1
+        label = unique = _printable("/".join(path.parts[shared:]) if needs_path else path.stem).strip() or "motion"
         number = 1
-        while unique in labels or (not is_single and unique in taken):
+        while unique in labels:
             number += 1
             unique = f"{label} ({number})"
         labels.append(unique)
     return tuple(labels)
-
-
-def _path_of(motion: Motion) -> Path:
-    """The file that a motion may have been read from, a pair's first component: its name."""
-    return Path((motion.first if isinstance(motion, Pair) else motion).name)
 
 
 def _printable(text: str) -> str:
