@@ -31,26 +31,12 @@ _DRIFT, _DRIFT_VELOCITY, _LARGEST_DISPLACEMENT = 2.0, 0.05, 10.0
 
 
 def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> tuple[Floats, Floats, str]:
-    """Times and values of a record without those that stand for missing samples.
-
-    Parameters
-    ----------
-    name : str
-        The file, for the error.
-    times, values : ndarray
-        Times (s) and accelerations in any unit; NaN is a missing sample.
-    gaps : {"refuse", "linear"}
-
-    Returns
-    -------
-    times, values : ndarray
-    found : str
-        What is missing, in words; empty if nothing is.
+    """Times (s) and values, in any unit, without those that stand for missing samples; and what is missing, in words.
 
     Raises
     ------
     InputError
-        Something is missing, and is to be refused.
+        Something is missing, and `gaps` is not "linear": with the time and the value.
     """
     missing = _is_fill(values)
     findings = []
@@ -80,22 +66,14 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
 
 
 def check_plausible(record: Motion, unit: str, implausible: str, has_gaps: bool) -> str:
-    """What no ground does, in words; empty if the record is plausible.
+    """What no ground does, in words; empty if the record, read in `unit`, is plausible.
 
-    Parameters
-    ----------
-    record : Motion
-        With its baseline taken off.
-    unit : str
-        The unit that the file was read in.
-    implausible : {"refuse", "accept"}
-    has_gaps : bool
-        Whether missing samples were interpolated: a drift is then theirs, and told, but not refused.
+    A drift behind samples that were interpolated (`has_gaps`) is theirs: told, but not refused.
 
     Raises
     ------
     InputError
-        Something is implausible, and is to be refused.
+        Something is implausible, and `implausible` is not "accept": with the time and the value.
     """
     peak, drift = _odd_peak(record, unit), _drift(record)
     found = "; ".join(text for text in (peak, drift) if text)

@@ -14,7 +14,7 @@ from slipsweep.model.parameters import check_choice, check_numbers, check_single
 from slipsweep.motion.formats import read_lines, read_samples
 from slipsweep.motion.inspection import check_plausible, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Reading
+from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
 Floats = NDArray[np.float64]
 
@@ -107,34 +107,17 @@ class Record:
     def from_obspy(
         cls,
         trace: Any,
-        units: str,
+        units: Unit,
         *,
         name: str | None = None,
-        baseline: str = "none",
-        gaps: str = "refuse",
-        implausible: str = "refuse",
+        baseline: Baseline = "none",
+        gaps: Gaps = "refuse",
+        implausible: Implausible = "refuse",
     ) -> "Record":
-        """The record in a trace of ObsPy, which reads miniSEED, SAC, K-NET and some forty other formats.
+        """The record in a trace of ObsPy, which reads miniSEED, SAC and some forty other formats.
 
-        Parameters
-        ----------
-        trace : obspy.Trace
-            With its acceleration, not counts, in `data`; masked samples are missing.
-        units : {"m/s2", "g", "cm/s2", "gal"}
-            Unit of its data.
-        name : str, optional
-            What the record is called; by default the trace's `id`.
-        baseline, gaps, implausible : str
-            As `read_record`.
-
-        Returns
-        -------
-        Record
-
-        Raises
-        ------
-        InputError
-            It is no trace, its data are whole numbers, which are counts of a digitizer, or as `read_record`.
+        `units` is that of the trace's data, which must be accelerations, not counts; masked samples are missing.
+        The record's name is by default the trace's `id`.  The other arguments, and InputError, are as `read_record`.
 
         Examples
         --------
@@ -150,7 +133,7 @@ class Record:
             data, interval, own = trace.data, check_single("interval", trace.stats.delta), str(trace.id)
         except AttributeError:
             raise InputError(f"trace = {shown(trace)}: must be a Trace of ObsPy, one of those in a Stream") from None
-        reading = Reading(units=units, baseline=baseline, gaps=gaps, implausible=implausible)  # type: ignore[arg-type]
+        reading = Reading(units=units, baseline=baseline, gaps=gaps, implausible=implausible)
         if reading.units is None:
             raise InputError(f"units = None: must be one of {', '.join(map(repr, UNITS))}")
         if np.asarray(data).dtype.kind in "iu":
@@ -209,12 +192,12 @@ def check_increasing(name: str, times: Floats) -> None:
 def read_record(
     path: str | Path,
     *,
-    units: str | None = None,
+    units: Unit | None = None,
     interval: float | None = None,
-    baseline: str = "none",
-    gaps: str = "refuse",
-    implausible: str = "refuse",
-    format: str = "auto",
+    baseline: Baseline = "none",
+    gaps: Gaps = "refuse",
+    implausible: Implausible = "refuse",
+    format: Format = "auto",
     channel: int | None = None,
 ) -> Record:
     """Read a recorded acceleration from a file.
@@ -271,14 +254,9 @@ def read_record(
     except TypeError:
         raise InputError(f"path = {shown(path)}: must be a path") from None
     reading = Reading(
-        units=units,  # type: ignore[arg-type]
-        interval=interval,
-        baseline=baseline,  # type: ignore[arg-type]
-        gaps=gaps,  # type: ignore[arg-type]
-        implausible=implausible,  # type: ignore[arg-type]
-        format=format,  # type: ignore[arg-type]
+        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
         channel=channel,
-    )
+    )  # fmt: skip
     return record_of(path, reading)
 
 
@@ -296,7 +274,7 @@ def record_of(path: Path, reading: Reading) -> Record:
             f"{path}: units: must be given, one of {', '.join(map(repr, UNITS))}: the file does not name the unit"
         )
     attrs = {
-        "record": path.name.encode(errors="backslashreplace").decode(),
+        "record": path.name,
         "record_format": kind,
         "record_units": unit,
         **({} if reading.channel is None else {"record_channel": str(reading.channel)}),

@@ -3,7 +3,7 @@
 import glob
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import takewhile
@@ -18,13 +18,10 @@ from slipsweep.model.parameters import check_list, check_single, shown
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import INTENSITY_MEASURES, MOTION_COORDINATES
 from slipsweep.motion.intensity import intensity_measures
-from slipsweep.motion.reading import Reading
+from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.records import Record, record_of
 
 Floats = NDArray[np.float64]
-
-#: Files whose damage is told with its reason; of all others there is the name.
-_MOST_REASONS = 20
 
 #: Letters of what a suite may be called after the entries that name its files.
 _LONGEST_NAME = 120
@@ -283,12 +280,12 @@ def read_suite(
     paths: Any,
     *,
     pairs: Sequence[str] | None = None,
-    units: str | None = None,
+    units: Unit | None = None,
     interval: float | None = None,
-    baseline: str = "none",
-    gaps: str = "refuse",
-    implausible: str = "refuse",
-    format: str = "auto",
+    baseline: Baseline = "none",
+    gaps: Gaps = "refuse",
+    implausible: Implausible = "refuse",
+    format: Format = "auto",
     channel: int | None = None,
 ) -> Suite:
     """Read a suite of recorded motions.
@@ -330,14 +327,9 @@ def read_suite(
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
     reading = Reading(
-        units=units,  # type: ignore[arg-type]
-        interval=interval,
-        baseline=baseline,  # type: ignore[arg-type]
-        gaps=gaps,  # type: ignore[arg-type]
-        implausible=implausible,  # type: ignore[arg-type]
-        format=format,  # type: ignore[arg-type]
+        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
         channel=channel,
-    )
+    )  # fmt: skip
     return suite_in(Path(), paths, pairs, reading)
 
 
@@ -354,7 +346,11 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         except InputError as error:
             reasons[file] = str(error).removeprefix(f"{file}: ")
     if reasons:
-        raise _unreadable(reasons, len(files))
+        names = ", ".join(file.name for file in reasons)
+        refused = InputError(f"{len(reasons)} of {len(files)} files cannot be read: {names}")
+        for file, reason in reasons.items():
+            refused.add_note(f"{file}: {reason}")
+        raise refused
     motions, stems = [], []
     for source in sources:
         first, *second = _parts(source)
@@ -366,7 +362,7 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         motions.append(Pair(record, records.get(second[0], second[0])) if second else record)
     entries = paths if isinstance(paths, (list, tuple)) else [paths]
     name = ", ".join(map(str, entries)) if all(isinstance(one, (str, Path)) for one in entries) else ""
-    return Suite(tuple(motions), _labels(stems), _printable(name) if 0 < len(name) <= _LONGEST_NAME else "suite")
+    return Suite(tuple(motions), _labels(stems), name if 0 < len(name) <= _LONGEST_NAME else "suite")
 
 
 _Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, Path | Record]
@@ -407,7 +403,7 @@ def _sources(given: Any, folder: Path) -> list[_Source]:
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
     """The files that an entry names."""
-    text = _printable(str(entry))
+    text = str(entry)
     if not text.strip():
         raise InputError(f"paths: {shown(entry)}: must be a file, a folder or a pattern")
     path = folder / entry
@@ -438,20 +434,9 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]
     incomplete = [one for one in sources if one not in pairs and one not in pairs.values()]
     incomplete += [one for one, other in pairs.items() if other not in sources]
     if incomplete:
-        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in incomplete)
+        names = ", ".join((one.name if isinstance(one, (Path, Record)) else shown(one)) for one in incomplete)
         raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
     return list(pairs.items())
-
-
-def _unreadable(reasons: Mapping[Path, str], count: int) -> InputError:
-    """One error for all files that cannot be read: their names, and what is wrong with each as its notes."""
-    names = ", ".join(_printable(path.name) for path in reasons)
-    error = InputError(f"{len(reasons)} of {count} files cannot be read: {names}")
-    for path, reason in list(reasons.items())[:_MOST_REASONS]:
-        error.add_note(f"{_printable(str(path))}: {reason}")
-    if len(reasons) > _MOST_REASONS:
-        error.add_note(f"... and {len(reasons) - _MOST_REASONS} more")
-    return error
 
 
 def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
@@ -462,16 +447,10 @@ def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
     labels: list[str] = []
     for path in paths:
         needs_path = stems[path.stem] > 1 and ways[path] == 1
-        label = unique = _printable("/".join(path.parts[shared:]) if needs_path else path.stem).strip() or "motion"
+        label = unique = "/".join(path.parts[shared:]) if needs_path else path.stem.strip() or "motion"
         number = 1
         while unique in labels:
             number += 1
             unique = f"{label} ({number})"
         labels.append(unique)
     return tuple(labels)
-
-
-def _printable(text: str) -> str:
-    """A name as it can be printed, and written as UTF-8."""
-    text = text.encode(errors="backslashreplace").decode()
-    return text if text.isprintable() else repr(text)[1:-1]
