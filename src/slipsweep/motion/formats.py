@@ -14,7 +14,7 @@
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -173,54 +173,60 @@ def _interval_in(header: str) -> float | None:
 
 
 def _read_at2(path: Path, lines: list[str]) -> Samples:
-    at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), None)
-    if at is None:
-        raise InputError(f"{path}: no NPTS and DT in its first lines: not a PEER AT2 file")
-    points = re.search(r"NPTS\s*=\s*(\d{1,9})\b", lines[at], re.IGNORECASE)
-    interval = re.search(rf"DT\s*=\s*({_NUMBER})", lines[at], re.IGNORECASE)
-    # files of the first database: "4096  0.0100  NPTS, DT"
-    before = re.match(rf"\s*(\d{{1,9}})\s+({_NUMBER})\s+NPTS,\s*DT", lines[at], re.IGNORECASE)
-    if not before and not (points and interval):
-        raise InputError(f"{path}: line {at + 1}: {shown(lines[at])}: must give NPTS= and DT=")
-    count, step = before.groups() if before else (points[1], interval[1])  # type: ignore[index]
-    header = " ".join(lines[:at]).upper()
+    at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), 0)
+    header = "\n".join(lines[:at]).upper()
     if "VELOCITY" in header or "DISPLACEMENT" in header:
         raise InputError(f"{path}: its header speaks of velocity or displacement: must be an acceleration (.AT2)")
+    # in files of the first database "4096  0.0100  NPTS, DT"
+    before = re.match(rf"\s*(\d{{1,9}})\s+({_NUMBER})\s+NPTS,\s*DT", lines[at] if lines else "", re.IGNORECASE)
+    points, interval = (
+        before.groups()
+        if before
+        else (
+            _in_header(path, lines[at : at + 1], name, pattern)[0]
+            for name, pattern in (("NPTS=", r"NPTS\s*=\s*(\d{1,9})\b"), ("DT=", rf"DT\s*=\s*({_NUMBER})"))
+        )
+    )
     values = _numbers(path, enumerate(lines[at + 1 :], at + 2))
-    return Samples(_even(path, values, float(step), int(count)), values, "g")
+    return Samples(_even(path, values, float(interval), int(points)), values, "g")
 
 
 def _read_esm(path: Path, lines: list[str]) -> Samples:
     body = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
-    keys = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in lines[:body])}
-    for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", r"\d{1,9}"), ("UNITS", ".+")):
-        if not re.fullmatch(pattern, keys.get(name, ""), re.ASCII):
-            raise InputError(f"{path}: {name}: {shown(keys.get(name, ''))}: must be in the header of an ESM file")
-    unit = keys["UNITS"].lower().replace("^", "")
+    interval, points, unit = (
+        _in_header(path, lines[:body], name, rf"^{name}:\s*({pattern})\s*$")[0]
+        for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", r"\d{1,9}"), ("UNITS", r"\S+"))
+    )
+    unit = unit.lower().replace("^", "")
     if unit not in UNITS:
-        raise InputError(f"{path}: UNITS = {shown(keys['UNITS'])}: must be one of {', '.join(map(repr, UNITS))}")
+        raise InputError(f"{path}: UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
     values = _numbers(path, enumerate(lines[body:], body + 1))
-    return Samples(_even(path, values, float(keys["SAMPLING_INTERVAL_S"]), int(keys["NDATA"])), values, unit)
+    return Samples(_even(path, values, float(interval), int(points)), values, unit)
 
 
 def _read_knet(path: Path, lines: list[str]) -> Samples:
     memo = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
-    header = "\n".join(lines[:memo])
-    numbers = []
-    for name, pattern in (
-        ("Sampling Freq(Hz)", rf"\s*({_NUMBER})"),
-        ("Duration Time(s)", rf"\s*({_NUMBER})"),
-        ("Scale Factor", rf"\s*({_NUMBER})\(gal\)/({_NUMBER})"),
-    ):
-        found = re.search(f"^{re.escape(name)}{pattern}", header, re.MULTILINE | re.IGNORECASE)
-        if found is None:
-            raise InputError(f"{path}: no {name} before the line Memo.: not a K-NET file, or damaged")
-        numbers += [float(number) for number in found.groups()]
-    frequency, duration, full_scale, counts = numbers
+    frequency, duration, full_scale, counts = (
+        float(number)
+        for name, pattern in (
+            ("Sampling Freq(Hz)", rf"^Sampling Freq\(Hz\)\s*({_NUMBER})"),
+            ("Duration Time(s)", rf"^Duration Time\(s\)\s*({_NUMBER})"),
+            ("Scale Factor", rf"^Scale Factor\s*({_NUMBER})\(gal\)/({_NUMBER})"),
+        )
+        for number in _in_header(path, lines[:memo], name, pattern)
+    )
     if not (0.0 < frequency < 1e6 and 0.0 < counts < 1e100 and 0.0 < full_scale < 1e100):
         raise InputError(f"{path}: {frequency:g} Hz, {full_scale:g} gal, {counts:g} counts: must be > 0")
     values = _numbers(path, enumerate(lines[memo + 1 :], memo + 2)) * (full_scale / counts)
     return Samples(_even(path, values, 1.0 / frequency, round(min(duration * frequency, 1e9))), values, "gal")
+
+
+def _in_header(path: Path, header: list[str], name: str, pattern: str) -> tuple[str, ...]:
+    """What a pattern finds in a header (InputError: nothing)."""
+    found = re.search(pattern, "\n".join(header), re.MULTILINE | re.IGNORECASE | re.ASCII)
+    if found is None:
+        raise InputError(f"{path}: no {name} in its header, or none that can be read: another format, or damaged")
+    return found.groups()
 
 
 # ----------------------------------------------------------------------------------- COSMOS
@@ -233,43 +239,34 @@ _COSMOS_DATA = r"\s*(\d{1,9})\s+\w+.*?\bpts?\b.*Format\s*=?\s*\(\d*[IFEG](\d{1,3
 
 
 def _read_cosmos(path: Path, lines: list[str], channel: int | None) -> Samples:
-    channels = list(_cosmos_channels(path, lines))
+    starts = [at for at, line in enumerate(lines) if _COSMOS_HEAD.search(line)]
+    read = (_cosmos_channel(path, lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
+    channels = [one for one in read if one is not None]
     if channel is None and len(channels) > 1:
         raise InputError(f"{path}: holds {len(channels)} channels of acceleration: give channel, from 1 on")
-    if not channels or not 1 <= (channel or 1) <= len(channels):
+    if not 1 <= (channel or 1) <= len(channels):
         raise InputError(f"{path}: channel = {channel or 1}: it holds {len(channels)} channels of acceleration")
     return channels[(channel or 1) - 1]
 
 
-def _cosmos_channels(path: Path, lines: list[str]) -> Iterator[Samples]:
-    """Channels of acceleration in a file."""
-    at = 0
-    while at < len(lines):
-        head = _COSMOS_HEAD.search(lines[at])
-        if head is None:
-            if lines[at].strip():
-                raise InputError(f"{path}: line {at + 1}: {shown(lines[at])}: must begin a channel of COSMOS format")
-            at += 1
-            continue
-        start = at
-        at, whole = _cosmos_values(path, lines, at + int(head[1]), _COSMOS_HEADER % "Integer")
-        at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
-        if whole.size < 3 or reals.size < 62:
-            raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
-        at += 1 + int(_cosmos_line(path, lines, at, _COSMOS_COMMENTS)[1])
-        at, values = _cosmos_values(path, lines, at, _COSMOS_DATA)
-        # what a V2 file may have behind the acceleration is its velocity and displacement
-        while at < len(lines) and not lines[at].lstrip().lower().startswith("end-of-data"):
-            at += 1
-        if at == len(lines):
-            raise InputError(f"{path}: no line End-of-data after the values: cut off, or damaged")
-        at += 1
-        if whole[1] != 1:
-            continue
-        if whole[2] not in _COSMOS_UNITS:
-            known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
-            raise InputError(f"{path}: code {whole[2]:.0f} for the unit of its values: must be one of {known}")
-        yield Samples(_even(path, values, reals[61] / 1000.0), values, _COSMOS_UNITS[int(whole[2])])
+def _cosmos_channel(path: Path, lines: list[str], start: int) -> Samples | None:
+    """The channel that begins at a line and goes to the last one; None if it is no acceleration."""
+    head = _COSMOS_HEAD.search(lines[start])
+    at, whole = _cosmos_values(path, lines, start + int(head[1] if head else 0), _COSMOS_HEADER % "Integer")
+    at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
+    if whole.size < 3 or reals.size < 62:
+        raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
+    at += 1 + int(_cosmos_line(path, lines, at, _COSMOS_COMMENTS)[1])
+    at, values = _cosmos_values(path, lines, at, _COSMOS_DATA)
+    # what a V2 file may have behind the acceleration is its velocity and displacement
+    if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
+        raise InputError(f"{path}: no line End-of-data after the values: cut off, or damaged")
+    if whole[1] != 1:
+        return None
+    if whole[2] not in _COSMOS_UNITS:
+        known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
+        raise InputError(f"{path}: code {whole[2]:.0f} for the unit of its values: must be one of {known}")
+    return Samples(_even(path, values, reals[61] / 1000.0), values, _COSMOS_UNITS[int(whole[2])])
 
 
 def _cosmos_line(path: Path, lines: list[str], at: int, pattern: str) -> re.Match[str]:
