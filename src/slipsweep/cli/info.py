@@ -17,9 +17,11 @@ def info(
     """Show what a result holds, how it was made, and its shares of flags."""
     from slipsweep.files import contents
     from slipsweep.files.jobs import RUN
+    from slipsweep.files.motions import read_embedded
     from slipsweep.files.opening import read_result
     from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import size_text
+    from slipsweep.motion.records import Record
 
     table = read_result(file)
     _echo(f"{Path(file)}  {size_text(nbytes_of(place_of(file)))}")
@@ -30,6 +32,9 @@ def info(
         typer.echo(f"{title}:")
         for name, text in entries.items():
             _echo(f"  {name:<23} {text}")
+    recorded = read_embedded(table, Path(file))
+    if isinstance(recorded, Record):
+        _echo(f"record: {recorded.summary()}")
     motions = contents.motions_text(table)
     if motions:
         typer.echo("motions, as recorded:")

@@ -102,6 +102,8 @@ def run(
             typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{beside}")
             typer.echo(f"{report.tally.cells} samples solved in {took}")
     typer.echo(f"inputs: {about['friction_inputs']}")
+    if checked.recorded is not None:
+        typer.echo(checked.recorded.summary())
     if "duplicate_motions" in about:
         typer.echo(f"the same motion under several labels: {about['duplicate_motions']}")
     echo_tally(report.tally)

@@ -31,6 +31,7 @@ _READING = {
     "record_units": "record_units",
     "record_channel": "record_channel",
     "record_sha256": "record_sha256",
+    "record_accepted": "record_accepted",
     "baseline": "record_baseline",
 }
 
@@ -43,6 +44,7 @@ _ABOUT: dict[str, dict[str, Any]] = {
     "record_units": {"long_name": "unit of the file of a record"},
     "record_channel": {"long_name": "channel of the file of a record"},
     "record_sha256": {"long_name": "SHA-256 of the file of a record"},
+    "record_accepted": {"long_name": "what is missing or implausible in a record, and was accepted"},
     "record_baseline": {"long_name": "what was taken off a record"},
 }
 
