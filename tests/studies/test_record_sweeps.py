@@ -246,7 +246,7 @@ def test_other_commands_on_the_result(folder: Path) -> None:
     assert "96 cells (3 theta x 2 mu_s x 4 scale x 2 time_scale x 2 polarity)" in done.stdout
     told = command(folder, "info", folder / "a.nc").stdout
     assert "number of slips that begin at rest (int32)" in told
-    assert "recorded acceleration of the plane" in told
+    assert "recorded acceleration of the base" in told
     assert "statically_unstable" in told
     assert export.export(folder / "a.nc", folder / "a.csv") == 96
     header, first = (folder / "a.csv").read_text().splitlines()[:2]
