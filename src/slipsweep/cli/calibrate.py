@@ -14,11 +14,10 @@ from slipsweep.cli.common import (
     Quiet,
     Theta,
     check_ending,
-    examples,
     typed_command,
     write_figure,
 )
-from slipsweep.cli.help import Panel
+from slipsweep.cli.help import Panel, examples
 from slipsweep.cli.options import BLOCK, chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model

@@ -1,5 +1,6 @@
 """What several commands share: options, progress, the shares of modes and flags, the command as typed."""
 
+import io
 import shlex
 import sys
 import time
@@ -11,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.help import Panel
+from slipsweep.cli.help import Panel, printable
 from slipsweep.cli.options import BLOCK
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, RunError
 from slipsweep.model.variables import (
     FLAG_KIND_TEXT,
     PARAMETERS,
@@ -49,9 +50,9 @@ Workers = Annotated[int | None, LARGE("Solve on N processes of this machine (ext
 Scheduler = Annotated[str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")]
 
 
-def examples(*lines: str) -> str:
-    """Put commands under a command's `--help`, a line each."""
-    return "\n".join(("Examples:", *lines))
+def echo(text: object = "") -> None:
+    """Print a line; text that comes from a file sends no control sequences to the terminal."""
+    typer.echo("\n".join(map(printable, str(text).split("\n"))))
 
 
 def echo_tally(tally: "Tally") -> None:
@@ -108,8 +109,13 @@ def write_figure(figure: "Figure", path: Path, overwrite: bool) -> None:
     """Write a figure in the format that the name ends in."""
     from slipsweep.files import outputs
 
+    drawn = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+    figure.savefig(drawn, format=path.suffix[1:], dpi=150)
     with outputs.complete_or_absent(path, overwrite) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+        try:
+            temporary.write_bytes(drawn.getvalue())
+        except OSError as error:
+            raise RunError(f"{path}: writing failed: {error.strerror}") from None
 
 
 def check_ending(path: Path, endings: Sequence[str]) -> None:
@@ -144,39 +150,28 @@ def taken_as(values: Mapping[str, float], g: float) -> str:
 @contextmanager
 def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Callable[[int], None] | None]:
     """Yield what to call with a number of cells done: a progress bar, if there is a terminal to see it."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        ProgressColumn,
-        Task,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     from slipsweep.jit import compiling
 
-    before = compiling.seconds()
+    watch, done = Watch(), 0
 
-    class Speed(ProgressColumn):
-        def render(self, task: Task) -> str:
-            seconds = (task.elapsed or 0.0) - (compiling.seconds() - before)
-            if not task.completed or seconds <= 0.0 or task.description:
-                return ""
-            return f"{task.completed / seconds:.3g} {unit}/s"
+    def advance(more: int) -> None:
+        nonlocal done
+        done += more
+        bar.update(task, completed=done, description=f"{watch.speed(done):.3g} {unit}/s")
 
     def compiled(kernel: str | None) -> None:
-        text = f"compiling for this processor, once: {kernel}" if kernel else ""
-        bar.update(task, description=text)
+        bar.update(task, description=f"compiling for this processor, once: {kernel}" if kernel else "")
 
-    columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar, compiling.watched(compiled):
         task = bar.add_task("", total=cells)
-        yield lambda done: bar.advance(task, done)
+        yield advance
 
 
 class Watch:
@@ -188,12 +183,16 @@ class Watch:
         self._compiling = compiling.seconds
         self._started, self._before = time.perf_counter(), compiling.seconds()
 
-    def text(self, count: int, unit: str, seconds: float | None = None) -> str:
-        """The time, `seconds` if given, and what was solved in it a second, compilation apart."""
-        total = time.perf_counter() - self._started if seconds is None else seconds
-        compiling = min(self._compiling() - self._before, total)
+    def speed(self, count: int) -> float:
+        """What was solved in a second, compilation apart."""
+        seconds = time.perf_counter() - self._started - (self._compiling() - self._before)
+        return count / max(seconds, 1e-9)
+
+    def text(self, count: int, unit: str) -> str:
+        """The time, and the speed."""
+        compiling = self._compiling() - self._before
         apart = f" ({compiling:.2f} s to compile, once)" if compiling > 0.0 else ""
-        return f"{total:.2f} s{apart}, {count / max(total - compiling, 1e-9):.3g} {unit}/s"
+        return f"{time.perf_counter() - self._started:.2f} s{apart}, {self.speed(count):.3g} {unit}/s"
 
 
 def typed_command() -> str:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, examples, progress_bar
-from slipsweep.cli.help import Panel
+from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, progress_bar
+from slipsweep.cli.help import Panel, examples
 
 #: The group of options that only this command has.
 TABLE = Panel("Table")

@@ -18,10 +18,9 @@ from slipsweep.cli.common import (
     Workers,
     echo_found,
     echo_tally,
-    examples,
     place_of,
 )
-from slipsweep.cli.help import Panel
+from slipsweep.cli.help import Panel, examples
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
 
@@ -90,8 +89,7 @@ def run(
     if report.found:
         echo_found(report.path)
     else:
-        # drawing counts, reading the sweep file does not
-        took = watch.text(report.tally.cells, unit, report.seconds if checked.sampling is None else None)
+        took = watch.text(report.tally.cells, unit)
         if checked.sampling is None:
             typer.echo(f"{report.tally.cells} cells ({grid}) in {took}")
         else:

@@ -13,12 +13,11 @@ from slipsweep.cli.common import (
     Overwrite,
     Quiet,
     check_ending,
-    examples,
     taken_as,
     typed_command,
     write_figure,
 )
-from slipsweep.cli.help import RARE
+from slipsweep.cli.help import RARE, examples
 from slipsweep.cli.options import BLOCK, SHAKING, chooses, option_name, reads_record
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
