@@ -206,6 +206,7 @@ def limited() -> None:
         (("run", "small.toml", "-o", "a.nc"), "a.nc"),
         (("limit", "small.toml", "-d", "50mm", "-o", "a.pdf"), "a.pdf"),
         (("chart", "small.nc", "-k", "contours", "-o", "a.pdf"), "a.pdf"),
+        (("export", "small.nc", "-o", "a.xlsx"), "a.xlsx"),
         ((*SIMULATE, "-o", "a.pdf"), "a.pdf"),
     ],
 )

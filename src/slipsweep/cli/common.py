@@ -14,7 +14,7 @@ import typer
 
 from slipsweep.cli.help import Panel, printable
 from slipsweep.cli.options import BLOCK
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError
 from slipsweep.model.variables import (
     FLAG_KIND_TEXT,
     PARAMETERS,
@@ -112,10 +112,7 @@ def write_figure(figure: "Figure", path: Path, overwrite: bool) -> None:
     drawn = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
     figure.savefig(drawn, format=path.suffix[1:], dpi=150)
     with outputs.complete_or_absent(path, overwrite) as temporary:
-        try:
-            temporary.write_bytes(drawn.getvalue())
-        except OSError as error:
-            raise RunError(f"{path}: writing failed: {error.strerror}") from None
+        temporary.write_bytes(drawn.getvalue())
 
 
 def check_ending(path: Path, endings: Sequence[str]) -> None:
