@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
     from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
-    from slipsweep.studies.hazard import HazardCurve
+    from slipsweep.studies.hazard import displacement_hazard
+    from slipsweep.studies.hazard_curves import HazardCurve
     from slipsweep.studies.shaking_tests import calibrate, measured_friction
-    from slipsweep.studies.suite_datasets import displacement_hazard, suite_statistics
+    from slipsweep.studies.suite_statistics import suite_statistics
 
 __all__ = [
     "Cosine",
@@ -77,8 +78,9 @@ _LAZY = {
     ),
     "flags": "slipsweep.studies.decoding",
     "open_result": "slipsweep.files.opening",
-    "HazardCurve": "slipsweep.studies.hazard",
-    **dict.fromkeys(("displacement_hazard", "suite_statistics"), "slipsweep.studies.suite_datasets"),
+    "HazardCurve": "slipsweep.studies.hazard_curves",
+    "displacement_hazard": "slipsweep.studies.hazard",
+    "suite_statistics": "slipsweep.studies.suite_statistics",
     **dict.fromkeys(("calibrate", "measured_friction"), "slipsweep.studies.shaking_tests"),
 }
 

@@ -9,7 +9,6 @@ import pytest
 import slipsweep
 from slipsweep.charts import style
 from slipsweep.files.opening import read_result
-from slipsweep.grid.plans import plan_sweep
 from slipsweep.model.estimates import friction_inputs
 from tests.support.commands import command
 
@@ -30,8 +29,9 @@ BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency
     ],
 )
 def test_every_result_says_what_is_estimated(given: dict[str, Any], words: str) -> None:
-    assert slipsweep.sweep(**BLOCK, **given).attrs["friction_inputs"] == words
-    assert style.model_text(plan_sweep(**BLOCK, **given).attrs).startswith(f"{words}\n")
+    attrs = slipsweep.sweep(**BLOCK, **given).attrs
+    assert attrs["friction_inputs"] == words
+    assert style.model_text(attrs).startswith(f"{words}\n")
     if "yield_acceleration" not in given or np.ndim(given["yield_acceleration"]) == 0:
         assert slipsweep.simulate(**BLOCK, **given).attrs["friction_inputs"] == words
     limit = {name: value for name, value in BLOCK.items() if name != "amplitude"}

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import plan_friction_parameters, plan_sweep
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
 from slipsweep.model.variables import PARAMETERS, WAVEFORM_INPUTS
@@ -62,7 +63,7 @@ def solve(
     if given.get("displacement_amplitude") is not None:
         given["amplitude"] = None
     plan = plan_sweep(
-        **given,
+        Inputs(**given),
         model=chosen,
         excitation=WAVEFORMS.from_attributes(table.attrs),
         solver=SOLVERS.from_attributes(table.attrs) if SOLVERS.attribute in table.attrs else SOLVERS.default,
@@ -89,7 +90,7 @@ def boundaries(table: xr.Dataset, always: bool = False) -> dict[str, xr.Variable
     given = {name: table[name] for name in _BLOCK if name in table.coords}
     # neither depends on the amplitude, nor on what it is taken for otherwise
     found = plan_friction_parameters(
-        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=float(table.attrs["g"])), **given
+        Inputs(amplitude=0.0, delta_mu=0.0, decay_rate=0.0, **given), model=Mendez(g=float(table.attrs["g"]))
     ).solve()
     slides_at_rest = found["yield_acceleration"].values <= 0
     limit = found["limiting_acceleration"]

@@ -26,7 +26,7 @@ from slipsweep.charts.sheet import (
 )  # fmt: skip
 from slipsweep.charts.style import BLUE, VERMILION, unit_text
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, Validity
-from slipsweep.studies.suite_statistics import suite_table
+from slipsweep.studies.suite_statistics import suite_statistics
 
 Floats = NDArray[np.float64]
 
@@ -223,7 +223,7 @@ def fragility(sheet: Sheet, thresholds: tuple[float, ...]) -> Figure:
     thresholds : tuple of float
         Displacements to exceed, m, increasing.
     """
-    statistics = suite_table(sheet.table, thresholds=thresholds, quantiles=QUANTILES, zero=0.0, over=None)
+    statistics = suite_statistics(sheet.table, thresholds=thresholds, quantiles=QUANTILES)
     drawn = Sheet(statistics, sheet.x, "threshold", sheet.look, sheet.across, sheet.down, sheet.axes)
     _note_suite(drawn.notes, sheet.table, "P is the share of")
     _note_cautions(drawn.notes, sheet.table)
@@ -260,7 +260,7 @@ def suite_text(sizes: Mapping[Any, int]) -> str:
 
 
 def _statistics(table: xr.Dataset) -> xr.Dataset:
-    return suite_table(table, thresholds=0.0, quantiles=QUANTILES, zero=0.0, over=None)
+    return suite_statistics(table, thresholds=0.0, quantiles=QUANTILES)
 
 
 def _as_newmark(table: xr.Dataset) -> xr.Dataset:

@@ -23,6 +23,7 @@ from slipsweep.cli.common import (
     write_figure,
 )
 from slipsweep.cli.help import Panel
+from slipsweep.cli.lengths import displacements
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
@@ -116,12 +117,10 @@ def _asked(
     sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None
 ) -> tuple[float | list[float], float | None]:
     """Tolerable displacements and the end of the search, in SI units."""
-    from slipsweep.model.parameters import check_values
     from slipsweep.model.units import quantity
 
     g = sweep.model.g
-    lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
-    check_values("displacement", lengths, "--displacement")
+    lengths = displacements(displacement, g)
     highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "amplitude", g)
     # one is one number; several are a dimension, in order and without repetition
     return (lengths if len(displacement) > 1 else lengths[0]), highest

@@ -111,12 +111,12 @@ def simulate(
     motion = _motion(record, reading, excitation)
 
     from slipsweep.files import outputs
-    from slipsweep.studies.history import history_table
+    from slipsweep.grid.inputs import Inputs
+    from slipsweep.studies.history import time_history
 
     outputs.check_outputs(paths, overwrite, reads=[record] if record else ())
-    table = history_table(
+    inputs = Inputs(
         mu_s=mu_s,
-        excitation=motion,
         scale=scale,
         time_scale=time_scale,
         polarity=None if polarity is None else int(polarity),
@@ -124,10 +124,9 @@ def simulate(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
-        model=model,
-        points_per_cycle=points,
         **given,
     )
+    table = time_history(inputs, excitation=motion, model=model, points_per_cycle=points)
     flags = Validity(table["validity"].item())
     if flags & VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in flags & VALUELESS)

@@ -17,7 +17,7 @@ from slipsweep.files.results import FileVariable, ResultFile, result_file
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
-from slipsweep.studies.suite_statistics import suite_table
+from slipsweep.studies.suite_statistics import suite_statistics
 
 #: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
 LAYERS = {
@@ -167,7 +167,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
 
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
-    found = suite_table(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES, zero=0.0, over=None)
+    found = suite_statistics(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES)
     results = {
         name: xr.Variable(found[name].dims, found[name].values.astype(kind), _over_motions(found[name].attrs))
         for name, kind in SHOWN.items()

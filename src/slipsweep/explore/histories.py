@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.explore.excerpt import Excerpt, Indices, evenly, thinned_lengths
+from slipsweep.grid.inputs import Inputs
 from slipsweep.model.options import MODELS
 from slipsweep.motion.waveforms import WAVEFORMS
-from slipsweep.studies.history import history_table
+from slipsweep.studies.history import time_history
 
 #: Points a cycle, and how many cycles at most.
 POINTS, CYCLES = 64, 3
@@ -88,7 +89,8 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
         given: dict[str, Any] = {
             name: variable.isel(cell, missing_dims="ignore").item() for name, variable in inputs.items()
         }
-        history = history_table(times=phase, excitation=motion, model=model, frequency=1.0 / (2.0 * math.pi), **given)
+        one = Inputs(frequency=1.0 / (2.0 * math.pi), **given)
+        history = time_history(one, times=phase, excitation=motion, model=model)
         columns = np.array([history[name].values for name in _COLUMNS])
         if np.isfinite(columns).all():
             largest = np.abs(columns).max(axis=1)

@@ -47,6 +47,7 @@ from slipsweep.motion.suites import Suite, suite_in
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
+    from slipsweep.grid.inputs import Inputs
     from slipsweep.studies.sampling import Sampling
 
 Floats = NDArray[np.float64]
@@ -289,10 +290,18 @@ class SweepSpec:
             if self.sampling is None:
                 from slipsweep.grid.plans import plan_sweep
 
-                return plan_sweep(**self.arguments())
+                return plan_sweep(
+                    self.inputs(),
+                    excitation=self.excitation,
+                    model=self.model,
+                    solver=self.solver,
+                    variables=list(self.output.variables),
+                )
             from slipsweep.studies.uncertainty import plan_samples
 
-            return plan_samples(self.sampling, **self._arguments_but("variables"))
+            return plan_samples(
+                self.sampling, self.inputs(), excitation=self.excitation, model=self.model, solver=self.solver
+            )
 
     def limits(self, displacement: float | list[float], maximum_amplitude: float | None = None) -> "AnyPlan":
         """Return the plan of `slipsweep.limit_amplitude` over all axes but the amplitude, by the cycle solver.
@@ -307,8 +316,14 @@ class SweepSpec:
                 raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
             from slipsweep.studies.limits import plan_limits
 
-            given = self._arguments_but("displacement_amplitude", *STRENGTHS, "solver", "variables")
-            return plan_limits(displacement=displacement, maximum_amplitude=maximum_amplitude, **given)
+            inputs = self.inputs().but(dict.fromkeys(("displacement_amplitude", *STRENGTHS)))
+            return plan_limits(
+                displacement,
+                inputs,
+                excitation=self.excitation,
+                model=self.model,
+                maximum_amplitude=maximum_amplitude,
+            )
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -318,25 +333,17 @@ class SweepSpec:
         except InputError as error:
             raise InputError(f"{self.source}: {error}") from None
 
-    def _arguments_but(self, *names: str) -> dict[str, Any]:
-        return {name: value for name, value in self.arguments().items() if name not in names}
+    def inputs(self) -> "Inputs":
+        """Return the parameters of the sweep."""
+        from slipsweep.grid.inputs import Inputs
 
-    def arguments(self) -> dict[str, Any]:
-        """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.grid.plans.plan_sweep`)."""
-        arguments: dict[str, Any] = {}
+        given: dict[str, Any] = {}
         for name, (dim, values) in self.parameters.items():
             if dim is None:
-                arguments[name] = float(values)
-            elif dim == name:
-                arguments[name] = values
+                given[name] = float(values)
             else:
-                arguments[name] = xr.Variable((dim,), values)
-        return arguments | {
-            "excitation": self.excitation,
-            "model": self.model,
-            "solver": self.solver,
-            "variables": list(self.output.variables),
-        }
+                given[name] = values if dim == name else xr.Variable((dim,), values)
+        return Inputs(**given)
 
 
 #: How netCDF files begin: netCDF-4, and the classic formats.

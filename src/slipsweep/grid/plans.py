@@ -18,6 +18,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, places
 from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tally import Tally
 from slipsweep.model.estimates import friction_inputs
@@ -32,7 +33,6 @@ from slipsweep.model.parameters import (
     number_text,
     shown,
 )
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
@@ -200,15 +200,20 @@ class Plan:
 
 
 def plan_sweep(
-    *, excitation: Any = "sine", model: Any = "mendez", solver: Any = "auto", variables: Any = None, **given: Any
+    inputs: Inputs,
+    *,
+    excitation: Any = "sine",
+    model: Any = "mendez",
+    solver: Any = "auto",
+    variables: Any = None,
 ) -> Plan:
     """Plan of a sweep.
 
     Parameters
     ----------
-    excitation, model, solver, variables, given
-        Keyword arguments of `slipsweep.sweep` but for `chunks` and `progress`; arrays with
-        dimensions of their own are `xr.Variable` instead of DataArray.
+    inputs : Inputs
+    excitation, model, solver, variables
+        As `slipsweep.sweep`.
 
     Raises
     ------
@@ -216,16 +221,16 @@ def plan_sweep(
         As `slipsweep.sweep`.
     """
     problem = check_problem(excitation, model, solver)
-    parameters = check_parameters(problem, given)
+    parameters = check_parameters(problem, inputs)
     if isinstance(problem.excitation, (Record, Suite)):
         return _plan_records(problem, parameters, variables)
     return _plan_waveform(problem, parameters, variables)
 
 
-def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, xr.Variable]:
+def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]:
     """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
     motion = problem.excitation
-    parameters = {name: values for name, values in given.items() if values is not None}
+    parameters = inputs.given
     if isinstance(motion, Waveform):
         check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
         if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
@@ -411,11 +416,11 @@ def _check_steps(solver: Step, excitation: Any) -> None:
     check_memory(f"steps_per_cycle = {solver.steps_per_cycle}", needed, "take fewer steps, or shorter ramps")
 
 
-def plan_friction_parameters(*, model: Any = "mendez", **given: Any) -> Plan:
+def plan_friction_parameters(inputs: Inputs, *, model: Any = "mendez") -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
     problem = check_problem("sine", model, "auto")
-    check_given(given, ("theta", "mu_s", "amplitude"))
-    coords = checked({name: values for name, values in given.items() if values is not None})
+    check_given(inputs.given, ("theta", "mu_s", "amplitude"))
+    coords = checked(inputs.given)
     names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, **MODELS.attributes(problem.model)}
@@ -435,8 +440,6 @@ def check_inputs(given: Collection[str], shaking: Collection[str], what: str) ->
     """Refuse inputs of another kind of shaking."""
     others = {*WAVEFORM_INPUTS, *RECORD_INPUTS} - {*shaking}
     for name in given:
-        if name not in PARAMETERS:
-            raise InputError(f"{name}: unknown; {did_you_mean(name, tuple(PARAMETERS))}")
         if name in others:
             raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
 
@@ -446,9 +449,10 @@ def checked(parameters: Mapping[str, Any]) -> dict[str, xr.Variable]:
     checked = {}
     for name, given in parameters.items():
         if isinstance(given, (xr.Variable, xr.DataArray)):
-            variable = xr.Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
-            if len(set(given.dims)) < len(given.dims):
-                raise InputError(f"{name}: dimensions {', '.join(map(str, given.dims))}: must be named each once")
+            dims = tuple(map(str, given.dims))
+            if len(set(dims)) < len(dims):
+                raise InputError(f"{name}: dimensions {', '.join(dims)}: must be named each once")
+            variable = xr.Variable(dims, check_values(name, given), {**given.attrs, **PARAMETERS[name]})
         else:
             values = check_values(name, given)
             if values.ndim > 1:

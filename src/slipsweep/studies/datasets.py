@@ -15,14 +15,15 @@ import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
 from slipsweep.model.options import MODELS, Model, Solver
-from slipsweep.model.parameters import computed, shown
-from slipsweep.model.variables import PARAMETERS, RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.model.parameters import shown
+from slipsweep.model.variables import RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies.history import history_table
+from slipsweep.studies.history import time_history
 from slipsweep.studies.limits import AMPLITUDE_STEPS, plan_limits
 
 #: What a caller may give for a parameter.
@@ -155,10 +156,28 @@ def sweep(
     array([[0.   , 0.   , 0.222],
            [0.   , 0.081, 0.445]])
     """
-    given = _inputs(locals())
-    plan = plan_sweep(**_plain(given), excitation=excitation, model=model, solver=solver, variables=variables)
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(progress) if chunks is None else _lazy(plan, chunks), brought)
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )
+    plan = plan_sweep(inputs, excitation=excitation, model=model, solver=solver, variables=variables)
+    brought = _brought(inputs, plan.coords, plan.names)
+    return (plan.solve(progress) if chunks is None else _lazy(plan, chunks)).assign_coords(brought)
 
 
 def friction_parameters(
@@ -219,10 +238,18 @@ def friction_parameters(
     >>> slipsweep.SlidingMode(found.sliding_mode.item()).name
     'STICK_SLIP'
     """
-    given = _inputs(locals())
-    plan = plan_friction_parameters(**_plain(given), model=model)
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(), brought)
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        yield_acceleration=yield_acceleration,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+    )
+    plan = plan_friction_parameters(inputs, model=model)
+    brought = _brought(inputs, plan.coords, plan.names)
+    return plan.solve().assign_coords(brought)
 
 
 def simulate(
@@ -298,15 +325,25 @@ def simulate(
     >>> print(f"{history.permanent_displacement.item() * 1000:.0f} mm after {history.time.values[-1]:.2f} s")
     331 mm after 2.78 s
     """
-    given = _inputs(locals())
-    table = history_table(
-        **_plain(given),
-        excitation=excitation,
-        model=model,
-        times=times,
-        points_per_cycle=points_per_cycle,
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
     )
-    return _dataset(table, {})
+    return time_history(inputs, excitation=excitation, model=model, times=times, points_per_cycle=points_per_cycle)
 
 
 def limit_amplitude(
@@ -389,17 +426,30 @@ def limit_amplitude(
     >>> limits.limit_amplitude.round(3).values
     array([3.34 , 3.756])
     """
-    given = _inputs(locals())
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        frequency=frequency,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )
     plan = plan_limits(
-        **_plain(given),
-        displacement=_plain({"displacement": displacement})["displacement"],
+        displacement,
+        inputs,
         excitation=excitation,
         model=model,
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,
     )
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(progress), brought)
+    brought = _brought(inputs, plan.coords, plan.names)
+    return plan.solve(progress).assign_coords(brought)
 
 
 def sample(
@@ -531,7 +581,24 @@ def sample(
     from slipsweep.studies.sampling import check_sampling
     from slipsweep.studies.uncertainty import plan_samples
 
-    given = _inputs(locals())
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+    )
     sampling = check_sampling(
         uncertain,
         samples=samples,
@@ -544,35 +611,14 @@ def sample(
         over=over,
         g=MODELS.of(model).g,
     )
-    plan = plan_samples(
-        sampling,
-        **_plain(given),
-        excitation=excitation,
-        model=model,
-        solver=solver,
-    )
-    brought = _brought(given, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
+    plan = plan_samples(sampling, inputs, excitation=excitation, model=model, solver=solver)
+    brought = _brought(inputs, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
     kept = {name: one for name, one in brought.items() if not {*sampling.over} & {*one.dims}}
-    return _dataset(plan.solve(progress), kept)
-
-
-def _inputs(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters among a function's arguments."""
-    return {name: arguments[name] for name in PARAMETERS if name in arguments}
-
-
-def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters without xarray: its arrays (computed, where they are lazy) as `xr.Variable`."""
-    return {
-        name: xr.Variable(tuple(map(str, values.dims)), computed(values), values.attrs)
-        if isinstance(values, (xr.DataArray, xr.Variable))
-        else values
-        for name, values in given.items()
-    }
+    return plan.solve(progress).assign_coords(kept)
 
 
 def _brought(
-    given: Mapping[str, Any], coords: Mapping[str, xr.Variable], results: Collection[str]
+    inputs: Inputs, coords: Mapping[str, xr.Variable], results: Collection[str]
 ) -> dict[Hashable, xr.Variable]:
     """Coordinates that the DataArrays among the parameters brought along; they must agree.
 
@@ -581,7 +627,7 @@ def _brought(
     """
     brought: dict[Hashable, xr.Variable] = {}
     dims = {dim for variable in coords.values() for dim in variable.dims}
-    for parameter, array in given.items():
+    for parameter, array in inputs.given.items():
         if not isinstance(array, xr.DataArray):
             continue
         stacked = [name for name, index in array.xindexes.items() if isinstance(index, PandasMultiIndex)]
@@ -601,15 +647,6 @@ def _brought(
                 raise InputError(f"{parameter}: its coordinate {name!r} has the name of a dimension: must have another")
             brought[name] = variable
     return {name: variable for name, variable in brought.items() if name not in coords}
-
-
-def _dataset(table: xr.Dataset, brought: Mapping[Hashable, xr.Variable]) -> xr.Dataset:
-    """A table as a Dataset; no array is copied."""
-
-    def labelled(variables: Mapping[str, xr.Variable]) -> dict[Hashable, xr.Variable]:
-        return {name: xr.Variable(part.dims, part.values, part.attrs) for name, part in variables.items()}
-
-    return xr.Dataset(labelled(table.data_vars), {**brought, **labelled(table.coords)}, table.attrs)
 
 
 def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
