@@ -7,13 +7,14 @@ from typing import Any
 
 import dask.array
 import numpy as np
+import pint
 import pytest
 import xarray as xr
 from scipy import stats
 
 import slipsweep
 from slipsweep import InputError
-from slipsweep.model.parameters import friction_coefficient, with_friction_coefficient
+from slipsweep.model.parameters import check_values, friction_coefficient, with_friction_coefficient
 from slipsweep.model.units import conversion
 
 RECORD = slipsweep.Record(np.arange(5) / 10, np.array([0.0, 4.0, -4.0, 2.0, 0.0]))
@@ -214,6 +215,23 @@ def test_friction_angles_that_are_none(phi: Any) -> None:
         friction_coefficient(phi)
     with pytest.raises(InputError, match="phi, mu_s: must not both be given"):
         with_friction_coefficient({"mu_s": 0.3, "phi": 20.0})
+
+
+def test_what_brings_a_unit_is_converted() -> None:
+    unit: Any = pint.UnitRegistry()
+    for name, given, expected in (
+        ("amplitude", 0.3 * unit.standard_gravity, 0.3 * 9.80665),
+        ("amplitude", unit.Quantity([10.0, 20.0], "cm/s**2"), [0.1, 0.2]),
+        ("amplitude", xr.DataArray([0.1, 0.2], dims="x", attrs={"units": "g"}), [0.981, 1.962]),
+        ("amplitude", xr.Variable("x", [1.0], {"units": "m s-2"}), [1.0]),
+        ("theta", 0.1 * unit.radian, np.degrees(0.1)),
+        ("frequency", 120.0 * unit.rpm, 2.0),
+        ("displacement", 50.0 * unit.mm, 0.05),
+    ):
+        np.testing.assert_allclose(check_values(name, given), expected, rtol=1e-14)
+    for name, given in (("amplitude", 3.0 * unit.gram), ("mu_s", xr.DataArray(30.0, attrs={"units": "%"}))):
+        with pytest.raises(InputError, match=f"{name}: units = .* must be a unit that converts to"):
+            check_values(name, given)
 
 
 def test_numbers_and_units_of_thousands_of_letters_are_refused_in_one_line() -> None:

@@ -15,6 +15,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError
+from slipsweep.model.units import without_unit
 from slipsweep.model.variables import PARAMETERS
 
 if TYPE_CHECKING:
@@ -83,6 +84,12 @@ BOUNDS: dict[str, Bound] = {
     "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1", includes_high=False),
     "threshold": _AMOUNT,
 }
+
+#: Own units of numbers that are no parameters of a sweep.
+_UNITS_OF_OTHERS = {"displacement": "m", "threshold": "m", "maximum_amplitude": "m s-2", "g": "m s-2", "interval": "s"}
+
+#: Gravity of the models by default, m/s²: the value that reproduces the paper's tables.
+GRAVITY = 9.81
 
 #: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (docs/speed.md).
 STEPS_PER_CYCLE = 1024
@@ -167,15 +174,19 @@ def check_finite(key: str, value: Any) -> float:
     return float(number)
 
 
-def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.float64]:
+def check_values(name: str, values: Any, key: str | None = None, g: float = GRAVITY) -> NDArray[np.float64]:
     """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors.
+
+    What brings a unit (a pint Quantity, an array of xarray with the attribute `units`) is converted to the parameter's
+    own; "g" is `g` m/s².
 
     Raises
     ------
     InputError
         Naming the parameter, the first value that is not allowed, and what is.
     """
-    array = check_numbers(key or name, values)
+    own = PARAMETERS[name]["units"] if name in PARAMETERS else _UNITS_OF_OTHERS.get(name)
+    array = check_numbers(key or name, values if own is None else without_unit(key or name, own, values, g))
     bound = BOUNDS[name]
     wrong = ~bound.holds(array)
     if wrong.any():

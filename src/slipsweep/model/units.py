@@ -2,6 +2,7 @@
 
 import json
 import re
+from typing import Any
 
 from slipsweep.errors import InputError
 from slipsweep.model.variables import PARAMETERS
@@ -14,7 +15,7 @@ _OWN_UNITS = {
     "m": ("m",),
     "m s-1": ("m s-1", "m/s"),
     "s": ("s",),
-    "1": ("1",),
+    "1": ("1", "dimensionless"),
 }
 
 #: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
@@ -37,8 +38,8 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
     """Return what to multiply a number in `units` by, to have it in the unit `own`; as `unit_factor`."""
     if units is None or units in _OWN_UNITS.get(own, (own,)):
         return 1.0
-    if own == "m s-2" and units == "g":
-        return g
+    if own == "m s-2" and units in ("g", "gal", "Gal"):  # a gallon, to pint
+        return g if units == "g" else 0.01
 
     refusal = InputError(f"{key} = {show(units)}: must be a unit that converts to {own}")
     # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
@@ -62,6 +63,34 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
         return float(quantity.to(target).magnitude)
     except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError):
         raise refusal from None
+
+
+def without_unit(key: str, own: str, values: Any, g: float) -> Any:
+    """Return what brings a unit, a pint Quantity or an array of xarray with the attribute `units`, in the unit `own`.
+
+    Other values are returned as they are; "g" is `g` m/s².
+
+    Raises
+    ------
+    InputError
+        Its unit does not convert.
+
+    Examples
+    --------
+    >>> import pint
+    >>> without_unit("amplitude", "m s-2", pint.Quantity(0.5, "standard_gravity"), 9.81)
+    4.903325
+    """
+    data = getattr(values, "data", values) if hasattr(values, "dims") else values
+    if hasattr(data, "magnitude") and hasattr(data, "units"):
+        units: Any = re.sub(r"\s*(/|\*+)\s*", r"\1", f"{data.units:D}")  # long names: "g" would be a gram
+        values = values.copy(data=data.magnitude) if hasattr(values, "dims") else data.magnitude
+    else:
+        units = getattr(values, "attrs", {}).get("units")
+    if not units:
+        return values
+    factor = conversion(f"{key}: units", own, str(units), g)
+    return values if factor == 1.0 else values * factor
 
 
 def quantity(key: str, text: str, parameter: str, g: float) -> float:

@@ -104,10 +104,9 @@ def _held(times: Floats, values: Floats) -> list[tuple[float, float, float]]:
     peak = np.abs(values).max(initial=0.0)
     starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
     lasts = np.concatenate([starts[1:], [values.size]]) - 1
+    is_long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
     found = []
-    for first, last in zip(starts, lasts, strict=True):
-        if last - first < _HELD_SAMPLES or times[last] - times[first] < _HELD:
-            continue
+    for first, last in zip(starts[is_long], lasts[is_long], strict=True):
         neighbours = values[[first - 1, last + 1]] if first > 0 and last < values.size - 1 else values[[first, last]]
         jumps = np.abs(neighbours - values[first]).min() > 0.05 * peak
         if abs(values[first]) > 0.01 * peak or jumps:  # else the ground is at rest

@@ -102,10 +102,7 @@ class Sine(Waveform):
 class Cosine(Waveform):
     """cos φ: it starts at its peak, to which the base's acceleration jumps at t = 0.
 
-    Parameters
-    ----------
-    cycles, ramp_in, ramp_out
-        As those of `Sine`.
+    Its parameters are those of `Sine`.
 
     See Also
     --------
@@ -125,10 +122,7 @@ class Cosine(Waveform):
 class Triangle(Waveform):
     """Straight lines through 0, 1 at π/2, −1 at 3π/2, 0.
 
-    Parameters
-    ----------
-    cycles, ramp_in, ramp_out
-        As those of `Sine`.
+    Its parameters are those of `Sine`.
 
     See Also
     --------
@@ -148,10 +142,7 @@ class Triangle(Waveform):
 class Square(Waveform):
     """1 on (0, π), −1 on (π, 2π).
 
-    Parameters
-    ----------
-    cycles, ramp_in, ramp_out
-        As those of `Sine`.
+    Its parameters are those of `Sine`.
 
     See Also
     --------
