@@ -26,9 +26,9 @@ def main() -> None:
                 tried(folder, OUTPUTS[number % 2], whole, random.Random(number))
             rows.append([fault, " ".join((tried.__doc__ or "").split()), rounds, rounds])
             print(f"{fault}: {rounds}", flush=True)
-    text = f"{machine.measured_on(('netCDF4', 'zarr', 'distributed'))}\n\n"
-    text += machine.table(["fault", "what it is", "tried", "survived"], rows)
-    (given.folder / "faults.md").write_text(text + "\n")
+            text = f"{machine.measured_on(('netCDF4', 'zarr', 'distributed'))}\n\n"
+            text += machine.table(["fault", "what it is", "tried", "survived"], rows)
+            (given.folder / "faults.md").write_text(text)
 
 
 if __name__ == "__main__":

@@ -4,22 +4,27 @@ Each round runs the command, hurts it at a random moment, and checks what is lef
 errors are one line, and `--resume` gives the bits of an undisturbed run.
 """
 
+import multiprocessing
 import os
 import random
+import resource
+import secrets
 import shutil
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.files.opening import read_result
 
-#: Some 30 chunks; half a second of work.
+#: Some 30 chunks.
 SWEEP = """
 [axes.theta]
 start = 0
@@ -28,11 +33,11 @@ num = 15
 [axes.mu_s]
 start = 0.27
 stop = 0.6
-num = 30
+num = 20
 [axes.amplitude]
 start = 0.5
 stop = 9
-num = 60
+num = 40
 [axes.frequency]
 start = 0.5
 stop = 5
@@ -41,43 +46,65 @@ num = 60
 
 OUTPUTS = ("out.nc", "out.zarr")
 
-#: The command in small chunks.
-COMMAND = """
-import sys
-from slipsweep.files import storing
-storing.CHUNK_CELLS = {cells}
-from slipsweep.cli import main
-sys.exit(main({arguments!r}))
-"""
+#: Processes begin as copies of one that has imported what the command needs.
+_PROCESSES = multiprocessing.get_context("forkserver")
+_PROCESSES.set_forkserver_preload(["slipsweep.cli", "slipsweep.files.jobs", "slipsweep.grid.graph", __name__])
 
 
-#: No file may become larger than this.
-LIMITED = """
-import resource, signal
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
-"""
+@dataclass
+class Started:
+    """A command that runs in a folder, and the file that has its standard error."""
+
+    process: Any
+    errors: Path
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return int(self.process.pid)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it has."""
+        return self.process.exitcode is not None
+
+    def finished(self, status: int | None = 0) -> str:
+        """What it has said on standard error; it must end with a status, and never with a traceback."""
+        self.process.join(300)
+        errors = self.errors.read_text()
+        assert "Traceback" not in errors, errors
+        assert status is None or self.process.exitcode == status, (self.process.exitcode, errors)
+        return errors
 
 
-def start(folder: Path, *arguments: str, cells: int = 60_000, before: str = "") -> "subprocess.Popen[str]":
-    """Start `slipsweep` in a folder."""
-    code = before + COMMAND.format(cells=cells, arguments=list(arguments))
-    pipe = subprocess.PIPE
-    return subprocess.Popen([sys.executable, "-c", code], cwd=folder, stdout=pipe, stderr=pipe, text=True)
+def start(folder: Path, *arguments: str, cells: int = 25_000, limit: int | None = None) -> Started:
+    """Start `slipsweep` in a folder, in chunks of so many cells; no file may become larger than `limit`."""
+    errors = folder / f"errors-{secrets.token_hex(4)}"
+    process = _PROCESSES.Process(target=_run, args=(folder, arguments, cells, limit, errors))
+    process.start()
+    return Started(process, errors)
 
 
-def finished(process: "subprocess.Popen[str]", status: int | None = 0) -> str:
-    """What a process has said on standard error; it must end with a status, and never with a traceback."""
-    _, errors = process.communicate(timeout=300)
-    assert "Traceback" not in errors, errors
-    assert status is None or process.returncode == status, (process.returncode, errors)
-    return errors
+def _run(folder: Path, arguments: Sequence[str], cells: int, limit: int | None, errors: Path) -> None:
+    from slipsweep.cli import main
+    from slipsweep.files import storing
+
+    os.chdir(folder)
+    with errors.open("w") as file:
+        os.dup2(file.fileno(), 2)
+    sys.stderr = os.fdopen(2, "w", buffering=1)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    storing.CHUNK_CELLS = cells
+    if limit is not None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    os._exit(main(list(arguments)))
 
 
 def prepared(folder: Path) -> bytes:
     """Write the sweep and an undisturbed result; return that in short."""
     (folder / "a.toml").write_text(SWEEP)
-    finished(start(folder, "run", "a.toml", "-o", "whole.nc", "-q"))
+    start(folder, "run", "a.toml", "-o", "whole.nc", "-q").finished()
     return bits(folder / "whole.nc")
 
 
@@ -93,7 +120,7 @@ def complete_or_absent(folder: Path, output: str, whole: bytes) -> None:
     path = folder / output
     if path.exists():
         assert bits(path) == whole
-    finished(start(folder, "run", "a.toml", "-o", output, "--resume", "-q"))
+    start(folder, "run", "a.toml", "-o", output, "--resume", "-q").finished()
     assert bits(path) == whole
     assert not (folder / f"{output}.part").exists()
     shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -102,12 +129,12 @@ def complete_or_absent(folder: Path, output: str, whole: bytes) -> None:
 def hurt(folder: Path, output: str, whole: bytes, sign: signal.Signals, chance: random.Random) -> None:
     """Kill a run, or interrupt it, somewhere between its first chunk and its end."""
     process = start(folder, "run", "a.toml", "-o", output, "-q")
-    _until(lambda: (folder / f"{output}.part").exists() or process.poll() is not None)
+    _until(lambda: (folder / f"{output}.part").exists() or process.has_ended)
     time.sleep(chance.uniform(0.0, 0.6))
-    process.send_signal(sign)
-    errors = finished(process, None)
-    if sign == signal.SIGINT and process.returncode:
-        assert process.returncode == 130, errors
+    _signal(process, sign)
+    errors = process.finished(None)
+    if sign == signal.SIGINT and process.process.exitcode:
+        assert process.process.exitcode == 130, errors
         assert errors.count("\n") == 1, errors
     complete_or_absent(folder, output, whole)
 
@@ -124,9 +151,8 @@ def interrupted(folder: Path, output: str, whole: bytes, chance: random.Random) 
 
 def full_disk(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """No room left: a limit of the size of files stands for it where the disk is not the tests' own."""
-    limited = LIMITED.format(limit=chance.randint(2_000, 100_000))
-    process = start(folder, "run", "a.toml", "-o", output, "-q", before=limited)
-    errors = finished(process, 1)
+    process = start(folder, "run", "a.toml", "-o", output, "-q", limit=chance.randint(2_000, 100_000))
+    errors = process.finished(1)
     assert errors.count("\n") == 1, errors
     assert output in errors, errors
     complete_or_absent(folder, output, whole)
@@ -137,8 +163,8 @@ def two_runs(folder: Path, output: str, whole: bytes, chance: random.Random) -> 
     first = start(folder, "run", "a.toml", "-o", output, "-q")
     time.sleep(chance.uniform(0.0, 1.5))
     second = start(folder, "run", "a.toml", "-o", output, "-q")
-    errors = [finished(process, None) for process in (first, second)]
-    assert sorted(process.returncode != 0 for process in (first, second)) == [False, True], errors
+    errors = [process.finished(None) for process in (first, second)]
+    assert sorted(process.process.exitcode != 0 for process in (first, second)) == [False, True], errors
     assert any(word in "".join(errors) for word in ("another", "exists already", "interrupted run")), errors
     complete_or_absent(folder, output, whole)
 
@@ -146,13 +172,13 @@ def two_runs(folder: Path, output: str, whole: bytes, chance: random.Random) -> 
 def edited(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """The sweep file is edited between: the chunks of the other sweep are not mixed in."""
     process = start(folder, "run", "a.toml", "-o", output, "-q")
-    _until(lambda: any((folder / f"{output}.part").glob("**/*")) or process.poll() is not None)
+    _until(lambda: any((folder / f"{output}.part").glob("**/*")) or process.has_ended)
     time.sleep(0.3)
-    process.kill()
-    finished(process, None)
+    _signal(process, signal.SIGKILL)
+    process.finished(None)
     if (folder / f"{output}.part" / "identity.json").exists():
         (folder / "a.toml").write_text(SWEEP.replace("stop = 14", f"stop = {chance.randint(5, 13)}"))
-        errors = finished(start(folder, "run", "a.toml", "-o", output, "--resume", "-q"), 2)
+        errors = start(folder, "run", "a.toml", "-o", output, "--resume", "-q").finished(2)
         assert "another sweep file" in errors
         (folder / "a.toml").write_text(SWEEP)
     complete_or_absent(folder, output, whole)
@@ -160,7 +186,7 @@ def edited(folder: Path, output: str, whole: bytes, chance: random.Random) -> No
 
 def damaged(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """A result with a part overwritten or cut off, or a file that is none, is read or refused in one line."""
-    finished(start(folder, "run", "a.toml", "-o", "damaged.nc", "-q", "--overwrite"))
+    start(folder, "run", "a.toml", "-o", "damaged.nc", "-q", "--overwrite").finished()
     path = folder / "damaged.nc"
     content = bytearray(path.read_bytes())
     if chance.random() < 0.5:
@@ -180,19 +206,19 @@ def damaged(folder: Path, output: str, whole: bytes, chance: random.Random) -> N
 
 def worker_killed(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """A worker is killed: its chunks are computed once more."""
-    process = start(folder, "run", "a.toml", "-o", output, "-q", "--workers", "2", cells=30_000)
-    _until(lambda: (folder / f"{output}.part").exists() or process.poll() is not None)
+    process = start(folder, "run", "a.toml", "-o", output, "-q", "--workers", "2", cells=15_000)
+    _until(lambda: (folder / f"{output}.part").exists() or process.has_ended)
     time.sleep(chance.uniform(1.0, 4.0))
     workers = _children(process.pid)
     for pid in workers[-1:]:
         os.kill(pid, signal.SIGKILL)
-    finished(process)
+    process.finished()
     complete_or_absent(folder, output, whole)
 
 
 def read_only(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """A folder that cannot be written."""
-    errors = finished(start(folder, "run", "a.toml", "-o", f"/proc/{output}", "-q"), None)
+    errors = start(folder, "run", "a.toml", "-o", f"/proc/{output}", "-q").finished(None)
     assert errors.count("\n") == 1, errors
     assert f"/proc/{output}" in errors
 
@@ -207,6 +233,11 @@ FAULTS: dict[str, Callable[[Path, str, bytes, random.Random], None]] = {
     "damaged result": damaged,
     "worker killed": worker_killed,
 }
+
+
+def _signal(process: Started, sign: signal.Signals) -> None:
+    with suppress(ProcessLookupError):  # it has ended
+        os.kill(process.pid, sign)
 
 
 def _until(condition: Callable[[], bool]) -> None:

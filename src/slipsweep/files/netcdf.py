@@ -58,7 +58,9 @@ def described(
     if labels:
         about = {"long_name": "name of the case"}
         found = found.assign_coords(label=xr.Variable(("case",), np.array(labels, object), about))
-    for name, one in found.data_vars.items():
+    for name, one in dict(found.variables).items():
+        if one.dtype.kind == "U":  # of any length
+            found[name] = found[name].astype(object)
         if one.attrs.get("ancillary_variables") not in found.variables:
             found[name].attrs.pop("ancillary_variables", None)
     if recorded is not None:

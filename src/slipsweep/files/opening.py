@@ -78,9 +78,11 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
     table = _open(path)
     if not str(table.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in table.attrs:
         raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
-    for name, one in table.variables.items():
+    for name, one in dict(table.variables).items():
         for key in _ENCODINGS:
             one.attrs.pop(key, None)
+        if one.dtype.kind in "UST":
+            table[name] = table[name].astype(object)
         kind = np.dtype(RESULT_DTYPES.get(str(name), "f8"))
         if kind.kind == "i" and one.dtype != kind:
             # another program has made other numbers of codes
