@@ -91,14 +91,11 @@ def test_a_suite_is_compared_by_what_is_in_it(folder: Path) -> None:
 
 def test_measures_along_the_motions(folder: Path) -> None:
     suite = read_suite(folder)
-    found = suite.measures
-    assert found["motion_file"].tolist() == ["a.csv", "b.csv", "c.csv"]
-    assert found["motion_samples"].tolist() == [5, 6, 4]
-    np.testing.assert_allclose(found["motion_interval"], [0.02, 0.03, 0.01], rtol=1e-14)
-    for at, motion in enumerate(suite):
-        assert isinstance(motion, Record)
-        for name, value in intensity_measures(motion).items():
-            assert found[f"motion_{name}"][at] == value
+    assert suite.measures["motion_file"].tolist() == ["a.csv", "b.csv", "c.csv"]
+    np.testing.assert_allclose(suite.measures["motion_interval"], [0.02, 0.03, 0.01], rtol=1e-14)
+    for at, record in enumerate(suite.components):
+        for name, value in intensity_measures(record).items():
+            assert suite.measures[f"motion_{name}"][at] == value
 
 
 @pytest.mark.parametrize(
