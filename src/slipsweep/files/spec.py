@@ -342,7 +342,7 @@ class SweepSpec:
             if dim is None:
                 given[name] = float(values)
             else:
-                given[name] = values if dim == name else xr.Variable((dim,), values)
+                given[name] = values if dim == name else xr.DataArray(values, dims=(dim,))
         return Inputs(**given)
 
 
@@ -513,6 +513,9 @@ def _parameters(file: Any, model: Model, sampling: "Sampling | None") -> dict[st
         sampling.check_given(tuple(given))
         given |= {*sampling.absolute}
     harmonic = _recorded(file.excitation) is None
+    if given >= {"mu_s", "phi"}:
+        raise InputError("axes.phi: not allowed beside mu_s: mu_s = tan(phi); give one of them")
+    given |= {"mu_s"} if "phi" in given else set()
     interface = () if "yield_coefficient" in given else ("theta", "mu_s")
     for name in (*interface, *(["frequency"] if harmonic else [])):
         if name not in given:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from slipsweep.model.parameters import with_friction_coefficient
+
 
 @dataclass(frozen=True, kw_only=True)
 class Inputs:
@@ -20,6 +22,7 @@ class Inputs:
 
     theta: Any = None
     mu_s: Any = None
+    phi: Any = None
     amplitude: Any = None
     frequency: Any = None
     displacement_amplitude: Any = None
@@ -38,9 +41,9 @@ class Inputs:
 
     @property
     def given(self) -> dict[str, Any]:
-        """The parameters that are given."""
+        """The parameters that are given; of `phi` the friction coefficient, an array that has it as a coordinate."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        return with_friction_coefficient({name: value for name, value in values.items() if value is not None})
 
     def but(self, others: Mapping[str, Any]) -> "Inputs":
         """The same with other values of some parameters; None leaves one out."""

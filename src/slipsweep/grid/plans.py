@@ -237,7 +237,7 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
             raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
         _check_interface(problem.model, parameters)
         check_given(parameters, ("frequency",))
-        return checked(parameters)
+        return checked(parameters, problem.model.g)
     check_inputs(parameters, RECORD_INPUTS, "a Suite" if isinstance(motion, Suite) else "a Record")
     _check_interface(problem.model, parameters)
     strengths = [name for name in STRENGTHS if name in parameters]
@@ -255,7 +255,8 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
     polarity = _polarity(parameters.pop("polarity", 1))
     defaults = {"time_scale": 1.0} if strengths else {"scale": 1.0, "time_scale": 1.0}
     parameters = defaults | parameters
-    found = checked({name: parameters[name] for name in PARAMETERS if name in parameters}) | {"polarity": polarity}
+    found = checked({name: parameters[name] for name in PARAMETERS if name in parameters}, problem.model.g)
+    found["polarity"] = polarity
     found |= motion_coordinates(motion, found)
     if strengths and strengths != ["scale"]:
         _check_moving(motion, found, strengths[0])
@@ -294,12 +295,12 @@ def motion_coordinates(motion: Record | Suite, coords: Mapping[str, xr.Variable]
 
 
 def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
-    """The coordinates that cells are solved for: of a motion its place in the suite, and no more."""
+    """The coordinates that cells are solved for: no friction angle; of a motion its place in the suite, and no more."""
+    own = {name: one for name, one in coords.items() if name not in ("phi", *MOTION_COORDINATES)}
     suite = problem.excitation
     if not isinstance(suite, Suite):
-        return dict(coords)
+        return own
     places = np.array([suite.index(str(label)) for label in coords["motion"].values], np.float64)
-    own = {name: one for name, one in coords.items() if name not in MOTION_COORDINATES}
     return own | {"motion": xr.Variable(("motion",), places)}
 
 
@@ -371,7 +372,7 @@ def _motion_tasks(
 def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a waveform; `coords` as `check_parameters` gives them."""
     wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
-    sizes, inputs = grid_sizes(coords), dict(coords)
+    sizes, inputs = grid_sizes(coords), inputs_of(problem, coords)
     drive: dict[str, xr.Variable] = {
         name: coords[name] for name in ("displacement_amplitude", "frequency") if name in coords
     }
@@ -420,7 +421,7 @@ def plan_friction_parameters(inputs: Inputs, *, model: Any = "mendez") -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
     problem = check_problem("sine", model, "auto")
     check_given(inputs.given, ("theta", "mu_s", "amplitude"))
-    coords = checked(inputs.given)
+    coords = checked(inputs.given, problem.model.g)
     names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, **MODELS.attributes(problem.model)}
@@ -444,17 +445,20 @@ def check_inputs(given: Collection[str], shaking: Collection[str], what: str) ->
             raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
 
 
-def checked(parameters: Mapping[str, Any]) -> dict[str, xr.Variable]:
-    """Every parameter as a float64 array with named dimensions, within its bounds, described."""
+def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
+    """Every parameter as a float64 array with named dimensions, within its bounds, described.
+
+    `g` is what "g" as the unit of an array stands for.
+    """
     checked = {}
     for name, given in parameters.items():
         if isinstance(given, (xr.Variable, xr.DataArray)):
             dims = tuple(map(str, given.dims))
             if len(set(dims)) < len(dims):
                 raise InputError(f"{name}: dimensions {', '.join(dims)}: must be named each once")
-            variable = xr.Variable(dims, check_values(name, given), {**given.attrs, **PARAMETERS[name]})
+            variable = xr.Variable(dims, check_values(name, given, g=g), {**given.attrs, **PARAMETERS[name]})
         else:
-            values = check_values(name, given)
+            values = check_values(name, given, g=g)
             if values.ndim > 1:
                 raise InputError(
                     f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
@@ -464,6 +468,8 @@ def checked(parameters: Mapping[str, Any]) -> dict[str, xr.Variable]:
         if variable.values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = variable
+        if name == "mu_s" and isinstance(given, xr.DataArray) and "phi" in given.coords:
+            checked["phi"] = given["phi"].variable.to_base_variable()
     return checked
 
 

@@ -4,11 +4,11 @@ A thin translation over `slipsweep.grid.plans` and `slipsweep.studies.history`: 
 with DataArrays are kept, and `chunks` makes a dask graph of a plan's tasks.
 """
 
-import itertools
-import operator
+import functools
+import inspect
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -16,26 +16,51 @@ from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
 from slipsweep.grid.inputs import Inputs
-from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
-from slipsweep.model.options import MODELS, Model, Solver
+from slipsweep.grid.plans import Plan, plan_friction_parameters, plan_sweep
+from slipsweep.model.choices import declared
+from slipsweep.model.options import MODELS, SOLVERS, Model, Solver
 from slipsweep.model.parameters import shown
-from slipsweep.model.variables import RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.model.variables import STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Waveform
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 from slipsweep.studies.history import time_history
 from slipsweep.studies.limits import AMPLITUDE_STEPS, plan_limits
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def _named(function: Function) -> Function:
+    """Say of an option of the shaking, the model or the solver that was given to the function itself where it goes."""
+    known = inspect.signature(function).parameters
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **options: Any) -> Any:
+        for name, value in options.items():
+            for family in (WAVEFORMS, MODELS, SOLVERS):
+                if name not in known and name in family.options:
+                    owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
+                    raise TypeError(
+                        f"{function.__name__}() has no argument {name!r}: give "
+                        f"{family.keyword}={owner.__name__}({name}={shown(value)})"
+                    )
+        return function(*arguments, **options)
+
+    return cast(Function, call)
+
 
 #: What a caller may give for a parameter.
 Values = float | Sequence[float] | np.ndarray | xr.DataArray
 
 
+@_named
 def sweep(
     theta: Values | None = None,
     mu_s: Values | None = None,
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
+    phi: Values | None = None,
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     solver: Solver | str = "auto",
@@ -74,6 +99,8 @@ def sweep(
         Peak ground acceleration A, m/s², ≥ 0; a record, or every motion of a suite, is scaled to it.
     frequency : float, array or DataArray
         Excitation frequency, Hz, > 0; not with a record.
+    phi : float, array or DataArray, optional
+        Friction angle, degrees, instead of `mu_s` = tan φ.
     excitation : Sine, Cosine, Triangle, Square, Harmonics, Record, Suite or str
         Motion of the base; "sine", "cosine", "triangle" and "square" are ten cycles without ramps.  All that is written
         about a record below holds for each motion of a suite.
@@ -159,6 +186,7 @@ def sweep(
     inputs = Inputs(
         theta=theta,
         mu_s=mu_s,
+        phi=phi,
         amplitude=amplitude,
         frequency=frequency,
         displacement_amplitude=displacement_amplitude,
@@ -252,12 +280,14 @@ def friction_parameters(
     return plan.solve().assign_coords(brought)
 
 
+@_named
 def simulate(
     theta: float | None = None,
     mu_s: float | None = None,
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
+    phi: float | None = None,
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     times: Sequence[float] | np.ndarray | None = None,
@@ -328,6 +358,7 @@ def simulate(
     inputs = Inputs(
         theta=theta,
         mu_s=mu_s,
+        phi=phi,
         amplitude=amplitude,
         frequency=frequency,
         displacement_amplitude=displacement_amplitude,
@@ -346,12 +377,14 @@ def simulate(
     return time_history(inputs, excitation=excitation, model=model, times=times, points_per_cycle=points_per_cycle)
 
 
+@_named
 def limit_amplitude(
     displacement: Values,
     theta: Values | None = None,
     mu_s: Values | None = None,
     frequency: Values | None = None,
     *,
+    phi: Values | None = None,
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     time_scale: Values | None = None,
@@ -429,6 +462,7 @@ def limit_amplitude(
     inputs = Inputs(
         theta=theta,
         mu_s=mu_s,
+        phi=phi,
         frequency=frequency,
         time_scale=time_scale,
         polarity=polarity,
@@ -452,12 +486,14 @@ def limit_amplitude(
     return plan.solve(progress).assign_coords(brought)
 
 
+@_named
 def sample(
     theta: Values | None = None,
     mu_s: Values | None = None,
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
+    phi: Values | None = None,
     uncertain: Mapping[str, Any],
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
@@ -584,6 +620,7 @@ def sample(
     inputs = Inputs(
         theta=theta,
         mu_s=mu_s,
+        phi=phi,
         amplitude=amplitude,
         frequency=frequency,
         displacement_amplitude=displacement_amplitude,
@@ -651,37 +688,17 @@ def _brought(
 
 def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
     """The results as dask arrays."""
-    lengths = _chunk_lengths(chunks, plan.sizes)
-    return plan.table(lambda task: _lazy_arrays(task, {dim: lengths[dim] for dim in task.sizes}))
+    from slipsweep.grid.graph import lazy_dataset
 
-
-def _lazy_arrays(task: Task, chunks: Mapping[str, tuple[int, ...]]) -> dict[str, Any]:
-    """One task as dask arrays: a node a chunk solves all results, another picks each out."""
-    from dask.array import Array
-    from dask.base import tokenize
-    from dask.highlevelgraph import HighLevelGraph
-
-    starts = [list(itertools.accumulate(lengths, initial=0)) for lengths in chunks.values()]
-    token = tokenize(task.solver.__name__, task.problem, task.names, chunks, task.inputs)
-    solved = f"slipsweep-{token}"
-    layers: dict[str, dict[Any, Any]] = {solved: {}} | {f"{name}-{token}": {} for name in task.names}
-    for index in itertools.product(*(range(len(lengths)) for lengths in chunks.values())):
-        slices = tuple(slice(begin[at], begin[at + 1]) for begin, at in zip(starts, index, strict=True))
-        layers[solved][solved, *index] = (task.part(slices).solve,)
-        for name in task.names:
-            layers[f"{name}-{token}"][f"{name}-{token}", *index] = (operator.getitem, (solved, *index), name)
-    arrays = {}
-    for name in task.names:
-        layer = f"{name}-{token}"
-        graph = HighLevelGraph({solved: layers[solved], layer: layers[layer]}, {solved: set(), layer: {solved}})
-        arrays[name] = Array(graph, layer, tuple(chunks.values()), dtype=RESULT_DTYPES.get(name, "float64"))
-    return arrays
+    return lazy_dataset(plan, _chunk_lengths(chunks, plan.sizes))
 
 
 def _chunk_lengths(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
     """Chunk lengths along every dimension; "auto" leaves frequency, which costs next to nothing, whole."""
     from dask.array.core import normalize_chunks
 
+    if isinstance(chunks, Integral) and chunks <= 0 and chunks != -1:
+        raise InputError(f"chunks = {shown(chunks)}: must be whole numbers > 0")
     asked = dict.fromkeys(sizes, "auto") | {"frequency": -1} if isinstance(chunks, str) and chunks == "auto" else chunks
     if isinstance(asked, Mapping):
         unknown = [dim for dim in asked if dim not in sizes and dim != "frequency"]
