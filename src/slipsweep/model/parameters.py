@@ -1,6 +1,5 @@
 """What a caller gives, checked: one clear message for the first thing that cannot be.
 
-`sweep`, `friction_parameters`, `simulate` and the sweep-file schema share these bounds.
 NumPy is imported where it is needed: the command line's options, hence `slipsweep --help`, come from here.
 """
 
@@ -195,26 +194,10 @@ def check_values(name: str, values: Any, key: str | None = None, g: float = GRAV
 
 
 def friction_coefficient(phi: Any) -> Any:
-    """Static friction coefficient of a friction angle, mu_s = tan phi.
+    """Static friction coefficient mu_s = tan phi of a friction angle, degrees: wherever `phi` is an input.
 
-    This is the one place where a friction angle becomes what the model takes: `sweep`, `sample`, `simulate`, sweep
-    files and commands that are given `phi` call it, with PARAMETERS["phi"] and BOUNDS["phi"].
-
-    Parameters
-    ----------
-    phi : float, array-like, DataArray or Variable
-        Friction angle, degrees, 0 < phi < 90.
-
-    Returns
-    -------
-    DataArray or Variable
-        Along the dimensions of `phi`, or along the dimension "phi"; a DataArray has the angles as its coordinate
-        "phi", which results keep.
-
-    Raises
-    ------
-    InputError
-        Angles that are not allowed; an array of several dimensions that are not named.
+    It lies along the dimensions of a DataArray or Variable, or along the dimension "phi"; but for a Variable it has the
+    angles as its coordinate "phi".  InputError: angles that are not allowed, or dimensions that have no name.
 
     Examples
     --------

@@ -19,17 +19,11 @@ REFERENCE = (
 class SlidingMode(IntEnum):
     """Sliding mode of a cell.
 
-    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of the paper [1]_.
+    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of the paper.
 
     See Also
     --------
     Validity : what else is to be known of a cell
-
-    References
-    ----------
-    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
-       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
-       https://doi.org/10.1016/j.soildyn.2011.08.007
 
     Examples
     --------
@@ -267,7 +261,7 @@ LIMIT_RESULTS: dict[str, dict[str, Any]] = {
     "permanent_displacement": _described("m", "permanent displacement, downslope, at the limit amplitude", "validity"),
 }
 
-#: Results of a record, beside the displacement, the velocity and the validity: -1 where there is no value.
+#: Results of a record, further to the displacement, the velocity and the validity: -1 where there is no value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
     "number_of_slips": _described("1", "number of slips that begin at rest", "validity"),
     "stick_slip_pulses": _described("1", "number of pulses in stick-slip mode", "validity"),
@@ -295,7 +289,7 @@ INTENSITY_MEASURES: dict[str, dict[str, Any]] = {
     "mean_period": _described("s", "mean period, 0.25 to 20 Hz"),
 }
 
-#: Coordinates of a suite along `motion`, beside it.
+#: Further coordinates of a suite along `motion`.
 MOTION_COORDINATES: dict[str, dict[str, Any]] = {
     "motion_file": {"long_name": "file of the motion"},
     "motion_sha256": {"long_name": "SHA-256 of the file of the motion"},
@@ -318,7 +312,7 @@ RECORD_SAMPLES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Coordinates of the statistics of `sample`, beside the parameters.
+#: Coordinates of the statistics of `sample`, further to the parameters.
 STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
     "quantile": _described("1", "share of the samples with a value that lies below"),
     "threshold": _described("m", "displacement to exceed"),
@@ -391,7 +385,7 @@ RESULT_DTYPES: dict[str, str] = {
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }
 
-#: What `sweep` returns when nothing is asked for by name.
+#: What `sweep` returns where no variables are named.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 DEFAULT_RECORD_RESULTS = ("permanent_displacement", "peak_relative_velocity", *RECORD_COUNTS, "validity")
 DEFAULT_SUITE_RESULTS = (*DEFAULT_RECORD_RESULTS, "motion_factor")

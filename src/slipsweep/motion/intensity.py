@@ -78,7 +78,7 @@ def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
         if "pgv" in given:
             return given["pgv"] / (peak_velocity(record) * given["time_scale"])
         # root by root: the square of a peak may be too large
-        root = math.sqrt(_ARIAS * float(_energy(record)[-1])) * record.peak
+        root = math.sqrt(_ARIAS * float(_energy(record)(record.times[-1]))) * record.peak
         return np.sqrt(given["arias_intensity"]) / np.sqrt(given["time_scale"]) / root
 
 
@@ -96,7 +96,7 @@ def peak_displacement(record: Motion) -> float:
 
 def arias_intensity(record: Motion) -> float:
     """Arias intensity π/(2g) ∫ Üg² dt, m/s (Arias 1970)."""
-    return _ARIAS * float(_energy(record)[-1]) * record.peak * record.peak
+    return _ARIAS * float(_energy(record)(record.times[-1])) * record.peak * record.peak
 
 
 def cumulative_absolute_velocity(record: Motion) -> float:
@@ -110,22 +110,15 @@ def significant_duration(record: Motion, low: float = 0.05, high: float = 0.95) 
     """Time between 5 % and 95 % of the Arias intensity, s (Trifunac and Brady 1975)."""
     from scipy.optimize import brentq
 
-    energy = _energy(record)
-    if not energy[-1] > 0.0:
+    energy, (first, last) = _energy(record), (record.times[0], record.times[-1])
+    total = float(energy(last))
+    if not total > 0.0:
         return 0.0
-    shape = _shape(record)
-    times = []
-    for share in (low, high):
-        at = int(np.searchsorted(energy, share * energy[-1])) - 1
-        slope, first = shape.c[:, at]
-        rest, step = share * energy[-1] - energy[at], float(record.times[at + 1] - record.times[at])
-
-        def missing(tau: float, slope: float = slope, first: float = first, rest: float = rest) -> float:
-            return tau * (first * first + slope * tau * (first + slope * tau / 3.0)) - rest
-
-        within = brentq(missing, 0.0, step, xtol=1e-15 * step) if missing(step) > 0.0 else step
-        times.append(float(record.times[at]) + within)
-    return times[1] - times[0]
+    begin, end = (
+        brentq(lambda time, share=share: float(energy(time)) - share * total, first, last, xtol=1e-15 * (last - first))
+        for share in (low, high)
+    )
+    return float(end - begin)
 
 
 def mean_period(record: Motion) -> float:
@@ -184,10 +177,10 @@ def _largest(curve: "PPoly", extremes: Floats) -> float:
     return float(np.abs(curve(np.concatenate([curve.x, extremes]))).max())
 
 
-def _energy(record: Motion) -> Floats:
-    """∫ Üg² dt up to every sample, with the peak as the unit."""
-    values = record.acceleration / (record.peak or 1.0)
-    first, last = values[:-1], values[1:]
+def _energy(record: Motion) -> "PPoly":
+    """∫ Üg² dt over time, with the peak as the unit."""
+    from scipy.interpolate import PPoly
+
+    (slope, first), times = _shape(record).c, record.times
     with np.errstate(over="ignore"):
-        parts = (first * first + first * last + last * last) * (np.diff(record.times) / 3.0)
-        return np.concatenate([[0.0], np.cumsum(parts)])
+        return PPoly(np.array([slope * slope, 2.0 * slope * first, first * first]), times).antiderivative()

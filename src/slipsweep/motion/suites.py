@@ -23,9 +23,6 @@ from slipsweep.motion.records import Record, record_of
 
 Floats = NDArray[np.float64]
 
-#: Letters of what a suite may be called after the entries that name its files.
-_LONGEST_NAME = 120
-
 #: Samples of the two components of a pair are at one time if they are nearer than this part of an interval.
 _SAME_TIME = 1e-6
 
@@ -360,9 +357,8 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         stems.append(stem)
         record = records.get(first, first)
         motions.append(Pair(record, records.get(second[0], second[0])) if second else record)
-    entries = paths if isinstance(paths, (list, tuple)) else [paths]
-    name = ", ".join(map(str, entries)) if all(isinstance(one, (str, Path)) for one in entries) else ""
-    return Suite(tuple(motions), _labels(stems), name if 0 < len(name) <= _LONGEST_NAME else "suite")
+    entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
+    return Suite(tuple(motions), _labels(stems), str(entry) if isinstance(entry, (str, Path)) else "suite")
 
 
 _Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, Path | Record]
@@ -434,7 +430,7 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]
     incomplete = [one for one in sources if one not in pairs and one not in pairs.values()]
     incomplete += [one for one, other in pairs.items() if other not in sources]
     if incomplete:
-        names = ", ".join((one.name if isinstance(one, (Path, Record)) else shown(one)) for one in incomplete)
+        names = ", ".join(one.name if isinstance(one, (Path, Record)) else shown(one) for one in incomplete)
         raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
     return list(pairs.items())
 
