@@ -412,7 +412,7 @@ def test_cases_keep_their_names(tmp_path: Path) -> None:
     drawn = ["dry ± joint", r"_wet \$^joint^\$"]
     for frequency in ([1.0, 2.0, 3.0], 1.0):
         table = plan_limits(0.005, zipped.but({"frequency": frequency})).solve()
-        figure = limit_chart(table.assign_attrs(labels={"case": names}))
+        figure = limit_chart(table.assign_coords(label=("case", names)))
         figure.savefig(tmp_path / "l.png")
         if frequency == 1.0:
             assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == drawn

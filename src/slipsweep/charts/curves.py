@@ -294,7 +294,9 @@ def _above_zero(curve: Curve) -> Curve:
 def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: dict[str, Any]) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
     xs, ys = _above_zero(curve)
-    text = panel.member(member) or ("all frequencies" if "frequency" in panel.data.dims else "this result")
+    several = panel.x != "frequency" and "frequency" in panel.data.dims
+    single = NEWMARK if panel.data.attrs["model"] == "newmark" else "this result"
+    text = panel.member(member) or ("all frequencies" if several else single)
     sheet.legend[text] = plot_curve(panel.axes, xs, ys, member / members, label=text, **look)
     for at in np.flatnonzero(np.isnan(ys[1:-1]) & (xs[1:-1] == xs[2:])) + 1:
         ends = [at - 1, at + 1]

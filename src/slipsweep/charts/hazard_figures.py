@@ -91,7 +91,7 @@ def hazard_chart(
             drawing.legend[plain(name)] = line_shown
     panel.set_xlabel("permanent displacement d (mm)")
     panel.set_ylabel("mean annual rate of u > d (1/year)")
-    texts = [model_text(rates.attrs), f"hazard curve {plain(str(rates.attrs['hazard_curve']))}"]
+    texts = [model_text(rates.attrs), f"hazard curve: {plain(str(rates.attrs['hazard_curve']))}"]
     if (held > 0.5 * lines).any():
         texts.append("Dotted: more than half of the rate comes from above the largest amplitude of the sweep, "
                      "where P is held constant.")  # fmt: skip

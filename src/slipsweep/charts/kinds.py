@@ -210,6 +210,10 @@ def _axis(
         if given == taken:
             raise InputError(f"--x {request.x} --y {request.y}: must be two different axes")
         dims = [str(dim) for dim in result.data[variable].dims]
+        if given not in PARAMETERS and given not in NAMED:
+            raise InputError(
+                f"{result.name}: --{option} {given}: must be a parameter: {', '.join(free) or 'none left'}"
+            )
         if given not in dims:
             raise InputError(
                 f"{result.name}: {given}: {variable} does not vary along it; it varies along {', '.join(dims)}"

@@ -60,8 +60,8 @@ HATCHES = {
 #: Hatching of displacements that have a trend which no block has.
 UNSOUND_HATCH = "///"
 
-#: Least extent of a hatched region, inches: a smaller one is a scrap of hatch, and is counted in the caption instead.
-_SCRAP = 0.12
+#: Least thickness of a hatched region, inches: a thinner one is a scrap of hatch; the caption counts its cells.
+_SCRAP = 0.09
 
 #: Displacements that people design for, m.
 _LEAST, _MOST = 1e-3, 1.0
@@ -352,9 +352,9 @@ def _finish(sheet: Sheet, name: str) -> Figure:
         for text, (cells, hatch) in hatches.items():
             look = {"facecolor": "none", "edgecolor": "0.2", "hatch": hatch}
             scraps[text] = scraps.get(text, 0) + _mark(sheet, panel, panel.grid(cells), text, look, scraps=False)
-    small = [f"{text.split(',')[0]} in {count}" for text, count in scraps.items() if count]
+    small = [f"{' '.join(text.split())} ({count} cell{'s' * (count > 1)})" for text, count in scraps.items() if count]
     if small:
-        sheet.notes.append(f"Regions too small to hatch: {', '.join(small)} cells.")
+        sheet.notes.append(f"Also, in regions too small to hatch: {'; '.join(small)}.")
     if name != "sliding_mode":
         sheet.note_left_out(name)
     return sheet.done(beside=False)
@@ -412,7 +412,7 @@ def _mark(
 
 
 def _large(panel: Panel, cells: NDArray[np.bool_], columns: Floats, rows: Floats) -> NDArray[np.bool_]:
-    """The cells of connected regions that are large enough for a hatch, both ways."""
+    """The cells of connected regions that are thick enough for a hatch."""
     to_inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
     xs = to_inches.transform(np.column_stack([columns, np.full_like(columns, rows[0])]))[:, 0]
     ys = to_inches.transform(np.column_stack([np.full_like(rows, columns[0]), rows]))[:, 1]
@@ -420,7 +420,8 @@ def _large(panel: Panel, cells: NDArray[np.bool_], columns: Floats, rows: Floats
     large = np.zeros(number + 1, bool)
     for at, (row, column) in enumerate(ndimage.find_objects(regions), start=1):
         extents = xs[column.stop] - xs[column.start], ys[row.stop] - ys[row.start]
-        large[at] = min(extents) >= _SCRAP
+        covered = float(np.mean(regions[row, column] == at)) * math.prod(extents)
+        large[at] = covered >= _SCRAP * max(extents)
     return np.asarray(large[regions])
 
 

@@ -48,7 +48,7 @@ _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5,
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 
 #: Width of a figure of one panel, inches, and characters of a caption in an inch.
-_WIDTH, _CHARACTERS = 7.0, 15
+_WIDTH, _CHARACTERS = 7.0, 16
 
 #: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
 _LINE, _LINES = 0.165, 4
@@ -100,19 +100,18 @@ class Drawing:
         lines = 0
         width, height = self.figure.get_size_inches()
         if self.axes is not None:
-            panel = self.axes
-            for other in (panel, *panel.child_axes):
-                if other.yaxis.get_ticks_position() == "right":
-                    panel = other
-            inside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.02 if panel is self.axes else 1.2, 1.0)}
+            right = any(other.yaxis.get_ticks_position() == "right" for other in self.axes.child_axes)
             if entries:
-                self.axes.legend(list(entries.values()), list(entries), fontsize="small", frameon=False, **inside)
+                self.axes.legend(
+                    list(entries.values()), list(entries), fontsize="small", frameon=False,
+                    loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0),
+                )  # fmt: skip
             add_caption(self.figure, self.axes, [*texts, *self.notes])
         else:
             self._set_small()
             if entries:
                 beside = beside and width > 5.0
-                columns = 1 if beside else max(1, int(width / 2.2))
+                columns = 1 if beside else max(1, int(width * 10.0 / self.look.font / 2.2))
                 self.figure.legend(
                     list(entries.values()), list(entries), ncols=columns, handlelength=3.2, fontsize="small",
                     frameon=False, loc="outside right upper" if beside else "outside upper center",
@@ -286,8 +285,8 @@ class Sheet(Drawing):
         shown = drawn > 0
         either = shown & (found["falls"] | found["below"])
         self.data["unsound"] = either.transpose(*drawn.dims)
-        counts = (int(one.sum()) for one in (shown & found["falls"], shown & found["below"], either, shown))
-        self.notes += unsound_text(*counts, what)
+        falls, below = (int((shown & found[name]).sum()) for name in ("falls", "below"))
+        self.notes += unsound_text(falls, below, int(either.sum()), int(shown.sum()), what)
 
     def done(self, beside: bool = True) -> Figure:
         """Draw legend and caption."""

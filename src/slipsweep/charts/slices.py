@@ -62,7 +62,7 @@ class Result:
     Raises
     ------
     InputError
-        It is no result of a sweep, or does not say what was solved.
+        It is no result of a sweep, does not say what was solved, or has other units than slipsweep writes.
     """
 
     def __init__(self, data: xr.Dataset, name: str) -> None:
@@ -80,27 +80,12 @@ class Result:
         ]  # fmt: skip
         self.data = data.sortby(falling) if falling else data
         self.attrs: dict[str, Any] = {str(key): value for key, value in data.attrs.items()}
-        self._check()
-        self.sort = self._sort()
-
-    def _check(self) -> None:
-        """Refuse a result that does not say what was solved, or has other units than slipsweep writes."""
-        recorded = not {"record", "suite"}.isdisjoint(self.attrs)
-        options = ("rise", "recoupling") if self.attrs.get("model") == "mendez" else ()
-        for name in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
-            if name not in self.attrs:
-                raise InputError(f"{self.name}: attribute {name!r}: missing; it says what was solved")
+        check_attributes(self.attrs, name)
         for key, about in (PARAMETERS | _RESULTS).items():
-            found = self.data[key].attrs.get("units") if key in self.data.variables else None
+            found = data[key].attrs.get("units") if key in data.variables else None
             if found and found != about.get("units", found):
-                raise InputError(f'{self.name}: {key}: units = "{found}"; must be "{about["units"]}"')
-        try:
-            MODELS.from_attributes(self.attrs)
-            if not recorded:
-                WAVEFORMS.from_attributes(self.attrs)
-            drawn_text(self.attrs)
-        except InputError as error:
-            raise InputError(f"{self.name}: {error}") from None
+                raise InputError(f'{name}: {key}: units = "{found}"; must be "{about["units"]}"')
+        self.sort = self._sort()
 
     def _sort(self) -> str:
         if any(name in STATISTICS for name in self.variables):
@@ -263,3 +248,19 @@ class Result:
         even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
         number = even[0] if even and size > number else number
         return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
+
+
+def check_attributes(attrs: Mapping[str, Any], name: str) -> None:
+    """Refuse a result of a sweep that does not say what was solved (InputError)."""
+    recorded = not {"record", "suite"}.isdisjoint(attrs)
+    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
+    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
+        if key not in attrs:
+            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
+    try:
+        MODELS.from_attributes(attrs)
+        if not recorded:
+            WAVEFORMS.from_attributes(attrs)
+        drawn_text(attrs)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None

@@ -130,9 +130,9 @@ def ratio_colours(number: int) -> ListedColormap:
     """
     below, above = (
         LinearSegmentedColormap.from_list("", ends)(np.linspace(0, 1, number))
-        for ends in (["#FFF0D2", "#E2A85C"], ["#9DB8DA", "#3C68A8"])
+        for ends in (["#FFF4DF", "#F0BE7E"], ["#A4BCDC", "#3C68A8"])
     )
-    return ListedColormap([*below, (0.68, 0.68, 0.68, 1.0), *above])
+    return ListedColormap([*below, (0.75, 0.75, 0.75, 1.0), *above])
 
 
 def to_grey(colour: Any) -> Any:
@@ -142,12 +142,10 @@ def to_grey(colour: Any) -> Any:
     return np.column_stack([grey, grey, grey, rgba[:, 3]])
 
 
-def grey_map(colours: Colormap) -> LinearSegmentedColormap:
+def grey_map(colours: Colormap) -> ListedColormap:
     """A map of colours by their lightness alone."""
-    found = LinearSegmentedColormap.from_list("grey", to_grey(colours(np.arange(colours.N))), colours.N)
-    found.set_under(to_grey(colours.get_under())[0])
-    found.set_over(to_grey(colours.get_over())[0])
-    return found
+    found = ListedColormap(to_grey(colours(np.arange(colours.N))))
+    return found.with_extremes(under=to_grey(colours.get_under())[0], over=to_grey(colours.get_over())[0])
 
 
 # ------------------------------------------------------------------------- names and units
@@ -300,11 +298,9 @@ def unsound_text(falls: int, below: int, either: int, total: int, what: str) -> 
     """What share of a picture no block would show: a sentence, or none."""
     if not either or not total:
         return []
-
-    def share(count: int) -> str:
-        return f"{100 * count / total:.2g} %"
-
+    parts = [("falls with A", falls), ("lies below half of Newmark's", below)]
+    shares = [f"{text} in {100 * count / total:.2g} %" for text, count in parts if count]
     return [
-        f"{what}: {share(either)} of the sliding cells shown. The displacement falls with A in {share(falls)} and "
-        f"lies below half of Newmark's in {share(below)}: a trend of the model that no block has."
+        f"{what}: {100 * either / total:.2g} % of the sliding cells shown. The displacement {' and '.join(shares)}, "
+        "a trend of the model that no block has."
     ]

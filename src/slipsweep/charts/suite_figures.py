@@ -50,6 +50,9 @@ SCALING = {
 #: Least displacement of a logarithmic axis, mm, where the largest is far above.
 _LEAST = 1.0
 
+#: Logarithms of an intensity measure within this are one value: motions scaled to it.
+_SAME = 1e-6
+
 _DISPLACEMENT = "permanent_displacement"
 _LABEL = "permanent displacement (mm)"
 
@@ -167,7 +170,7 @@ def intensity(sheet: Sheet, measure: str) -> Figure:
             panel.axes.plot(xs[below], np.full(below.sum(), low * 1.1), gid="below", **edge)
             sheet.legend["zero, or below the axis"] = Line2D([], [], **edge)
         _draw_regression(sheet, panel, xs, ys)
-    sheet.notes.append("Regression of ln u on the logarithm of the abscissa, of motions that slide; "
+    sheet.notes.append("Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
                        "σ: standard deviation of ln u about it.")  # fmt: skip
     sheet.notes.append(_scaling_text(sheet.data, measure))
     missing = int(np.count_nonzero(~np.isfinite(places)))
@@ -182,8 +185,10 @@ def intensity(sheet: Sheet, measure: str) -> Figure:
 def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
     """The line of ln u = a + b ln(measure), its R² and scatter over the panel."""
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
-    if np.unique(xs[slid]).size < 3:
+    if slid.sum() < 3:
         text = "no regression: fewer than 3 motions slide"
+    elif np.ptp(np.log(xs[slid])) < _SAME:
+        text = "no regression: one value for all motions"
     else:
         found: Any = stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
         rest = np.log(ys[slid]) - found.intercept - found.slope * np.log(xs[slid])

@@ -104,7 +104,8 @@ def limit(
     if figures:
         from slipsweep.charts.limit_figures import limit_chart
 
-        figure = limit_chart(table.assign_attrs(labels={"case": job.labels}))
+        labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
+        figure = limit_chart(labelled)
         for path in figures:
             write_figure(figure, path, overwrite)
     if not quiet:

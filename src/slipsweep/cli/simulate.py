@@ -197,6 +197,6 @@ def _write_csv(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Wavefo
 
 
 def _write_figure(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
-    from slipsweep.charts import figures
+    from slipsweep.charts.history_figures import history
 
-    write_figure(figures.history(table), path, overwrite)
+    write_figure(history(table), path, overwrite)

@@ -10,14 +10,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.charts.answers import amplitude_of
-from slipsweep.charts.slices import CODES, check_drawable, check_sweep
+from slipsweep.charts.slices import check_attributes
 from slipsweep.errors import InputError
 from slipsweep.files.results import FileVariable, ResultFile, result_file
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
-from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
+from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.studies.suite_statistics import suite_statistics
+
+#: Codes of cells, and what stands for a missing one.
+CODES = {"sliding_mode": -1, "validity": 0}
+
+#: Largest number that is drawn: products of a few of them are still numbers.
+_MOST = 1e75
 
 #: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
 LAYERS = {
@@ -149,7 +154,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
         if 0 in lengths.values():
             raise InputError(f"{path}: holds no cells")
         map_dims = _map_dims(path, lengths)
-        _check_made(file)
+        check_attributes(file.attrs, str(path))
         left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
         if math.prod(left.values()) > cells:
             raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
@@ -173,8 +178,7 @@ def _with_statistics(table: xr.Dataset) -> xr.Dataset:
         for name, kind in SHOWN.items()
         if name in found.data_vars
     }
-    coords = {**table.coords, **{dim: found[dim] for dim in ("quantile", "threshold")}}
-    return xr.Dataset({**table.data_vars, **results}, coords, table.attrs)
+    return table.assign(results).assign_coords({dim: found[dim] for dim in ("quantile", "threshold")})
 
 
 def _over_motions(attrs: Mapping[str, Any]) -> dict[str, Any]:
@@ -183,15 +187,16 @@ def _over_motions(attrs: Mapping[str, Any]) -> dict[str, Any]:
     return {**attrs, "long_name": text if "motions" in text else f"{text}, over all motions"}
 
 
-def _check_made(file: ResultFile) -> None:
-    """Refuse a file that does not say any more what was solved (InputError)."""
-    if not {"record", "suite"} & file.attrs.keys():
-        check_sweep(file)
-        return
-    for name in ("model", "g"):
-        if name not in file.attrs:
-            raise InputError(f"{file.path}: attribute {name!r}: missing; it says what was solved")
-    MODELS.from_attributes(file.attrs)
+def amplitude_of(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> xr.Variable:
+    """The amplitude A = ω²d: files do not hold it where d and the frequency span a grid."""
+    return xr.apply_ufunc(peak_acceleration, displacement_amplitude, frequency)
+
+
+def check_drawable(path: Path, name: str, values: NDArray[Any], most: float = _MOST) -> None:
+    """Refuse numbers that no drawing library can place (InputError)."""
+    beyond = values[np.abs(values) > np.float64(most)]  # np.float64: single precision would make it infinite
+    if beyond.size:
+        raise InputError(f"{path}: {name}: holds {beyond.flat[0]:.4g}; what is drawn must be within +-{most:g}")
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
