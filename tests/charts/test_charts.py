@@ -19,7 +19,7 @@ from slipsweep.charts.answers import newmark
 from slipsweep.charts.slices import Result
 from slipsweep.cli import main
 from slipsweep.errors import InputError
-from slipsweep.files.at import find, stored_indices
+from slipsweep.files.selection import find, places_at
 from slipsweep.model.variables import NOTES
 
 SINE = slipsweep.Sine(cycles=5)
@@ -243,7 +243,7 @@ def test_one_curve_has_newmarks_beside(grid: xr.Dataset, lined: xr.Dataset) -> N
     at: dict[str, Any] = {"theta": 6, "mu_s": 0.45}
     for x, cut in (("amplitude", {"frequency": 2.0}), ("frequency", {"amplitude": 9.0})):
         figure = grid.slipsweep.chart(at=at | cut)
-        given = {x: grid[x].values, **cut, "excitation": SINE}
+        given: dict[str, Any] = {x: grid[x].values, **cut, "excitation": SINE}
         ours, theirs = (
             slipsweep.sweep(6.0, 0.45, **given, model=model).permanent_displacement.values * 1000
             for model in ("mendez", "newmark")
@@ -450,16 +450,18 @@ def test_values_on_axes_are_found_as_messages_print_them(grid: xr.Dataset) -> No
         ({"frequency": f"{printed}Hz"}, {"frequency": [2]}),
         ({"frequency": f"{float(printed) * 1000:g}mHz"}, {"frequency": [2]}),
     ):
-        assert stored_indices(result, at) == expected
+        found = places_at(result, "result", at, list(map(str, result.dims)))
+        assert {name: places.tolist() for name, places in found.items()} == expected
     assert find(result, {"mu_s": 0.333})["mu_s"][0].index is None  # a number is what it is
-    for at, message in (
+    wrong: tuple[tuple[dict[str, Any], str], ...] = (
         ({"frequency": "1.2"}, r"frequency = 1.2: not among the values of the result; its neighbours are 0.948683 and"),
         ({"mu_s": "0.5"}, "mu_s = 0.5: outside the range of the result, 0.3 to 0.4"),
         ({"theta": 6}, "theta = 6: outside the range of the result, 5 degree"),
         ({"thta": 5}, 'did you mean "theta"'),
-    ):
+    )
+    for cut, message in wrong:
         with pytest.raises(InputError, match=message):
-            stored_indices(result, at)
+            places_at(result, "result", cut, list(map(str, result.dims)))
 
 
 def test_values_that_nothing_lies_between_are_refused_with_their_neighbours() -> None:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from slipsweep.files.at import At
+    from slipsweep.files.selection import At
 
     class _Options(TypedDict, total=False):
         at: Mapping[str, At] | None

@@ -13,7 +13,7 @@ from slipsweep._version import __version__
 from slipsweep.charts.maps import HATCHES
 from slipsweep.charts.slices import NAMED, Result
 from slipsweep.charts.style import LEFT_OUT, SYMBOLS, drawn_text, flag_name, model_text, plain, unit
-from slipsweep.files.at import labels_of
+from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import (
     FLAG_KINDS,
     PARAMETERS,
@@ -87,5 +87,5 @@ def _inputs(result: Result) -> list[str]:
         if len(values) > 1:
             ends = f"{values[0]:.4g} to {values[-1]:.4g}{space}{units}, {len(values)} values"
         texts.append(f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}: {ends}")
-    labels = {dim: labels_of(result.data, dim) for dim in NAMED if dim in result.dims}
+    labels = {dim: axis_labels(result.data, dim) for dim in NAMED if dim in result.dims}
     return texts + [f"{dim}s: {plain(', '.join(names))}" for dim, names in labels.items() if names]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from slipsweep.charts.sheet import Drawing, curve_looks, over, plot_curve, set_scale
 from slipsweep.charts.style import SYMBOLS, Look, axis_label, length_text, model_text, plain, value_text
 from slipsweep.charts.suite_figures import QUANTILES, SUITE, draw_suite, suite_text
-from slipsweep.files.at import axis_values, labels_of
+from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
 from slipsweep.studies.suite_statistics import limit_quantiles
 
@@ -61,7 +61,7 @@ def limit_chart(data: xr.Dataset, axes: Axes | None = None, look: Look | None = 
     size = max(6.0, 3.6 * len(across) + 1.2), max(4.2, 2.9 * len(down) + 1.3)
     drawing = Drawing(look or Look(), len(down), len(across), size, axes)
     family = shown[curves] if curves else [0]
-    x = axis_values(data, abscissa) if abscissa else np.zeros(1)
+    x = axis_numbers(data, abscissa) if abscissa else np.zeros(1)
 
     for (i, at_row), (j, at_column) in itertools.product(enumerate(down), enumerate(across)):
         panel = drawing.grid[i, j]
@@ -77,7 +77,7 @@ def limit_chart(data: xr.Dataset, axes: Axes | None = None, look: Look | None = 
         if title:
             panel.set_title(title, fontsize="medium")
         panel.grid(color="0.9", which="both")
-        names = labels_of(data, abscissa) if abscissa else []
+        names = axis_labels(data, abscissa) if abscissa else []
         if names:
             slanted = {"rotation": 40, "ha": "right"} if abscissa == "motion" else {}
             panel.set_xticks(x, list(map(plain, names)), **slanted)
@@ -142,8 +142,8 @@ def _text(name: str, value: float) -> str:
 
 
 def _label(data: xr.Dataset, name: str, index: int) -> str:
-    names = labels_of(data, name)
-    return f"{name} {plain(names[index])}" if names else _text(name, axis_values(data, name)[index])
+    names = axis_labels(data, name)
+    return f"{name} {plain(names[index])}" if names else _text(name, axis_numbers(data, name)[index])
 
 
 def _axis_label(name: str | None) -> str:

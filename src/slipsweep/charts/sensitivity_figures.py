@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from slipsweep.charts.sheet import Sheet, curve_looks, over, plot_curve
 from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, plain
 from slipsweep.errors import InputError
-from slipsweep.files.at import labels_of
+from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import SENSITIVITY_STATUS_TEXT, SensitivityStatus
 
 #: Results that the charts show, and how: name, interval, text, colour of bars.
@@ -34,7 +34,7 @@ def bars(sheet: Sheet) -> Figure:
         Of a slice over `input` and `bound` that holds `NAMES`.
     """
     _check_there(sheet)
-    inputs = labels_of(sheet.data, "input")
+    inputs = axis_labels(sheet.data, "input")
     _legend(sheet)
     totals = over(sheet.data["total_index"], sheet.data, ("input", sheet.across, sheet.down))
     order = np.argsort(np.nan_to_num(totals).reshape(len(inputs), -1).sum(axis=1))
@@ -66,7 +66,7 @@ def curves(sheet: Sheet) -> Figure:
         Of a slice over its abscissa, `input` and `bound` that holds `NAMES`.
     """
     _check_there(sheet)
-    inputs = labels_of(sheet.data, "input")
+    inputs = axis_labels(sheet.data, "input")
     sheet.set_axis("x", sheet.x)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")

@@ -40,7 +40,7 @@ from slipsweep.charts.style import (
     value_text,
 )
 from slipsweep.errors import InputError
-from slipsweep.files.at import axis_values, labels_of
+from slipsweep.files.selection import axis_labels, axis_numbers
 
 Floats = NDArray[np.float64]
 
@@ -214,7 +214,7 @@ class Panel:
 
     def values(self, name: str) -> Floats:
         """The values along an axis, in the units that they are drawn in."""
-        return axis_values(self.data, name) * self.look.scale(name, self.g)
+        return axis_numbers(self.data, name) * self.look.scale(name, self.g)
 
     def grid(self, name: str | xr.DataArray, along: str | None = None) -> Any:
         """A variable over (y, x), or over (y, `along`); without y of one row."""
@@ -323,10 +323,10 @@ def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
 
 def member_text(data: xr.Dataset, dim: str, index: int, look: Look) -> str:
     """A value of an axis that tells curves or panels apart: ``θ = 5°``, or a case by its label."""
-    labels = labels_of(data, dim)
+    labels = axis_labels(data, dim)
     if labels:
         return plain(labels[index])
-    value = float(axis_values(data, dim)[index]) if dim in data.sizes else float(data[dim].values[index])
+    value = float(axis_numbers(data, dim)[index]) if dim in data.sizes else float(data[dim].values[index])
     if dim == "threshold":
         return f"d = {length_text(value)}"
     if dim not in SYMBOLS:

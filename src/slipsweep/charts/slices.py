@@ -13,7 +13,7 @@ import xarray as xr
 from slipsweep.charts.answers import solve, with_amplitude
 from slipsweep.charts.style import drawn_text
 from slipsweep.errors import InputError
-from slipsweep.files.at import At, Place, between, find, labels_of
+from slipsweep.files.selection import At, Place, axis_labels, between, find
 from slipsweep.model.options import MODELS
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
@@ -149,7 +149,7 @@ class Result:
         Raises
         ------
         InputError
-            As `slipsweep.files.at.find`, or a value between those of the result where no slice can be solved.
+            As `slipsweep.files.selection.find`, or a value between those of the result where no slice can be solved.
         """
         there = self.data[[*self.variables, *(name for name in self.data.coords if name in _KEPT)]]
         found = find(there, at, self.name)
@@ -209,9 +209,9 @@ class Result:
             where[dim] = found if dim in keep else found[0]
         wanted = [name for name in names if name in self.variables]
         picked = {
-            dim: labels_of(self.data, dim)[where[dim]]
+            dim: axis_labels(self.data, dim)[where[dim]]
             for dim in NAMED
-            if dim in where and dim not in keep and labels_of(self.data, dim)
+            if dim in where and dim not in keep and axis_labels(self.data, dim)
         }
         coords = [name for name in self.data.coords if name in _KEPT or name in self.dims]
         data = self.data[[*wanted, *coords]].isel(where).load()

@@ -142,7 +142,7 @@ def to_grey(colour: Any) -> Any:
     return np.column_stack([grey, grey, grey, rgba[:, 3]])
 
 
-def grey_map(colours: Colormap) -> ListedColormap:
+def grey_map(colours: Colormap) -> Colormap:
     """A map of colours by their lightness alone."""
     found = ListedColormap(to_grey(colours(np.arange(colours.N))))
     return found.with_extremes(under=to_grey(colours.get_under())[0], over=to_grey(colours.get_over())[0])

@@ -26,7 +26,7 @@ from slipsweep.charts.sheet import (
 )
 from slipsweep.charts.style import BLUE, NEWMARK, VERMILION, flag_name, unit_text
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES
-from slipsweep.studies.suite_datasets import suite_statistics
+from slipsweep.studies.suite_statistics import suite_statistics
 
 Floats = NDArray[np.float64]
 

@@ -69,12 +69,12 @@ def chart(
     from slipsweep.charts import book, kinds
     from slipsweep.charts.slices import Result
     from slipsweep.files import outputs
-    from slipsweep.runs.opening import open_result
+    from slipsweep.files.opening import read_result
 
     requested = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
     if levels is not None and requested and {"contours", "fragility"}.isdisjoint(requested):
         raise InputError(f"--levels {levels}: only with --kind contours or fragility")
-    with open_result(file) as data:
+    with read_result(file) as data:
         result = kinds.drawable(data, file)
         chosen_levels = levels.split(",") if levels else ()
         look = kinds.look_of(result, variable, chosen_levels, units, show_cautions, width, grey)
