@@ -696,7 +696,7 @@ def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path
     with slipsweep.open_result(path) as data:
         title = book.title_page(Result(data, "grid.nc"))
     text = "\n".join(one.get_text() for one in title.texts)
-    assert "plane inclination θ: 0 to 20°, 11 values" in text
+    assert " θ: 0 to 20°, 11 values" in text
     for flag in maps.HATCHES:
         assert f"{(flag.name or '').lower()} (" in text
     for one in title.texts:

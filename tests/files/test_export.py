@@ -265,7 +265,7 @@ def test_the_rows_of_a_pivoted_table_are_all_other_axes_unless_chosen(folder: Pa
     [
         (("--at", "theta=6"), "theta = 6: not among the values of the result; its neighbours are 5 and 20 degree"),
         (("--at", "theta=21"), "theta = 21: outside the range of the result, 0 to 20 degree"),
-        (("--at", "thet=5"), '--at thet=5: no such axis here; did you mean "theta"?'),
+        (("--at", "thet=5"), 'thet = 5: no such axis; did you mean "theta"?'),
         (("--at", "theta=5mm"), "must be a number, with a unit that converts to degree"),
         (("--at", "theta"), "--at theta: must be NAME=VALUE"),
         (("--rows", "theta"), "--rows theta: needs --columns"),
