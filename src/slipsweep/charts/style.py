@@ -26,6 +26,7 @@ COLOURS = LinearSegmentedColormap.from_list("pale", mpl.colormaps["YlGnBu"](np.l
 SYMBOLS = {
     "theta": "θ",
     "mu_s": "μs",
+    "phi": "φ",
     "amplitude": "A",
     "displacement_amplitude": "d",
     "frequency": "f",

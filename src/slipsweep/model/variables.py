@@ -188,7 +188,7 @@ _DIRECTION = (
 PARAMETERS: dict[str, dict[str, Any]] = {
     "theta": _described("degree", "base inclination"),
     "mu_s": _described("1", "static friction coefficient"),
-    "phi": _described("degree", "friction angle, in place of mu_s = tan(phi)"),
+    "phi": _described("degree", "friction angle of the interface"),
     "amplitude": _described("m s-2", "peak ground acceleration"),
     "displacement_amplitude": _described("m", "peak ground displacement"),
     "frequency": _described("Hz", "excitation frequency"),
