@@ -1,44 +1,34 @@
-"""Faults tried and survived: ``python -m benchmarks.faults`` writes faults.md.
+"""What a user meets, many times over: ``python -m benchmarks.faults`` writes results/faults.md.
 
-Does rounds of every kind in tests/support/fault_rounds.py; the first fault that is not survived ends it with
-an error.  ``.ci/include-report`` puts the table into docs/large-sweeps.md.  Nothing is timed.
+The rounds are those of tests/support/fault_rounds.py; the first fault that is not survived ends it.
 """
 
 import random
 import tempfile
 from pathlib import Path
 
-from benchmarks.machine import arguments, measured_on, table
-from tests.support.fault_rounds import FAULTS, OUTPUTS, can_be_done, damaged, rounds
+from benchmarks import machine
+from tests.support.fault_rounds import FAULTS, OUTPUTS, prepared
 
-#: Rounds of each kind; those in this process are cheap.
-ROUNDS, CHEAP_ROUNDS = 10, 200
+ROUNDS = 50
 
 
 def main() -> None:
-    """Do all rounds, write faults.md."""
-    given = arguments(__doc__, counts={"rounds": ROUNDS})
-    seed = 1 if given.tiny else random.randrange(2**31)
-    print(f"seed {seed}", flush=True)
-    names = [name for name in FAULTS if FAULTS[name] is damaged or not given.tiny]
-    rows, total = [], dict.fromkeys(OUTPUTS, 0)
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder).chmod(0o755)  # for the faults done as another user
-        for name in names:
-            count = given.rounds if FAULTS[name] is not damaged else 1 if given.tiny else CHEAP_ROUNDS
-            row, reason = [name], can_be_done(name)
-            for kind, output in OUTPUTS.items():
-                done = 0 if reason else rounds(name, Path(folder), seed, count, output)
-                total[kind] += done
-                row += [str(done), str(done)]
-            rows.append([*row, reason or "–"])
-            print(*rows[-1], flush=True)
-    rows.append(["all", *(str(total[kind]) for kind in OUTPUTS for _ in range(2)), ""])
-    header = ["fault", *(f"{kind}: {word}" for kind in OUTPUTS for word in ("tried", "survived")), "why not here"]
-    head = (
-        f"{measured_on(('numpy', 'numba', 'netCDF4', 'zarr', 'distributed'))} Written by `python -m benchmarks.faults`."
-    )
-    (given.folder / "faults.md").write_text(f"{head}\n\n{table(header, rows)}")
+    """Do the rounds, and write the table."""
+    given = machine.arguments(__doc__)
+    rounds = 1 if given.tiny else ROUNDS
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        whole = prepared(folder)
+        for fault, tried in FAULTS.items():
+            for number in range(rounds):
+                tried(folder, OUTPUTS[number % 2], whole, random.Random(number))
+            rows.append([fault, " ".join((tried.__doc__ or "").split()), rounds, rounds])
+            print(f"{fault}: {rounds}", flush=True)
+            text = f"{machine.measured_on(('netCDF4', 'zarr', 'distributed'))}\n\n"
+            text += machine.table(["fault", "what it is", "tried", "survived"], rows)
+            (given.folder / "faults.md").write_text(text)
 
 
 if __name__ == "__main__":

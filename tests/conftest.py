@@ -3,7 +3,6 @@
 import os
 import signal
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -24,25 +23,6 @@ def _no_power_cut() -> Iterator[None]:
     """Nothing waits for the disk, which alone takes minutes on a slow one; processes that tests start do wait."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda descriptor: None)
-        yield
-
-
-@pytest.fixture(scope="module")
-def tried_here() -> Iterator[None]:
-    """Have results tried out in this process, not in a copy of it: 0.1 s less for each that is opened.
-
-    For files that tests have written themselves; tests/files/test_results.py opens those that are damaged.
-    """
-    from slipsweep.files import guard  # here: the settings above come first
-
-    def tried(read: guard.Trial, path: Path) -> tuple[int, str]:
-        told: list[str] = []
-        return guard._run(read, path, told.append), "".join(told)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(guard, "_limit_memory", lambda: None)
-        patch.setattr(guard, "_next_step", lambda: None)
-        patch.setattr(guard, "_forked", tried)
         yield
 
 

@@ -8,7 +8,7 @@ from slipsweep.jit.sources import PACKAGE
 
 #: Folders, and modules at the top, in the order in which data walk.
 ORDER = (
-    "_version", "errors", "jit", "model", "motion", "kernels", "grid", "studies", "files", "runs", "charts", "explore",
+    "_version", "errors", "jit", "model", "motion", "kernels", "grid", "studies", "files", "charts", "explore",
     "cli",
 )  # fmt: skip
 

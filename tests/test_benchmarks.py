@@ -12,19 +12,16 @@ ROOT = Path(__file__).resolve().parent.parent
 WRITES = {
     "report": ["report.md"],
     "roofline": ["roofline.md"],
-    "large_sweeps": ["large_sweeps.md", "scaling.md", "large_sweeps.json"],
+    "large_sweeps": ["large_sweeps.md"],
     "records": ["records.md"],
     "paper_waveforms": ["paper_waveforms.md", "paper_waveforms.png"],
     "faults": ["faults.md"],
     "agreement": ["agreement.md"],
     "limits": ["limits.md"],
-    "hunt": ["hunt.md"],
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
     "waveforms": ["waveforms.md"],
     "variables": ["variables.md"],
     "uncertainty": ["uncertainty.md"],
-    "stores": ["stores.md"],
-    "writers": ["writers.md"],
     "calibration": ["calibration.md"],
     "commits": ["commits.csv", "commits.png"],
     "steps": ["steps.md"],
@@ -33,7 +30,7 @@ WRITES = {
 }
 
 #: Half a minute of processes, clusters and compilation.
-SLOW = ("large_sweeps", "writers", "commits", "steps")
+SLOW = ("large_sweeps", "faults", "commits", "steps")
 
 
 @pytest.fixture(autouse=True)

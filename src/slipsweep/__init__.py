@@ -20,16 +20,17 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.model.variables import SlidingMode, Validity
 
 if TYPE_CHECKING:
+    from slipsweep.files.opening import open_result
     from slipsweep.model.options import Cycle, Mendez, Newmark, Step
     from slipsweep.motion.records import Record, read_record
     from slipsweep.motion.suites import Pair, Suite, read_suite
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
-    from slipsweep.runs.opening import open_result
     from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
     from slipsweep.studies.decoding import flags
-    from slipsweep.studies.hazard import HazardCurve
+    from slipsweep.studies.hazard import displacement_hazard
+    from slipsweep.studies.hazard_curves import HazardCurve
     from slipsweep.studies.shaking_tests import calibrate, measured_friction
-    from slipsweep.studies.suite_datasets import displacement_hazard, suite_statistics
+    from slipsweep.studies.suite_statistics import suite_statistics
 
 __all__ = [
     "Cosine",
@@ -76,9 +77,10 @@ _LAZY = {
         ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
     ),
     "flags": "slipsweep.studies.decoding",
-    "open_result": "slipsweep.runs.opening",
-    "HazardCurve": "slipsweep.studies.hazard",
-    **dict.fromkeys(("displacement_hazard", "suite_statistics"), "slipsweep.studies.suite_datasets"),
+    "open_result": "slipsweep.files.opening",
+    "HazardCurve": "slipsweep.studies.hazard_curves",
+    "displacement_hazard": "slipsweep.studies.hazard",
+    "suite_statistics": "slipsweep.studies.suite_statistics",
     **dict.fromkeys(("calibrate", "measured_friction"), "slipsweep.studies.shaking_tests"),
 }
 

@@ -8,8 +8,7 @@ import pytest
 
 import slipsweep
 from slipsweep.charts import style
-from slipsweep.files import results
-from slipsweep.grid.plans import plan_sweep
+from slipsweep.files.opening import read_result
 from slipsweep.model.estimates import friction_inputs
 from tests.support.commands import command
 
@@ -30,8 +29,9 @@ BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency
     ],
 )
 def test_every_result_says_what_is_estimated(given: dict[str, Any], words: str) -> None:
-    assert slipsweep.sweep(**BLOCK, **given).attrs["friction_inputs"] == words
-    assert style.model_text(plan_sweep(**BLOCK, **given).attrs).startswith(f"{words}\n")
+    attrs = slipsweep.sweep(**BLOCK, **given).attrs
+    assert attrs["friction_inputs"] == words
+    assert style.model_text(attrs).startswith(f"{words}\n")
     if "yield_acceleration" not in given or np.ndim(given["yield_acceleration"]) == 0:
         assert slipsweep.simulate(**BLOCK, **given).attrs["friction_inputs"] == words
     limit = {name: value for name, value in BLOCK.items() if name != "amplitude"}
@@ -72,7 +72,7 @@ def test_summaries_files_and_info_say_it(tmp_path: Path) -> None:
     sweep.write_text("".join(f"[axes.{name}]\nvalues = [{value}]\n" for name, value in BLOCK.items()))
     path = tmp_path / "a.nc"
     assert f"\ninputs: {words}\n" in command(tmp_path, "run", sweep, "-o", path).stdout
-    assert results.read_contents(path).attributes["friction_inputs"] == words
+    assert read_result(path).attrs["friction_inputs"] == words
     assert f"\nfriction_inputs: {words}\n" in command(tmp_path, "info", path).stdout
     assert f"\ninputs: {words}\n" in command(tmp_path, "limit", sweep, "--displacement", "10mm").stdout
     options = [option for name, value in BLOCK.items() for option in (f"--{name.replace('_', '-')}", str(value))]

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from slipsweep.charts import kinds
-from slipsweep.charts.slices import Result
 from tests.support.commands import command
 
 SWEEP = """
@@ -29,13 +27,11 @@ def test_a_report_has_a_title_page_and_a_chart_a_page(tmp_path: Path) -> None:
     assert command(tmp_path, "run", "a.toml").returncode == 0
     done = command(tmp_path, "report", "a.nc")
     assert (done.returncode, done.stderr) == (0, "")
-    first, *left_out = done.stdout.splitlines()
-    assert first == "a.pdf"
-    with Result(tmp_path / "a.nc") as result:
-        fitting = kinds.fitting(result)
-    assert any(line.startswith("no newmark: ") for line in left_out)
+    assert done.stdout == "a.pdf\n"
     pages = re.findall(rb"/Type /Page\b", (tmp_path / "a.pdf").read_bytes())
-    assert len(pages) == 1 + len(fitting) - len(left_out)
+    assert (
+        len(pages) == 1 + 5
+    )  # contours, modes, families, dimensionless, spread; no ratio of Newmark's block to itself
     content = (tmp_path / "a.pdf").read_bytes()
     for arguments, message in (
         (("a.nc",), "a.pdf: exists already; give --overwrite"),

@@ -26,8 +26,6 @@ from slipsweep.explore.page import write_page
 from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, NOTES, VALIDITY_TEXT, VALUELESS, FlagKind, flags_of
 from tests.support.commands import command
 
-pytestmark = pytest.mark.usefixtures("tried_here")
-
 pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
 
 #: Stuck, stick-slip, continuous, flagged and statically unstable cells.

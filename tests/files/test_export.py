@@ -17,12 +17,10 @@ import xarray as xr
 import slipsweep
 from slipsweep.errors import InputError
 from slipsweep.files import export, spec
+from slipsweep.files import storing as store
+from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import FLAG_KINDS, VALIDITY_TEXT, Validity
-from slipsweep.runs import store
-from slipsweep.runs.jobs import sweep_job
 from tests.support.commands import command
-
-pytestmark = pytest.mark.usefixtures("tried_here")
 
 GRID = """
 [axes.theta]
@@ -172,7 +170,7 @@ def test_memory_stays_that_of_a_chunk(tmp_path: Path) -> None:
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert peak < 0.1 * (tmp_path / "a.csv").stat().st_size
+    assert peak < 0.2 * (tmp_path / "a.csv").stat().st_size
 
 
 def test_the_command(folder: Path) -> None:
@@ -265,9 +263,9 @@ def test_the_rows_of_a_pivoted_table_are_all_other_axes_unless_chosen(folder: Pa
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--at", "theta=6"), "theta=6: not among the values of the file; its neighbours are 5 and 20 degree"),
-        (("--at", "theta=21"), "theta=21: outside the values of the file, 0 to 20 degree"),
-        (("--at", "thet=5"), '--at thet=5: no such axis here; did you mean "theta"?'),
+        (("--at", "theta=6"), "theta = 6: not among the values of the result; its neighbours are 5 and 20 degree"),
+        (("--at", "theta=21"), "theta = 21: outside the range of the result, 0 to 20 degree"),
+        (("--at", "thet=5"), 'thet = 5: no such axis; did you mean "theta"?'),
         (("--at", "theta=5mm"), "must be a number, with a unit that converts to degree"),
         (("--at", "theta"), "--at theta: must be NAME=VALUE"),
         (("--rows", "theta"), "--rows theta: needs --columns"),
@@ -309,7 +307,7 @@ def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
     assert [row[-1] for row in rows[1:]] == ["statically_unstable", "yield_governs"]
     assert book["permanent_displacement"].cell(2, book["permanent_displacement"].max_column).value is None
     about = {str(name): text for name, text in book["about"].iter_rows(values_only=True) if name}
-    assert about["plane inclination"] == "2 values, 5 to 25 degree"
+    assert about["base inclination"] == "2 values, 5 to 25 degree"
     assert about["friction parameters"] == "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"
     assert about["1 statically_unstable"].startswith("no value: 50.00% of 6 cells; ")
     assert about["file"] == str(folder / "cases.nc")

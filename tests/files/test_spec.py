@@ -10,7 +10,39 @@ from slipsweep import Cycle, Mendez, Newmark, Sine, Step
 from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.model import variables
-from tests.support.sweep_files import CASES, GOOD
+
+GOOD = """
+[axes.theta]
+start = 0
+stop = 20
+num = 5
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.amplitude]
+start = 0.1
+stop = 1
+num = 4
+units = "g"
+[axes.frequency]
+start = 0.1
+stop = 10
+num = 3
+spacing = "log"
+"""
+
+CASES = """
+[[cases]]
+label = "first"
+theta = 5
+amplitude = 3
+[[cases]]
+theta = 6
+amplitude = 5
+[axes.mu_s]
+values = [0.3, 0.5, 0.7]
+[axes.frequency]
+values = [1, 2]
+"""
 
 MU_S = "[axes.mu_s]\nvalues = [0.3, 0.5]"
 FREQUENCY = '[axes.frequency]\nstart = 0.1\nstop = 10\nnum = 3\nspacing = "log"'
@@ -24,7 +56,7 @@ def axis(name: str, body: str) -> str:
 
 
 def test_axes_become_arrays_in_the_parameters_own_units() -> None:
-    arguments = spec.parse(GOOD, "a.toml").arguments()
+    arguments = spec.parse(GOOD, "a.toml").inputs().given
     np.testing.assert_allclose(arguments["theta"], [0, 5, 10, 15, 20])
     np.testing.assert_allclose(arguments["mu_s"], [0.3, 0.5])
     np.testing.assert_allclose(arguments["amplitude"], np.array([0.1, 0.4, 0.7, 1.0]) * 9.81)
@@ -33,12 +65,11 @@ def test_axes_become_arrays_in_the_parameters_own_units() -> None:
 
 def test_defaults() -> None:
     sweep = spec.parse(GOOD, "a.toml")
-    arguments = sweep.arguments()
-    assert arguments["excitation"] == Sine(cycles=10, ramp_in=0.0, ramp_out=0.0)
-    assert arguments["model"] == Mendez(rise="monotone", recoupling="eq12", g=9.81)
-    assert arguments["solver"] == Cycle()
-    assert arguments["variables"] == list(variables.DEFAULT_RESULTS)
-    assert "yield_acceleration" not in arguments
+    assert sweep.excitation == Sine(cycles=10, ramp_in=0.0, ramp_out=0.0)
+    assert sweep.model == Mendez(rise="monotone", recoupling="eq12", g=9.81)
+    assert sweep.solver == Cycle()
+    assert sweep.output.variables == list(variables.DEFAULT_RESULTS)
+    assert "yield_acceleration" not in sweep.inputs().given
     plan = sweep.plan()
     assert plan.sizes == {"theta": 5, "mu_s": 2, "amplitude": 4, "frequency": 3}
     assert list(plan.names) == list(variables.DEFAULT_RESULTS)
@@ -65,15 +96,14 @@ def test_every_word_reaches_the_sweep(table: str, key: str) -> None:
     found = []
     for word in WORDS[table, key]:
         step = 'method = "step"\n' if key == "rule" else ""
-        arguments = spec.parse(f'{GOOD}[{table}]\n{step}{key} = "{word}"\n', "a.toml").arguments()
-        choice = arguments[table]
+        choice = getattr(spec.parse(f'{GOOD}[{table}]\n{step}{key} = "{word}"\n', "a.toml"), table)
         assert word in ("auto", choice.name, getattr(choice, key, None))
         found.append(choice)
     assert len(set(found)) == len(WORDS[table, key]) - ("auto" in WORDS[table, key])
 
 
 def test_options_reach_the_sweep() -> None:
-    arguments = spec.parse(
+    sweep = spec.parse(
         GOOD
         + """
         [model]
@@ -92,32 +122,28 @@ def test_options_reach_the_sweep() -> None:
         variables = ["validity"]
         """,
         "a.toml",
-    ).arguments()
-    expected = {
-        "model": Mendez(rise="literal", recoupling="integrate", g=9.8),
-        "excitation": Sine(cycles=5),
-        "solver": Step(rule="simpson", steps_per_cycle=512),
-        "yield_acceleration": 0.5,
-        "structure_frequency": 3.0,
-        "variables": ["validity"],
-    }
-    assert {name: arguments[name] for name in expected} == expected
+    )
+    assert sweep.model == Mendez(rise="literal", recoupling="integrate", g=9.8)
+    assert sweep.excitation == Sine(cycles=5)
+    assert sweep.solver == Step(rule="simpson", steps_per_cycle=512)
+    assert (sweep.inputs().yield_acceleration, sweep.inputs().structure_frequency) == (0.5, 3.0)
+    assert sweep.output.variables == ["validity"]
 
 
 def test_newmark_has_no_rise() -> None:
-    arguments = spec.parse(GOOD + '[model]\nfriction = "newmark"\n', "a.toml").arguments()
-    assert arguments["model"] == Newmark()
-    assert not hasattr(arguments["model"], "rise")
+    model = spec.parse(GOOD + '[model]\nfriction = "newmark"\n', "a.toml").model
+    assert model == Newmark()
+    assert not hasattr(model, "rise")
 
 
 def test_coulomb_is_the_default_that_an_axis_replaces() -> None:
     text = GOOD + '[model]\nyield_acceleration = "coulomb"\n[axes.yield_acceleration]\nvalues = [0.5, 1]\n'
-    np.testing.assert_array_equal(spec.parse(text, "a.toml").arguments()["yield_acceleration"], [0.5, 1])
+    np.testing.assert_array_equal(spec.parse(text, "a.toml").inputs().given["yield_acceleration"], [0.5, 1])
 
 
 def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
     sweep = spec.parse(CASES, "a.toml")
-    arguments = sweep.arguments()
+    arguments = sweep.inputs().given
     assert sweep.plan().sizes == {"mu_s": 3, "frequency": 2, "case": 2}
     assert sweep.labels == ("first", "2")
     for name, values in {"theta": [5, 6], "amplitude": [3, 5]}.items():
@@ -128,7 +154,7 @@ def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
 def test_the_plan_of_a_block() -> None:
     part = spec.parse(CASES, "a.toml").plan().part({"mu_s": slice(1, 3), "case": slice(1, 2)})
     assert part.sizes == {"mu_s": 2, "frequency": 2, "case": 1}
-    coords = part.empty().coords
+    coords = part.template().coords
     np.testing.assert_array_equal(coords["mu_s"].values, [0.5, 0.7])
     np.testing.assert_array_equal(coords["frequency"].values, [1, 2])
     np.testing.assert_array_equal(coords["theta"].values, [6])
@@ -154,17 +180,18 @@ def test_the_plan_of_a_block() -> None:
 )
 def test_units(name: str, units: str, factor: float) -> None:
     text = axis(name, f'values = [0.25, 0.5]\nunits = "{units}"')
-    np.testing.assert_allclose(spec.parse(text, "a.toml").arguments()[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
+    given = spec.parse(text, "a.toml").inputs().given
+    np.testing.assert_allclose(given[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
 
 
 def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:
-    arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").arguments()
+    arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").inputs().given
     assert arguments["amplitude"][-1] == 1.62
 
 
 def test_displacement_amplitude_in_millimetres() -> None:
     text = GOOD.replace("axes.amplitude", "axes.displacement_amplitude").replace('"g"', '"mm"')
-    arguments = spec.parse(text, "a.toml").arguments()
+    arguments = spec.parse(text, "a.toml").inputs().given
     np.testing.assert_allclose(arguments["displacement_amplitude"], [1e-4, 4e-4, 7e-4, 1e-3])
 
 

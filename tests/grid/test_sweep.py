@@ -16,6 +16,7 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans
 from slipsweep.grid.chunks import slabs
+from slipsweep.grid.inputs import Inputs
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -285,7 +286,7 @@ def test_what_is_given_is_a_coordinate_and_no_result() -> None:
 def test_the_frequency_axis_costs_no_kernel_calls(solver: str, cells_solved: list[int]) -> None:
     slipsweep.sweep(**AXES, solver=solver)
     assert sum(cells_solved) == 3 * 2 * 4
-    plan = plans.plan_sweep(**AXES)
+    plan = plans.plan_sweep(Inputs(**AXES))
     inputs = engine.cell_inputs(plan.tasks[0].inputs, 4, 9.81)
     assert engine.cells_to_solve((3, 2, 4, 5), inputs, plan.tasks[0].inputs["frequency"]) == 3 * 2 * 4
 
@@ -309,7 +310,7 @@ def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
     result = slipsweep.sweep(**AXES, variables=FRICTION_PARAMETERS)
     assert tuple(result.data_vars) == tuple(name for name in RESULTS if name in FRICTION_PARAMETERS)
     assert not cells_solved
-    plan = plans.plan_sweep(**AXES, variables=["sliding_mode"])
+    plan = plans.plan_sweep(Inputs(**AXES), variables=["sliding_mode"])
     assert [task.names for task in plan.tasks] == [("sliding_mode",)]
     assert plan.tasks[0].solve().keys() == {"sliding_mode"}
 

@@ -3,14 +3,18 @@
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from slipsweep import HazardCurve, InputError, Newmark, RunError, Validity, displacement_hazard
+import slipsweep
+from slipsweep import HazardCurve, InputError, Newmark, Record, RunError, Suite, Validity, displacement_hazard
 from slipsweep.model.options import MODELS
-from slipsweep.studies.hazard import exceedance_rates, read_hazard_curve
+from slipsweep.studies.fragility import fragility, openquake_fragility
+from slipsweep.studies.hazard import exceedance_rates
+from slipsweep.studies.hazard_curves import read_hazard_curve
 from tests.studies.test_suite_statistics import suite_result
 from tests.support.commands import command
 
@@ -28,21 +32,17 @@ def power_law(k0: float, k: float, points: int = 12) -> HazardCurve:
     return HazardCurve(amplitude, k0 * amplitude**-k)
 
 
-@pytest.mark.parametrize("k", [0.5, 1.0, 2.5, 4.0])
-@pytest.mark.parametrize(("median", "beta"), [(0.3, 0.3), (2.0, 0.6), (5.0, 0.9)])
+@pytest.mark.parametrize("k", [0.5, 2.5, 4.0])
+@pytest.mark.parametrize(("median", "beta"), [(0.3, 0.3), (5.0, 0.9)])
 def test_the_closed_form_of_a_power_law_and_a_lognormal_fragility(k: float, median: float, beta: float) -> None:
-    """λ = k0 θ^-k exp(k² β² / 2) (Cornell 1996); as an array and as a function."""
+    """λ = k0 θ^-k exp(k² β² / 2) (Cornell 1996)."""
     k0 = 3e-4
     expected = k0 * median**-k * math.exp(0.5 * (k * beta) ** 2)
     amplitude = median * np.exp(beta * np.linspace(-12.0, 12.0, 2401))
-
-    def fragility(a: Any) -> Any:
-        return norm.cdf(np.log(a / median) / beta)
-
-    for given in (fragility, fragility(amplitude)):
-        found = exceedance_rates(power_law(k0, k), amplitude, given)
-        assert float(found.rate) == pytest.approx(expected, rel=1e-3)
-        assert float(found.omitted) < 1e-9 * expected
+    found = exceedance_rates(power_law(k0, k), amplitude, norm.cdf(np.log(amplitude / median) / beta))
+    assert float(found.rate) == pytest.approx(expected, rel=1e-3)
+    assert float(found.omitted) < 1e-9 * expected
+    assert found.lower < expected < found.upper < 1.1 * expected
 
 
 def test_a_step_is_the_curve_itself() -> None:
@@ -80,19 +80,27 @@ def test_against_quadrature() -> None:
     assert float(exceedance_rates(curve, amplitude, chance).rate) == pytest.approx(expected, rel=1e-9)
 
 
-# -------------------------------------------------------------------------------- of a suite
+def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_two_amplitudes() -> None:
+    curve = curve_of([0.5, 2.0, 8.0], [0.1, 0.01, 0.001])
+    found = exceedance_rates(curve, [1.0, 4.0], [[0.0], [1.0]])
+    first, last = curve.rate_at(np.array([1.0, 4.0]))
+    np.testing.assert_allclose([found.lower[0], found.upper[0]], [last, first], rtol=1e-12)
+
+
+# ----------------------------------------------------------------- of a suite, of uncertain inputs, of both
 
 
 def test_of_a_suite_by_hand() -> None:
     """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
     nan, unstable = np.nan, int(Validity.STATICALLY_UNSTABLE)
-    u = np.array([[0.0, 0.0, 0.0], [nan, 0.2, 0.0], [nan, nan, nan], [0.3, 0.2, 0.5]])
+    u = np.array([[0.0, 0.0, 0.0], [nan, 0.2, 0.0], [nan, nan, nan], [0.0, 0.2, 0.5], [0.3, 0.2, 0.5]])
     values = np.stack([u, np.full_like(u, nan)])
     flags = np.where(np.isnan(values), unstable, 0)
-    result = suite_result(values, flags, ("mu_s", "amplitude", "motion")).assign_coords(amplitude=[0.0, 1.0, 2.0, 4.0])
+    result = suite_result(values, flags, ("mu_s", "amplitude", "motion"))
+    result = result.assign_coords(amplitude=[0.0, 1.0, 2.0, 3.0, 4.0])
     curve = curve_of([0.5, 8.0], [0.4, 0.4 / 256])  # 0.1 a⁻²
-    expected = exceedance_rates(curve, [1.0, 4.0], [[0.5, 0.0], [1.0, 1.0 / 3.0]])
-    for given in (result, result.isel(amplitude=[2, 0, 3, 1]), result.transpose("motion", "amplitude", "mu_s")):
+    expected = exceedance_rates(curve, [1.0, 3.0, 4.0], [[0.5, 0.0], [2 / 3, 1 / 3], [1.0, 1 / 3]])
+    for given in (result, result.isel(amplitude=[2, 0, 3, 1, 4]), result.transpose("motion", "amplitude", "mu_s")):
         found = displacement_hazard(given, curve, ["100mm", 0.4])
         assert found.annual_rate.dims == ("mu_s", "threshold")
         np.testing.assert_allclose(found.annual_rate, np.array([expected.rate, [nan, nan]]), rtol=1e-12)
@@ -105,6 +113,52 @@ def test_of_a_suite_by_hand() -> None:
     for one in (result.isel(amplitude=1), result.rename(amplitude="pgv")):
         with pytest.raises(InputError, match="amplitude: must be a dimension of two peak ground accelerations or more"):
             displacement_hazard(one, curve)
+    with pytest.raises(InputError, match="only two peak ground accelerations have a value, and P"):
+        displacement_hazard(result.isel(amplitude=[1, 4]), curve, 0.1)
+    # where P is the same at both, nothing is in doubt
+    certain = displacement_hazard(result.isel(amplitude=[3, 4]), curve, 0.4)
+    assert certain.annual_rate[0, 0].item() == pytest.approx(0.1 / 3.0 / 9.0, rel=1e-12)
+
+
+def suite() -> Suite:
+    times = np.arange(0.0, 4.0, 0.01)
+    motions = [Record(times, np.sin(2.0 * np.pi * f * times) * np.exp(-times), name=f"m{f}") for f in (0.8, 1.5, 2.5)]
+    return Suite(tuple(motions))
+
+
+def test_friction_that_is_uncertain_over_a_suite() -> None:
+    """Pooled by `sample` or not, motions weigh the same; the rate is that of the fragility of all samples."""
+    curve = power_law(1e-3, 2.0)
+    given: dict[str, Any] = {
+        "theta": 5.0, "amplitude": [2.0, 4.0, 6.0, 8.0], "excitation": suite(), "samples": 256,
+        "uncertain": {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}}, "thresholds": [0.01, 0.1],
+    }  # fmt: skip
+    pooled = slipsweep.sample(**given, over="motion")
+    found = displacement_hazard(pooled, curve)
+    chances = pooled.exceedance_probability.transpose("amplitude", "threshold").values
+    expected = exceedance_rates(curve, given["amplitude"], chances)
+    np.testing.assert_allclose(found.annual_rate, expected.rate, rtol=1e-12)
+    apart = displacement_hazard(slipsweep.sample(**given), curve, ["10cm"])
+    np.testing.assert_allclose(apart.annual_rate, expected.rate[1:], rtol=1e-12)
+    with pytest.raises(InputError, match=r"thresholds = 0.03: not among those of the result, 0.01, 0.1 m: add it to"):
+        displacement_hazard(pooled, curve, 0.03)
+
+
+def test_a_fragility_in_the_form_of_openquake() -> None:
+    u = np.array([[[0.0, 0.1], [0.02, 0.2], [0.3, 0.4]]] * 2)
+    result = suite_result(u, np.zeros_like(u), ("mu_s", "amplitude", "motion"))
+    result = result.assign_coords(amplitude=[0.981, 1.962, 3.924], mu_s=[0.3, 0.4])
+    root = ElementTree.fromstring(openquake_fragility(fragility(result, ["1cm", "50mm"])))
+    space = {"nrml": "http://openquake.org/xmlns/nrml/0.5"}
+    (model,) = root.findall("nrml:fragilityModel", space)
+    assert model.findtext("nrml:limitStates", namespaces=space) == "u_above_10_mm u_above_50_mm"
+    functions = model.findall("nrml:fragilityFunction", space)
+    assert [one.attrib for one in functions] == [{"id": f"mu_s_{mu}", "format": "discrete"} for mu in (0.3, 0.4)]
+    imls = functions[0].find("nrml:imls", space)
+    assert imls is not None
+    assert (imls.text, imls.attrib) == ("0.1 0.2 0.4", {"imt": "PGA", "noDamageLimit": "0.1"})
+    poes = {one.attrib["ls"]: one.text for one in functions[0].findall("nrml:poes", space)}
+    assert poes == {"u_above_10_mm": "0.5 1 1", "u_above_50_mm": "0.5 0.5 1"}
 
 
 # ------------------------------------------------------------------------------------ curves
@@ -117,6 +171,29 @@ def test_a_curve_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(curve.amplitude, [0.981, 3.924, 15.696], rtol=1e-15)
     assert curve.rate.tolist() == [0.01, 0.0005, 0.00001]
     assert float(curve.rate_at(np.array([1.962]))[0]) == pytest.approx(math.sqrt(0.01 * 0.0005), rel=1e-12)
+
+
+OPENQUAKE = """\
+#,,,,,,"generated_by='OpenQuake engine 3.18', kind='mean', investigation_time=50.0, imt='PGA'"
+custom_site_id,lon,lat,depth,poe-0.0500000,poe-0.1000000,poe-0.2000000,poe-0.4000000,poe-0.8000000
+a,12.5,41.9,0.0,1.000000E+00,4.0E-01,1.0E-01,1.0E-02,0.0
+b,13.0,42.0,0.0,9.0E-01,3.0E-01,5.0E-02,5.0E-03,1.0E-04
+"""
+
+
+def test_a_file_of_openquake(tmp_path: Path) -> None:
+    """Probabilities in 50 years become annual rates, −ln(1 − p)/50; 1 and 0 are no rates."""
+    path = tmp_path / "hazard_curve-mean-PGA_12.csv"
+    path.write_text(OPENQUAKE)
+    curve = read_hazard_curve(path, 9.81, site=1)
+    np.testing.assert_allclose(curve.amplitude, [0.981, 1.962, 3.924], rtol=1e-12)
+    np.testing.assert_allclose(curve.rate, -np.log1p([-0.4, -0.1, -0.01]) / 50.0, rtol=1e-12)
+    assert read_hazard_curve(path, 9.81, site=2).amplitude.size == 5
+    with pytest.raises(InputError, match=r"2 sites: give the number of one, site = 1 to 2"):
+        read_hazard_curve(path, 9.81)
+    path.write_text(OPENQUAKE.replace("'PGA'", "'SA(0.3)'"))
+    with pytest.raises(InputError, match=r"curves of SA\(0.3\): must be of PGA"):
+        read_hazard_curve(path, 9.81, site=1)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +228,7 @@ def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> Non
 
 
 def test_the_command(tmp_path: Path) -> None:
-    """It prints the rates that the function gives, and draws them."""
+    """It prints the rates that the function gives, draws them, and says what to do about what is not known."""
     rng = np.random.default_rng(3)
     amplitude = np.geomspace(0.5, 10.0, 6)
     u = amplitude[:, None] ** 2 * 0.01 * rng.lognormal(0.0, 0.6, (2, 1, 9)) * [[[1.0]], [[0.5]]]
@@ -162,36 +239,47 @@ def test_the_command(tmp_path: Path) -> None:
     result.attrs |= ATTRIBUTES
     result.to_netcdf(tmp_path / "a.nc")
     (tmp_path / "hazard.csv").write_text(CURVE)
-    run = ("hazard", "a.nc", "--curve", "hazard.csv", "-d", "0.2", "-d", "50mm", "-d", "90")
-    done = command(tmp_path, *run, "-o", "h.svg", "-o", "h.png")
+    run = ("hazard", "a.nc", "--curve", "hazard.csv", "-d", "0.2", "-d", "50mm", "-d", "90m")
+    done = command(tmp_path, *run, "-o", "h.svg", "-o", "h.png", "-o", "f.xml")
     assert (done.returncode, done.stderr) == (0, "")
     found = displacement_hazard(result, tmp_path / "hazard.csv", [0.05, 0.2, 90.0])
-    rows = [line.split() for line in done.stdout.splitlines() if line.startswith("  ") and line.split()[0] != "d"]
-    assert [row[:2] for row in rows if row[0] != "no"] == [
+    rows = [line.split() for line in done.stdout.splitlines() if line.startswith("  ")]
+    assert [row[:2] for row in rows if row[0] not in ("d", "up")] == [
         [f"{d:g}", f"{rate:.4g}"]
         for point in found.annual_rate.values
         for d, rate in zip([0.05, 0.2, 90], point, strict=True)
     ]
-    assert "no value: up to 33.3% of the motions at an amplitude" in done.stdout
-    assert done.stdout.count("exceeded by no motion at any amplitude") == 2
+    assert "up to 33.3% of the motions or samples have no value" in done.stdout
+    assert done.stdout.count("not exceeded at any amplitude") == 2
     assert "mu_s = 0.3\n" in done.stdout
+    assert "above 1.019 g P(u > d) is taken as it is there: to compute it, extend the axis amplitude" in done.stdout
+    assert "put more values on the axis amplitude" in done.stdout
     assert (tmp_path / "h.svg").read_text().count("mu_s = 0.4") == 1
+    assert (tmp_path / "f.xml").read_text().count("<poes") == 6
     cut = command(tmp_path, *run, "--at", "mu_s=0.4", "-o", "c.png")
     assert (cut.returncode, cut.stdout.count("annual rate")) == (0, 1)
     assert f"{found.annual_rate.values[1, 0]:.4g}" in cut.stdout
 
 
+def test_the_end_of_the_curve_is_told_from_the_end_of_the_sweep(tmp_path: Path) -> None:
+    u = np.array([[0.0, 0.1], [0.1, 0.2], [0.3, 0.4]])
+    result = suite_result(u, np.zeros_like(u), ("amplitude", "motion")).assign_coords(amplitude=[5.0, 10.0, 20.0])
+    result.attrs |= ATTRIBUTES
+    result.to_netcdf(tmp_path / "a.nc")
+    (tmp_path / "hazard.csv").write_text("PGA (m/s2), annual rate\n6, 0.01\n12, 0.001\n")
+    done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", "-d", "5cm")
+    assert "to compute it, extend the hazard curve" in done.stdout
+    assert "the hazard curve begins at 0.6116 g, where displacements are exceeded already" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--at", "mu_s=0.35"), "--at mu_s=0.35: not among the values of the file; its neighbours are 0.3 and 0.4"),
-        (("--at", "theta=5"), "--at theta=5: no such axis here"),
-        (("--at", "mu_s=0.3", "--at", "mu_s=0.4"), "--at mu_s=0.4: mu_s is given twice"),
-        (("--at", "mu_s=0.3,0.4"), "--at mu_s: 2 values; must be one"),
+        (("--at", "mu_s=0.35"), "its neighbours are 0.3 and 0.4"),
         (("-d", "5 s"), '--displacement = "5 s": must be a number'),
-        (("-d", "-1"), "--displacement = -1: must be"),
-        (("-o", "h.csv"), "h.csv: the name must end in one of .png, .svg, .pdf"),
-        (("-o", "h.png", "-d", "8"), "no motion exceeds any of the given displacements"),
+        (("-d", "50"), "--displacement = 50: without a unit that is 50 m; give the unit: -d 50mm or -d 50m"),
+        (("-o", "h.csv"), "h.csv: the name must end in one of .png, .svg, .pdf, .xml"),
+        (("--site", "2"), "site = 2: only for a file of OpenQuake"),
     ],
 )
 def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], message: str) -> None:
@@ -200,8 +288,7 @@ def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], messag
     result.attrs |= ATTRIBUTES
     result.to_netcdf(tmp_path / "a.nc")
     (tmp_path / "hazard.csv").write_text(CURVE)
-    asked = () if "-d" in given else ("-d", "1cm")
-    done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", *asked, *given)
+    lengths = () if "-d" in given else ("-d", "1cm")
+    done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", *lengths, *given)
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr
-    assert not (tmp_path / "h.png").exists()

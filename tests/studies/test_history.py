@@ -12,8 +12,6 @@ import pytest
 import slipsweep
 from slipsweep import Cosine, Harmonics, Sine
 from slipsweep.errors import InputError
-from slipsweep.grid.plans import Plan
-from slipsweep.studies import history as studied
 from tests.support.commands import command
 
 #: Shaking that leaves Newmark's block with a velocity.
@@ -143,28 +141,3 @@ class Noted:
     def __call__(self, *arguments: Any) -> None:
         self.done.append([numba.typeof(one) for one in arguments])
         self.kernel(*arguments)
-
-
-@pytest.mark.parametrize(
-    ("kernel", "motion"),
-    [
-        ("history", {"amplitude": 3.0, "frequency": 1.0}),
-        ("record_history", {"excitation": slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)}),
-    ],
-)
-def test_the_kernel_of_a_history_is_made_while_its_sweep_is_solved(
-    kernel: str, motion: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    done: list[Any] = []
-
-    def solve(plan: Plan) -> Any:
-        done.append("swept")
-        return solved(plan)
-
-    solved = Plan.solve
-    monkeypatch.setattr(Plan, "solve", solve)
-    monkeypatch.setattr(studied, kernel, Noted(getattr(studied, kernel), done))
-    slipsweep.simulate(5.0, 0.4, **motion)
-    types, *then = done
-    assert then == ["swept", "waited for", *[types] * (len(then) - 2)]
-    assert types in then

@@ -2,7 +2,6 @@
 
 import hashlib
 import importlib.util
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Record, RunError, read_record, sweep
+from slipsweep import InputError, Record, read_record, sweep
 from slipsweep.files import export, spec
-from slipsweep.grid import chunks
-from slipsweep.grid.tables import Table
+from slipsweep.files import storing as store
+from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
-from slipsweep.runs import solving, store
-from slipsweep.runs.jobs import sweep_job
 from tests.support.commands import command
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -156,45 +153,6 @@ def test_rows_of_cases_may_hold_the_scales(folder: Path) -> None:
 # -------------------------------------------------------------------------------------- chunks
 
 
-def test_chunks_and_folders_give_what_one_piece_gives(folder: Path) -> None:
-    run(folder / "a.toml", folder / "a.nc")
-    run(folder / "a.toml", folder / "b.nc", chunk_cells=7)
-    assert_same_data(folder / "a.nc", folder / "b.nc")
-    run(folder / "a.toml", folder / "split", chunk_cells=30, split=True)
-    whole = stored(folder / "a.nc")
-    for path in sorted((folder / "split").iterdir()):
-        with xr.open_dataset(path) as chunk, xr.open_dataset(folder / "a.nc") as one:
-            places = {dim: chunk[dim] for dim in chunk.permanent_displacement.dims}
-            np.testing.assert_array_equal(chunk.permanent_displacement, one.permanent_displacement.sel(places))
-        np.testing.assert_array_equal(stored(path)["record_acceleration"], whole["record_acceleration"])
-
-
-def test_an_interrupted_run_goes_on_but_not_with_another_record(folder: Path) -> None:
-    def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
-        for number, table in solving.solve_here(*arguments):
-            if number == 3:
-                raise RunError("the power went")
-            yield number, table
-
-    with pytest.raises(RunError, match="the power went"):
-        run(folder / "a.toml", folder / "a.nc", chunk_cells=7, solved=failing)
-    motion = (folder / "motion.csv").read_text()
-    (folder / "motion.csv").write_text(motion.replace("5.00,", "5.001,"))
-    with pytest.raises(InputError, match=r"cannot go on with the chunks in a\.nc\.parts: record was"):
-        run(folder / "a.toml", folder / "a.nc", resume=True)
-    (folder / "motion.csv").write_text(motion)
-    run(folder / "a.toml", folder / "a.nc", resume=True)
-    run(folder / "a.toml", folder / "b.nc")
-    assert_same_data(folder / "a.nc", folder / "b.nc")
-
-
-def test_chunks_of_a_record_are_seconds_of_work(folder: Path) -> None:
-    checked = spec.load(folder / "a.toml")
-    job = sweep_job(checked)
-    assert solving.default_cells(job.plan) < chunks.CHUNK_CELLS // 10
-    assert "record" in job.asked
-
-
 # ------------------------------------------------------------------------------------- refused
 
 
@@ -288,7 +246,7 @@ def test_other_commands_on_the_result(folder: Path) -> None:
     assert "96 cells (3 theta x 2 mu_s x 4 scale x 2 time_scale x 2 polarity)" in done.stdout
     told = command(folder, "info", folder / "a.nc").stdout
     assert "number of slips that begin at rest (int32)" in told
-    assert "recorded acceleration of the plane" in told
+    assert "recorded acceleration of the base" in told
     assert "statically_unstable" in told
     assert export.export(folder / "a.nc", folder / "a.csv") == 96
     header, first = (folder / "a.csv").read_text().splitlines()[:2]

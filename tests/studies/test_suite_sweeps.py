@@ -2,7 +2,6 @@
 
 import importlib.util
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +9,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, RunError, Suite, read_suite, sweep
+from slipsweep import InputError, Suite, read_suite, sweep
 from slipsweep.files import spec
+from slipsweep.files import storing as store
+from slipsweep.files.jobs import limit_job, sweep_job
 from slipsweep.files.motions import read_embedded
-from slipsweep.files.results import result_file
-from slipsweep.grid.tables import Table
+from slipsweep.files.opening import read_result
 from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
 from slipsweep.motion.intensity import intensity_measures
-from slipsweep.runs import solving, store
-from slipsweep.runs.jobs import limit_job, sweep_job
-from tests.studies.test_record_sweeps import assert_same_data, stored
+from tests.studies.test_record_sweeps import assert_same_data
 from tests.support.commands import command
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -98,7 +96,7 @@ def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
         np.testing.assert_array_equal(
             result.permanent_displacement.sel(motion="m1"), expected.permanent_displacement.sel(motion="m1")
         )
-    with result_file(folder / "a.nc") as file:
+    with read_result(folder / "a.nc") as file:
         kept = read_embedded(file, folder / "a.nc")
     assert isinstance(kept, Suite)
     assert kept.labels == suite.labels
@@ -131,7 +129,7 @@ def test_limits_of_a_suite(folder: Path) -> None:
     text = SWEEP.replace("[0.1, 0.3]", "[0.1]").replace("[0, 5, 25]", "[5]")
     job = limit_job(spec.parse(text, "a.toml", folder), [0.01, 0.1])
     store.run(job, folder / "l.nc", command="slipsweep limit a.toml")
-    store.run(job, folder / "m.nc", command="slipsweep limit a.toml", chunk_cells=5)
+    store.run(job, folder / "m.nc", command="slipsweep limit a.toml")
     assert_same_data(folder / "l.nc", folder / "m.nc")
     with xr.open_dataset(folder / "l.nc") as result:
         assert result.limit_amplitude.dims == ("theta", "mu_s", "time_scale", "polarity", "motion", "displacement")
@@ -139,52 +137,6 @@ def test_limits_of_a_suite(folder: Path) -> None:
 
 
 # -------------------------------------------------------------------------------------- chunks
-
-
-@pytest.mark.parametrize("text", [SWEEP, SAMPLES])
-def test_chunks_and_folders_give_what_one_piece_gives(folder: Path, text: str) -> None:
-    (folder / "a.toml").write_text(text)
-    run(folder / "a.toml", folder / "a.nc")
-    for cells in (2, 7):  # parts of the motions, and of all else
-        run(folder / "a.toml", folder / f"b{cells}.nc", chunk_cells=cells)
-        assert_same_data(folder / "a.nc", folder / f"b{cells}.nc")
-    run(folder / "a.toml", folder / "split", chunk_cells=2, split=True)
-    name = "permanent_displacement" if text == SWEEP else "mean_displacement"
-    for path in sorted((folder / "split").iterdir())[:5]:
-        with xr.open_dataset(path) as chunk, xr.open_dataset(folder / "a.nc") as one:
-            places = {dim: chunk[dim] for dim in chunk[name].dims}
-            np.testing.assert_array_equal(chunk[name], one[name].sel(places))
-            assert chunk.sizes["motion"] < 3
-        # all motions are in every file: a part can be run again as a whole
-        np.testing.assert_array_equal(stored(path)["record_time"], stored(folder / "a.nc")["record_time"])
-
-
-def test_an_interrupted_run_goes_on_but_not_with_other_motions(folder: Path) -> None:
-    def failing(*arguments: Any) -> Iterator[tuple[int, Table]]:
-        for number, table in solving.solve_here(*arguments):
-            if number == 3:
-                raise RunError("the power went")
-            yield number, table
-
-    with pytest.raises(RunError, match="the power went"):
-        run(folder / "a.toml", folder / "a.nc", chunk_cells=7, solved=failing)
-    motion = (folder / "motions" / "m1.csv").read_text()
-    changed = {
-        "a sample": lambda: (folder / "motions" / "m1.csv").write_text(motion.replace("0.4,", "0.401,")),
-        "a name": lambda: (folder / "motions" / "m1.csv").rename(folder / "motions" / "m9.csv"),
-        "one more": lambda: write_motion(folder / "motions" / "m3.csv", 5, 50, 0.01),
-    }
-    for what, change in changed.items():
-        change()
-        with pytest.raises(InputError, match=r"cannot go on with the chunks in a\.nc\.parts: suite was"):
-            run(folder / "a.toml", folder / "a.nc", resume=True)
-        for other in ("m9.csv", "m3.csv"):
-            (folder / "motions" / other).unlink(missing_ok=True)
-        (folder / "motions" / "m1.csv").write_text(motion)
-        assert what
-    run(folder / "a.toml", folder / "a.nc", resume=True)
-    run(folder / "a.toml", folder / "b.nc")
-    assert_same_data(folder / "a.nc", folder / "b.nc")
 
 
 # --------------------------------------------------------------------------------- commands

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, Pair, Record, Suite, limit_amplitude, sample, simulate, sweep
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import plan_sweep
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, RECORD_RESULTS
 from slipsweep.motion.intensity import intensity_measures
@@ -87,7 +88,9 @@ def test_lazy_results_and_parts_have_the_same_bits() -> None:
     later = sweep([0, 5], [0.1, 0.3], **given, chunks={"motion": 1, "amplitude": 2})
     for name in now:
         np.testing.assert_array_equal(later[name].compute(), now[name], err_msg=str(name))
-    plan = plan_sweep(theta=[0, 5], mu_s=[0.1, 0.3], **given)
+    plan = plan_sweep(
+        Inputs(theta=[0, 5], mu_s=[0.1, 0.3], amplitude=given["amplitude"], polarity="both"), excitation=SUITE
+    )
     part = plan.part({"motion": slice(1, 2), "theta": slice(1, 2)})
     # another process gets the samples of its own motions only
     assert len(pickle.dumps(part)) < len(pickle.dumps(plan)) - 2 * 8 * (300 + 500) + 2000

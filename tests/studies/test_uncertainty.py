@@ -12,16 +12,12 @@ import xarray as xr
 from scipy import stats
 
 import slipsweep
-from slipsweep.charts import uncertainty_figures
-from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.slices import Result
-from slipsweep.charts.style import Look
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files import spec
+from slipsweep.files import storing as store
+from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import DRAWN, RECORD_INPUTS, WAVEFORM_INPUTS, Validity
-from slipsweep.runs import store
-from slipsweep.runs.jobs import sweep_job
 from slipsweep.studies.sampling import check_sampling
 from tests.support.commands import command
 
@@ -570,12 +566,9 @@ def test_charts_by_default(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_fragility_curves_are_the_probabilities(folder: Path) -> None:
-    keep = {"amplitude": slice(None), "threshold": slice(None)}
-    with Result(folder / "fragile.nc") as result:
-        table = result.select(
-            ["exceedance_probability", "valueless_share"], keep, {"theta": "5deg", "frequency": "2000mHz"}
-        )
-    figure = uncertainty_figures.fragility(Sheet(table, "amplitude", "threshold", Look()))
+    figure = xr.load_dataset(folder / "fragile.nc").slipsweep.chart(
+        "fragility", at={"theta": "5deg", "frequency": "2000mHz"}
+    )
     found = xr.load_dataset(folder / "fragile.nc").sel(theta=5, frequency=2).exceedance_probability
     curves = {line.get_label(): line.get_xydata() for line in figure.axes[0].get_lines()}
     assert list(curves) == ["d = 10 mm", "d = 100 mm"]
@@ -586,10 +579,7 @@ def test_fragility_curves_are_the_probabilities(folder: Path) -> None:
 
 
 def test_bands_are_the_quantiles(folder: Path) -> None:
-    with Result(folder / "fragile.nc") as result:
-        names = ["displacement_quantile", "valueless_share"]
-        table = result.select(names, {"amplitude": slice(None), "quantile": slice(None)}, {"theta": 0, "frequency": 1})
-    figure = uncertainty_figures.quantile_bands(Sheet(table, "amplitude", None, Look()))
+    figure = xr.load_dataset(folder / "fragile.nc").slipsweep.chart("quantiles", at={"theta": 0, "frequency": 1})
     (axes,) = (axes for axes in figure.axes if axes.get_yscale() == "log")
     (median,) = (line for line in axes.get_lines() if line.get_label() == "median")
     found = xr.load_dataset(folder / "fragile.nc").sel(theta=0, frequency=1, quantile=0.5).displacement_quantile * 1000
@@ -603,14 +593,12 @@ def test_the_share_without_a_value_is_shown(tmp_path: Path) -> None:
     job = sweep_job(spec.parse(text.replace('"1cm", 0.1', "0.1"), "steep.toml"))
     store.run(job, tmp_path / "steep.nc", command="slipsweep run")
     whole = job.plan.solve()
-    with Result(tmp_path / "steep.nc") as result:
-        names = ["exceedance_probability", "displacement_quantile", "valueless_share"]
-        table = result.select(names, {"amplitude": slice(None), "quantile": slice(None)}, {"frequency": 1})
-    figure = uncertainty_figures.fragility(Sheet(table, "amplitude", None, Look()))
+    result = xr.load_dataset(tmp_path / "steep.nc")
+    figure = result.slipsweep.chart("fragility", at={"frequency": 1})
     assert 0.1 < whole["valueless_share"].values.max() < 0.9
     dotted = [line for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
     np.testing.assert_array_equal(dotted[0].get_ydata(), whole["valueless_share"].values[0])
-    bands = uncertainty_figures.quantile_bands(Sheet(table, "amplitude", None, Look()))
+    bands = result.slipsweep.chart("quantiles", at={"frequency": 1})
     assert "Without a value: up to" in bands.get_supxlabel()
 
 
@@ -618,10 +606,10 @@ def test_the_share_without_a_value_is_shown(tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (("--kind", "quantiles", "--y", "theta"), "--y theta: not with quantiles"),
-        (("--kind", "fragility", "--x", "threshold"), "needs an axis of two values or more"),
+        (("--kind", "fragility", "--x", "threshold"), "--x threshold: must be a parameter"),
         (("--kind", "fragility", "--x", "theta", "--y", "theta"), "--y theta: must be another axis"),
         (("--at", "threshold=1kg"), 'threshold = "1kg": must be a number, with a unit that converts to m'),
-        (("--at", "amplitude=3g"), "outside the file's range, 0.981 to 9.81 m s-2"),
+        (("--at", "amplitude=3g"), "outside the range of the result, 0.981 to 9.81 m s-2"),
     ],
 )
 def test_bad_charts(

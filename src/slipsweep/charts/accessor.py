@@ -1,24 +1,20 @@
 """`Dataset.slipsweep`: what the command line draws, from a dataset; importing this module registers it with xarray."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from slipsweep.files.results import ResultFile, Where
 from slipsweep.studies.decoding import flags
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from slipsweep.charts.slices import Cut
+    from slipsweep.files.selection import At
 
     class _Options(TypedDict, total=False):
-        at: Mapping[str, Cut] | None
+        at: Mapping[str, At] | None
         x: str | None
         y: str | None
         panels: Sequence[str]
@@ -26,6 +22,8 @@ if TYPE_CHECKING:
         levels: Sequence[float | str]
         units: Literal["m/s2", "g"]
         show_cautions: bool
+        width: float | str | None
+        grey: bool
 
 
 @xr.register_dataset_accessor("slipsweep")
@@ -60,7 +58,7 @@ class SlipsweepAccessor:
         self,
         kind: str | None = None,
         *,
-        at: "Mapping[str, Cut] | None" = None,
+        at: "Mapping[str, At] | None" = None,
         x: str | None = None,
         y: str | None = None,
         panels: Sequence[str] = (),
@@ -68,6 +66,8 @@ class SlipsweepAccessor:
         levels: Sequence[float | str] = (),
         units: Literal["m/s2", "g"] = "m/s2",
         show_cautions: bool = False,
+        width: float | str | None = None,
+        grey: bool = False,
         ax: "Axes | None" = None,
     ) -> "Figure | Axes":
         """Draw a chart, as `slipsweep chart` does.
@@ -75,11 +75,12 @@ class SlipsweepAccessor:
         Parameters
         ----------
         kind : str, optional
-            Of a sweep "contours", "modes", "families", "dimensionless", "newmark" or "spread"; of a sweep under a suite
-            "motions", "fragility", "intensity" or "histogram", under one record "motions"; of statistics (`sample`,
-            `suite_statistics`) "fragility", "quantiles" or "sensitivity".  Results of `simulate` ("history"),
-            `limit_amplitude` ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
-            `measured_friction` ("friction") have one chart each.  By default the first one that a dataset has.
+            Of a sweep "contours", "modes", "families", "curve", "dimensionless", "newmark" or "spread"; of a sweep
+            under a suite "motions", "fragility", "intensity" or "histogram", under one record "motions"; of statistics
+            (`sample`, `suite_statistics`) "fragility", "quantiles" or "sensitivity".  Results of `simulate`
+            ("history"), `limit_amplitude` ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
+            `measured_friction` ("friction") have one chart each.  By default the first one that a dataset has; of a
+            sweep with one axis left "curve".
         at : mapping of axis to value, optional
             Value of an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
             by default its middle.  Several values choose the curves or panels of an axis, or the motions of a suite.
@@ -96,6 +97,10 @@ class SlipsweepAccessor:
             Unit of accelerations on the main axis and in the caption.
         show_cautions : bool
             Draw values flagged `not_recoupled`, too; by default they are left out, because they are unreliable.
+        width : float or str, optional
+            Width of the figure: mm, or a text with another unit ("3.5 inch").  Below 127 mm text is smaller.
+        grey : bool
+            Draw without colour.
         ax : matplotlib.axes.Axes, optional
             Axes to draw a chart of one panel in, with its legend and caption.
 
@@ -118,44 +123,8 @@ class SlipsweepAccessor:
         'permanent displacement, downslope (mm)'
         """
         from slipsweep.charts import kinds
-        from slipsweep.charts.style import Look
 
-        with kinds.opened(DatasetSource(self._dataset)) as result:
-            look = Look(units, show_cautions, kinds.levels_of(result, variable, levels))
-            figure = kinds.draw(result, kind, kinds.Wish(x, y, at or {}, variable, panels, axes=ax, look=look))
+        result = kinds.drawable(self._dataset, "dataset")
+        look = kinds.look_of(result, variable, levels, units, show_cautions, width, grey)
+        figure = kinds.draw(result, kind, kinds.Request(x, y, at or {}, variable, panels, axes=ax, look=look))
         return figure if ax is None else ax
-
-
-class DatasetSource(ResultFile):
-    """A dataset in place of the file that it may be written to."""
-
-    def __init__(self, dataset: xr.Dataset) -> None:
-        # nothing of the file's own start: there is none
-        self.path = Path("dataset")
-        self.attrs = {str(name): value for name, value in dataset.attrs.items()}
-        self.sizes = {str(dim): size for dim, size in dataset.sizes.items()}
-        self.variables: dict[str, Any] = {str(name): _DatasetVariable(one) for name, one in dataset.variables.items()}
-        self.coordinates = [str(name) for name in dataset.coords]
-
-
-class _DatasetVariable:
-    """A variable of a dataset in place of a `FileVariable`."""
-
-    def __init__(self, variable: xr.Variable) -> None:
-        self._variable = variable
-        self.dims = tuple(map(str, variable.dims))
-        self.attrs = {str(name): value for name, value in variable.attrs.items()}
-        self.is_text = variable.dtype.kind in "OUST"
-
-    def read(self, where: Where) -> np.ma.MaskedArray:
-        """Read a hyperslab."""
-        return np.ma.MaskedArray(self._variable.isel({dim: where[dim] for dim in self.dims if dim in where}).values)
-
-    def read_floats(self, where: Where) -> NDArray[Any]:
-        """Read a hyperslab of numbers, NaN where there is no value."""
-        return np.asarray(self.read(where).data)
-
-    def read_codes(self, where: Where, missing: int = -1) -> NDArray[Any]:
-        """Read a hyperslab of codes, `missing` where there is none (xarray reads those as NaN)."""
-        values = self.read_floats(where)
-        return np.where(np.isnan(values), missing, values).astype(np.int16)

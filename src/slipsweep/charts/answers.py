@@ -1,21 +1,23 @@
-"""What is solved anew on the cells of a slice, through the public plans.
+"""What is solved for a chart, on the cells of its slice, by the public functions.
 
-The accelerations of yield and of the mode limit, results on the limit itself, Newmark's block, and the answers
-that other choices of recoupling and friction decay give.
+The accelerations of yield and of the mode limit, results on the limit itself, Newmark's block, the results of
+other options of the model, and where the displacement has a trend that no block has.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from slipsweep.grid.plans import plan_friction_parameters, plan_sweep
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
 from slipsweep.model.variables import PARAMETERS, WAVEFORM_INPUTS
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.studies.datasets import friction_parameters, sweep
+
+#: Amplitudes of a motion.
+DRIVES = ("amplitude", "displacement_amplitude")
 
 #: Friction decay that the paper measured on its shaking table: 2.30 and 2.70 (Table 2).
 MEASURED_DECAY = (2.0, 3.0)
@@ -23,114 +25,149 @@ MEASURED_DECAY = (2.0, 3.0)
 #: The dimension of the two sides of the mode limit.
 SIDE = "side"
 
+DISPLACEMENT = "permanent_displacement"
+
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 _FRICTION = ("decay_rate", "delta_mu", "minimum_friction")
 
-
-def amplitude_of(displacement_amplitude: Variable, frequency: Variable) -> Variable:
-    """The amplitude A = ω²d on a slice: files do not hold it where d and the frequency span a grid."""
-    dims = (*displacement_amplitude.dims, *(dim for dim in frequency.dims if dim not in displacement_amplitude.dims))
-    both = (
-        variable.values.reshape([variable.sizes.get(dim, 1) for dim in dims])
-        for variable in (displacement_amplitude, frequency)
-    )
-    return Variable(dims, np.asarray(peak_acceleration(*both), np.float64), PARAMETERS["amplitude"])
+#: How much smaller the amplitude is at which it is asked whether the displacement falls with it, and what of a
+#: displacement is rounding.
+_SMALLER, _ROUNDING = 0.99, 1e-9
 
 
-def solve(table: Table, names: Iterable[str], model: Model | None = None, **changed: Any) -> Mapping[str, Variable]:
+def solve(data: xr.Dataset, names: Iterable[str], model: Model | None = None, **changed: Any) -> xr.Dataset:
     """Solve the cells of a slice as the slice's result was solved.
 
     Parameters
     ----------
-    table : Table
+    data : Dataset
         Gives the parameters and, in its attributes, model, excitation and solver.
     names : iterable of str
         Results.
     model : Model, optional
         Another model.
-    changed : Variable, float or None
+    changed : DataArray, float or None
         Parameters that differ; None stands for the model's own estimate.
-
-    Returns
-    -------
-    mapping of str to Variable
     """
-    chosen = model or MODELS.from_attributes(table.attrs)
-    wanted = [*_BLOCK, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS]
-    given = {name: table[name] for name in wanted if name in table.coords} | changed
+    chosen = model or MODELS.from_attributes(data.attrs)
+    block = ("yield_coefficient",) if "yield_coefficient" in data.coords else _BLOCK
+    wanted = [*block, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS]
+    given = {name: _bare(data[name]) for name in wanted if name in data.coords} | changed
     if given.get("displacement_amplitude") is not None:
         given["amplitude"] = None
-    plan = plan_sweep(
+    return sweep(
         **given,
         model=chosen,
-        excitation=WAVEFORMS.from_attributes(table.attrs),
-        solver=SOLVERS.from_attributes(table.attrs) if SOLVERS.attribute in table.attrs else SOLVERS.default,
+        excitation=WAVEFORMS.from_attributes(data.attrs),
+        solver=SOLVERS.from_attributes(data.attrs) if SOLVERS.attribute in data.attrs else SOLVERS.default,
         variables=list(names),
     )
-    return plan.solve().data_vars
 
 
-def boundaries(table: Table, always: bool = False) -> dict[str, Variable]:
+def _bare(array: xr.DataArray) -> Any:
+    """Values along their dimensions, as the public functions take them."""
+    values = np.asarray(array.values, np.float64)
+    if not array.dims:
+        return float(values)
+    coords = {array.name: values} if array.dims == (array.name,) else {}
+    return xr.DataArray(values, dims=array.dims, coords=coords)
+
+
+def with_amplitude(data: xr.Dataset) -> xr.Dataset:
+    """The same with A = ω²d where the file has d instead: files do not hold A where d and f span a grid."""
+    if "amplitude" in data.coords or not {"displacement_amplitude", "frequency"} <= {*data.coords}:
+        return data
+    found = xr.apply_ufunc(peak_acceleration, data["displacement_amplitude"], data["frequency"])
+    return data.assign_coords(amplitude=found.assign_attrs(PARAMETERS["amplitude"]))
+
+
+def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     """Yield acceleration and, but for Newmark's block, limiting acceleration (Eq. 7) of a slice, m/s².
 
     Parameters
     ----------
-    table : Table
+    data : Dataset
     always : bool
         Return both for Newmark's block, too.
 
     Returns
     -------
-    dict of str to Variable
-        ``yield_acceleration`` and ``limiting_acceleration`` along those dimensions of the slice that
-        they depend on; NaN where the block slides under its own weight.
+    Dataset
+        ``yield_line`` and ``limit_line`` along those dimensions of the slice that they depend on;
+        NaN where the block slides under its own weight.
     """
-    given = {name: table[name] for name in _BLOCK if name in table.coords}
+    g = float(data.attrs["g"])
+    if "yield_coefficient" in data.coords:
+        return xr.Dataset({"yield_line": data["yield_coefficient"].reset_coords(drop=True) * g})
+    given = {name: _bare(data[name]) for name in _BLOCK if name in data.coords}
     # neither depends on the amplitude, nor on what it is taken for otherwise
-    found = plan_friction_parameters(
-        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=float(table.attrs["g"])), **given
-    ).solve()
-    slides_at_rest = found["yield_acceleration"].values <= 0
-    limit = found["limiting_acceleration"]
-    unstable = found["validity"].values != 0
-    lines = {
-        "yield_acceleration": replace(
-            found["yield_acceleration"], values=np.where(slides_at_rest, np.nan, found["yield_acceleration"].values)
-        ),
-        "limiting_acceleration": replace(limit, values=np.where(unstable, np.nan, limit.values)),
-    }
-    if table.attrs["model"] == "newmark" and not always:
-        del lines["limiting_acceleration"]
-    return lines
+    found = friction_parameters(amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given)
+    onset = found["yield_acceleration"].reset_coords(drop=True)
+    lines = {"yield_line": onset.where(onset > 0)}
+    if always or data.attrs["model"] != "newmark":
+        lines["limit_line"] = found["limiting_acceleration"].where(found["validity"] == 0).reset_coords(drop=True)
+    return xr.Dataset(lines)
 
 
-def newmark(table: Table, **changed: Any) -> Variable:
-    """Permanent displacement of Newmark's block on the cells of a slice."""
-    return solve(table, ["permanent_displacement"], Newmark(g=float(table.attrs["g"])), **changed)[
-        "permanent_displacement"
-    ]
+def newmark(data: xr.Dataset, **changed: Any) -> xr.DataArray:
+    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved."""
+    if data.attrs["model"] == "newmark" and not changed:
+        return data[DISPLACEMENT]
+    if "newmark_displacement" in data and not changed:
+        return data["newmark_displacement"]
+    return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])), **changed)[DISPLACEMENT]
 
 
-def sides_of(limit: Variable) -> dict[str, Any]:
+def sides_of(limit: xr.DataArray) -> dict[str, Any]:
     """The amplitude on the mode limit, where the block still sticks and slips, and the next number above it.
 
     What to give to `solve` or `newmark` for the results on either side, along a dimension ``side``.
     """
     there = np.where(np.isfinite(limit.values), limit.values, 1.0)
     both = np.stack([there, np.nextafter(there, np.inf)], axis=-1)
-    return {"amplitude": Variable((*limit.dims, SIDE), both), "displacement_amplitude": None}
+    return {"amplitude": xr.DataArray(both, dims=(*limit.dims, SIDE)), "displacement_amplitude": None}
 
 
-def alternatives(table: Table) -> dict[str, tuple[Model, dict[str, Any]]]:
-    """The answers that an engineer has to choose from on a slice: what to change for `solve`, by what it is called.
+def unsound(data: xr.Dataset, theirs: xr.DataArray) -> xr.Dataset:
+    """Where the displacement has a trend that no block has.
+
+    Parameters
+    ----------
+    data : Dataset
+        A slice of a sweep with the permanent displacement.
+    theirs : DataArray
+        Displacement of Newmark's block on its cells.
+
+    Returns
+    -------
+    Dataset
+        ``falls``: it is smaller than at an amplitude that is 1 % smaller; ``below``: it is less than half of Newmark's.
+    """
+    ours = data[DISPLACEMENT]
+    if data.attrs["model"] == "newmark":
+        nowhere = xr.zeros_like(ours, bool)
+        return xr.Dataset({"falls": nowhere, "below": nowhere})
+    drive = next(name for name in reversed(DRIVES) if name in data.coords)
+    before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * _SMALLER)})[DISPLACEMENT]
+    if drive in before.dims:
+        before = before.assign_coords({drive: ours[drive]})
+    before = before.reset_coords(drop=True)
+    return xr.Dataset({
+        "falls": (ours < before * (1 - _ROUNDING)) & (ours > 0),
+        "below": (ours < 0.5 * theirs) & (ours > 0),
+    })  # fmt: skip
+
+
+def alternatives(data: xr.Dataset) -> dict[str, tuple[Model, dict[str, Any]]]:
+    """The options that an engineer has to choose from on a slice: what to change for `solve`, by what it is called.
 
     Newmark's block; the friction decay λ by Eq. 6, or as the paper measured it; the end of sliding by
     Eq. 12, or by integration.  All with the slice's own yield acceleration.
     """
-    g = float(table.attrs["g"])
-    own = MODELS.from_attributes(table.attrs)
+    g = float(data.attrs["g"])
+    own = MODELS.from_attributes(data.attrs)
     ours = own if isinstance(own, Mendez) else Mendez(g=g)
-    found: dict[str, tuple[Model, dict[str, Any]]] = {"Newmark": (Newmark(g=g), {})}
+    found: dict[str, tuple[Model, dict[str, Any]]] = {"Newmark's block": (Newmark(g=g), {})}
     for recoupling, text in (("eq12", "stop by Eq. 12"), ("integrate", "stop by integration")):
         model = ours.but(recoupling=recoupling)
         found[f"λ by Eq. 6, {text}"] = (model, {"decay_rate": None})

@@ -3,7 +3,6 @@
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -12,9 +11,9 @@ from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
 from slipsweep.charts.maps import HATCHES
-from slipsweep.charts.sheet import LEFT_OUT
-from slipsweep.charts.slices import Result
-from slipsweep.charts.style import SYMBOLS, drawn_text, model_text, plain, unit
+from slipsweep.charts.slices import NAMED, Result
+from slipsweep.charts.style import LEFT_OUT, SYMBOLS, drawn_text, flag_name, model_text, plain, unit
+from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import (
     FLAG_KINDS,
     PARAMETERS,
@@ -43,7 +42,7 @@ def title_page(result: Result) -> Figure:
     attributes = result.attrs
     recorded = result.sort in ("record", "suite")
     hatched = [
-        f"{(flag.name or '').lower()} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}"
+        f"{flag_name(flag)} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}"
         + ("; left out of contours and curves unless their caption says that it is drawn" if flag in LEFT_OUT else "")
         for flag in HATCHES
     ]
@@ -57,7 +56,7 @@ def title_page(result: Result) -> Figure:
         ],
         **({} if recorded else {"Flags that the charts hatch": hatched}),
         "Origin": [
-            plain(f"{result.path}"),
+            plain(result.name),
             f"solved by {attributes.get('source', 'slipsweep')}",
             f"drawn by slipsweep {__version__}, matplotlib {mpl.__version__}",
             *plain(str(attributes.get("history", ""))).splitlines(),
@@ -78,16 +77,15 @@ def title_page(result: Result) -> Figure:
 def _inputs(result: Result) -> list[str]:
     """A line an input: its range, or its value."""
     texts = []
-    for name in result.coordinates:
-        if name not in PARAMETERS:
+    for name in PARAMETERS:
+        if name not in result.data.coords:
             continue
-        values: Any = result.axes[name] if name in result.axes else np.unique(result.read(name, {}))
+        values = np.unique(result.data[name].values)
         units = unit(name)
         space = "" if units in ("", "°") else " "
         ends = f"{values[0]:.4g}{space}{units}"
         if len(values) > 1:
             ends = f"{values[0]:.4g} to {values[-1]:.4g}{space}{units}, {len(values)} values"
         texts.append(f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}: {ends}")
-    for dim, names in result.labels.items():
-        texts.append(f"{dim}s: {plain(', '.join(names))}")
-    return texts
+    labels = {dim: axis_labels(result.data, dim) for dim in NAMED if dim in result.dims}
+    return texts + [f"{dim}s: {plain(', '.join(names))}" for dim, names in labels.items() if names]

@@ -3,12 +3,12 @@
 import json
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from slipsweep.charts.sheet import new_panels
 from slipsweep.charts.style import BLUE, VERMILION
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import HISTORY
 
 _GREY = "0.45"
@@ -20,12 +20,12 @@ _LABELS = {
 }
 
 
-def friction(table: Table, axes: Axes | None = None) -> Figure:
+def friction(table: xr.Dataset, axes: Axes | None = None) -> Figure:
     """Draw measured friction in the manner of the paper's Fig. 7.
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         What `slipsweep.studies.friction.friction_table` returns.
 
     Returns
@@ -57,12 +57,12 @@ def friction(table: Table, axes: Axes | None = None) -> Figure:
     return figure
 
 
-def calibration(table: Table, axes: Axes | None = None) -> Figure:
+def calibration(table: xr.Dataset, axes: Axes | None = None) -> Figure:
     """Draw measured against computed motion in the manner of the paper's Figs. 8 and 9.
 
     Parameters
     ----------
-    table : Table
+    table : xr.Dataset
         What `slipsweep.studies.calibration.calibration_table` returns.
 
     Returns
@@ -102,7 +102,7 @@ def calibration(table: Table, axes: Axes | None = None) -> Figure:
     return figure
 
 
-def _caption(table: Table) -> str:
+def _caption(table: xr.Dataset) -> str:
     """The parameters with their 95 % intervals."""
     parts = []
     for name, sign, unit in (

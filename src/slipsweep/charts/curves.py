@@ -1,32 +1,48 @@
-"""Curves: a result over one axis of a slice, a curve for each value of another, or for each answer there is."""
+"""Curves: a result over one axis of a slice, a curve for each value of another, or for each option of the model."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from slipsweep.charts.answers import SIDE, alternatives, boundaries, newmark, sides_of, solve
-from slipsweep.charts.sheet import (
+from slipsweep.charts.answers import (
+    DISPLACEMENT,
     DRIVES,
-    LINES,
+    SIDE,
+    alternatives,
+    newmark,
+    sides_of,
+    solve,
+    thresholds,
+)
+from slipsweep.charts.sheet import (
     Panel,
     Sheet,
-    broadcast,
     check_positive,
     curve_looks,
+    has_flags,
     log_axis,
     log_ticks,
+    over,
     plot_curve,
     reliable,
-    validity_has,
-)  # fmt: skip
-from slipsweep.charts.style import BLUE, VERMILION, value_text
-from slipsweep.grid.tables import Table, Variable
+)
+from slipsweep.charts.style import (
+    BLUE,
+    LINES,
+    NEWMARK,
+    NO_SLIDING,
+    UNSOUND,
+    VERMILION,
+    flag_name,
+    ratio_text,
+    value_text,
+)
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.variables import CAUTIONS, RESULTS, Validity
 
@@ -36,20 +52,19 @@ Curve = tuple[Floats, Floats]
 #: Least displacement of a logarithmic axis, mm, where the largest is far above; and of u ω² / A.
 _LEAST, _LEAST_SCALED = 1.0, 1e-4
 
-_DISPLACEMENT = "permanent_displacement"
-
 _NEWMARK: dict[str, Any] = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
 _JUMP: dict[str, Any] = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
 _CAUTION: dict[str, Any] = {"color": "0.8", "linewidth": 7, "solid_capstyle": "butt", "zorder": 1.5}
+_UNSOUND: dict[str, Any] = {"color": "0.55", "linewidth": 7, "linestyle": (0, (0.15, 0.35)), "zorder": 1.6}
 
-#: How the answers are drawn that an engineer has to choose from.
+#: How the options are drawn that an engineer has to choose from.
 _ANSWERS: dict[str, dict[str, Any]] = {
     f"{decay}, stop by {end}": {"color": colour, "markerfacecolor": face, "linestyle": dash, "marker": marker}
     for end, colour, face in (("Eq. 12", BLUE, BLUE), ("integration", VERMILION, "white"))
     for decay, dash, marker in (
         ("λ by Eq. 6", (0, (7, 2)), "o"), ("λ = 2", (0, (3, 1.5)), "s"), ("λ = 3", (0, (7, 2, 1.5, 2)), "^"),
     )
-} | {"Newmark": {"color": "0.35", "linestyle": "-", "marker": "x"}}  # fmt: skip
+} | {NEWMARK: {"color": "0.35", "linestyle": "-", "marker": "x"}}  # fmt: skip
 
 
 # ------------------------------------------------------------------------- the three charts
@@ -61,31 +76,36 @@ def families(sheet: Sheet, name: str) -> Figure:
     Parameters
     ----------
     sheet : Sheet
-        Of a slice that holds the result and `validity`.
+        Of a slice that holds the result and `validity`; without `y` there is one curve.
     name : str
         The result.
     """
     factor = 1000.0 if RESULTS[name].get("units") == "m" else 1.0
     label, shown = RESULTS[name]["long_name"], "mm" if factor > 1 else sheet.look.unit(name)
-    values = reliable(sheet.table.data_vars, name, sheet.look).values * factor
-    check_positive(label, values)
+    drawn = reliable(sheet.data, name, sheet.look)
+    check_positive(label, drawn.values)
+    compared = name == DISPLACEMENT and sheet.data.attrs["model"] != "newmark"
+    sheet.data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn)
+    if name == DISPLACEMENT:
+        theirs = newmark(sheet.data)
+        sheet.data["newmark"] = theirs.reset_coords(drop=True)
+        sheet.find_unsound(drawn, theirs, "Barred curves")
     sheet.set_axis("x", sheet.x)
     for panel in sheet.panels:
-        log_axis(panel.axes, values, _LEAST if factor > 1 else None)
+        log_axis(panel.axes, drawn.values * factor, _LEAST if factor > 1 else None)
         panel.axes.set_ylabel(f"{label} ({shown})" if shown else label)
-        curves = _curves(panel, panel.result(name), _on_limit(panel, name))
-        looks = curve_looks(len(curves))
-        for member, ((xs, ys), look) in enumerate(zip(curves, looks, strict=True)):
-            _draw(sheet, panel, (xs, ys * factor), member, len(curves), look)
+        found = _curves(panel, panel.grid("drawn"), _on_limit(panel, name))
+        looks = curve_looks(len(found)) if panel.y else [{"color": BLUE, "linestyle": "-", "marker": ""}]
+        for member, ((xs, ys), look) in enumerate(zip(found, looks, strict=True)):
+            _draw(sheet, panel, (xs, ys * factor), member, len(found), look)
         _underlay(sheet, panel, name, factor)
-        if name == _DISPLACEMENT and panel.table.attrs["model"] != "newmark":
-            for ys, look in zip(panel.grid(newmark(panel.table)), looks, strict=True):
-                _draw_newmark(sheet, panel, (panel.values(panel.x), ys * factor), look)
+        for ys, look in zip(panel.grid("newmark") if compared else (), looks, strict=False):
+            _draw_newmark(sheet, panel, (panel.values(panel.x), ys * factor), look)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(name)
-    if name == _DISPLACEMENT:
-        sheet.note_newmark()
-    return sheet.finish("outside right upper")
+    if compared:
+        sheet.notes += ratio_text((drawn / theirs).values)
+    return sheet.done()
 
 
 def dimensionless(sheet: Sheet) -> Figure:
@@ -96,21 +116,26 @@ def dimensionless(sheet: Sheet) -> Figure:
     sheet : Sheet
         Of a slice over the amplitude and some frequencies that holds `permanent_displacement` and `validity`.
     """
-    drawn = [dimensionless_curves(panel, panel.result(_DISPLACEMENT)) for panel in sheet.panels]
+    drawn = reliable(sheet.data, DISPLACEMENT, sheet.look)
+    theirs = newmark(sheet.data)
+    sheet.data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn, newmark=theirs.reset_coords(drop=True))
+    sheet.find_unsound(drawn, theirs, "Barred curves")
+    scaled = [dimensionless_curves(panel, panel.data["drawn"]) for panel in sheet.panels]
     # the paper's axis begins at the yield acceleration
-    beyond = np.concatenate([ys[xs > 1] for one in drawn for xs, ys in one.values()])
+    beyond = np.concatenate([ys[xs > 1] for one in scaled for xs, ys in one.values()])
     check_positive("displacement beyond the yield acceleration", beyond)
-    frequencies = np.atleast_1d(sheet.table["frequency"].values)
+    frequencies = np.atleast_1d(sheet.data["frequency"].values)
     shapes: list[dict[str, Any]] = [
         {"marker": shape, "markersize": 5, "markerfacecolor": "none"} for shape in "ox+"[: frequencies.size - 1]
     ]
-    for panel, curves in zip(sheet.panels, drawn, strict=True):
+    for panel, curves in zip(sheet.panels, scaled, strict=True):
         panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
         panel.axes.set_ylabel("permanent displacement, u ω² / A")
         log_axis(panel.axes, beyond, _LEAST_SCALED)
-        found = _on_limit(panel, _DISPLACEMENT)
-        edges = dimensionless_curves(panel, found, _sides(panel)["amplitude"], SIDE) if found else {}
-        classical = panel.table.attrs["model"] != "newmark" and dimensionless_curves(panel, newmark(panel.table))
+        found = _on_limit(panel, DISPLACEMENT)
+        sides = sides_of(panel.data["limit_line"])["amplitude"] if found is not None else None
+        edges = {} if found is None else dimensionless_curves(panel, found, sides, SIDE)
+        classical = {} if sheet.data.attrs["model"] == "newmark" else dimensionless_curves(panel, panel.data["newmark"])
         members = len(curves) // frequencies.size
         for member, look in enumerate(curve_looks(members)):
             xs, ys = curves[member, 0]
@@ -126,18 +151,18 @@ def dimensionless(sheet: Sheet) -> Figure:
                 every = max(1, xs.size // 12)
                 place = (number * every // frequencies.size, every)
                 panel.axes.plot(xs, ys, color=look["color"], linestyle="", markevery=place, **shape)
-        _underlay(sheet, panel, _DISPLACEMENT)
+        _underlay(sheet, panel, DISPLACEMENT)
         log_ticks(panel.axes.xaxis, 10)
         panel.axes.set_xlim(left=1.0)
     for frequency, shape in zip(frequencies, [{"linestyle": "-"}, *shapes], strict=True) if shapes else ():
         sheet.legend[value_text("frequency", frequency)] = Line2D([], [], **{"color": "0.3", "linestyle": "", **shape})
-    sheet.note_left_out(_DISPLACEMENT)
-    sheet.note_newmark()
-    return sheet.finish("outside right upper")
+    sheet.note_left_out(DISPLACEMENT)
+    sheet.notes += [] if sheet.data.attrs["model"] == "newmark" else ratio_text((drawn / theirs).values)
+    return sheet.done()
 
 
 def spread(sheet: Sheet) -> Figure:
-    """Draw the answers that an engineer has to choose from, the band between them, and the one of this result.
+    """Draw the results of options that an engineer has to choose from, the band between them, and this result.
 
     Newmark's block; friction decay λ by Eq. 6 or as measured; sliding that ends by Eq. 12 or by integration.
 
@@ -146,14 +171,16 @@ def spread(sheet: Sheet) -> Figure:
     sheet : Sheet
         Of a slice over one axis that holds `permanent_displacement` and `validity`.
     """
+    drawn = reliable(sheet.data, DISPLACEMENT, sheet.look)
+    # the others have a mode limit, whatever this one is
+    sheet.data = sheet.data.merge(thresholds(sheet.data, always=True)).assign(drawn=drawn)
+    sheet.find_unsound(drawn, newmark(sheet.data), "Barred, of this result")
     sheet.set_axis("x", sheet.x)
-    for panel in sheet.panels:
-        panel.lines = boundaries(panel.table, always=True)  # the others have a mode limit, whatever this one is
-    flags: list[Variable] = []
-    own_text = _own_text(sheet.table)  # one for all panels: the caption has what differs
+    flags: list[xr.DataArray] = []
+    own_text = _own_text(sheet.data)  # one for all panels: the caption has what differs
     answers = [_answers(panel, own_text, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for _, ys in one.values()])
-    check_positive(RESULTS[_DISPLACEMENT]["long_name"], values)
+    check_positive(RESULTS[DISPLACEMENT]["long_name"], values)
     for panel, curves in zip(sheet.panels, answers, strict=True):
         log_axis(panel.axes, values, _LEAST)
         panel.axes.set_ylabel("permanent displacement (mm)")
@@ -169,84 +196,80 @@ def spread(sheet: Sheet) -> Figure:
             look = {"linewidth": 1.0, "markersize": 3.5, **_ANSWERS[text]} if text in _ANSWERS else own
             place = number / len(curves)
             sheet.legend[text] = plot_curve(panel.axes, *_above_zero(curve), place, label=text, **look)
-        _underlay(sheet, panel, _DISPLACEMENT, 1000.0)
+        _underlay(sheet, panel, DISPLACEMENT, 1000.0)
         _mark_accelerations(sheet, panel)
-    sheet.note_left_out(_DISPLACEMENT, *flags)
+    sheet.note_left_out(DISPLACEMENT, *flags)
     sheet.notes.append("All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
-    return sheet.finish("outside right upper")
+    return sheet.done()
 
 
 # ------------------------------------------------------------------------ what they show
 
 
 def dimensionless_curves(
-    panel: Panel, displacement: Variable, amplitude: Variable | None = None, along: str | None = None
+    panel: Panel, displacement: xr.DataArray, amplitude: xr.DataArray | None = None, along: str | None = None
 ) -> dict[tuple[int, int], Curve]:
     """A/Üy and uω²/A of every curve of a panel and every frequency of its slice, by their numbers."""
+    data = panel.data
     dims = (panel.y, "frequency", along or panel.x)
-    variables = (
-        displacement, amplitude or panel.table["amplitude"], panel.table["frequency"],
-        panel.lines["yield_acceleration"],
-    )  # fmt: skip
-    u, a, frequency, threshold = (broadcast(one, panel.table, dims) for one in variables)
+    variables = (displacement, data["amplitude"] if amplitude is None else amplitude, data["frequency"],
+                 data["yield_line"])  # fmt: skip
+    u, a, frequency, threshold = (over(one, data, dims) for one in variables)
     with np.errstate(divide="ignore", invalid="ignore"):
         scaled, ratio = np.broadcast_arrays(u * (2 * math.pi * frequency) ** 2 / a, a / threshold)
     return {(i, j): (ratio[i, j], scaled[i, j]) for i in range(scaled.shape[0]) for j in range(scaled.shape[1])}
 
 
-def _answers(panel: Panel, own_text: str, flags: list[Variable]) -> dict[str, Curve]:
+def _answers(panel: Panel, own_text: str, flags: list[xr.DataArray]) -> dict[str, Curve]:
     """The curves of a spread, mm, all over the same abscissae, the result's own last; their validity to `flags`."""
     found = {}
-    for text, (model, changed) in alternatives(panel.table).items():
-        solved = solve(panel.table, [_DISPLACEMENT, "validity"], model, **changed)
+    for text, (model, changed) in alternatives(panel.data).items():
+        solved = solve(panel.data, [DISPLACEMENT, "validity"], model, **changed)
         flags.append(solved["validity"])
-        drawn = reliable(solved, _DISPLACEMENT, panel.look)
-        found[text] = _curves(panel, drawn, _on_limit(panel, _DISPLACEMENT, model, **changed))[0]
-    own = _curves(panel, panel.result(_DISPLACEMENT), _on_limit(panel, _DISPLACEMENT))[0]
+        drawn = reliable(solved, DISPLACEMENT, panel.look)
+        found[text] = _curves(panel, panel.grid(drawn), _on_limit(panel, DISPLACEMENT, model, **changed))[0]
+    own = _curves(panel, panel.grid("drawn"), _on_limit(panel, DISPLACEMENT))[0]
     found[f"this result:\n{own_text}"] = own
     return {text: (xs, ys * 1000.0) for text, (xs, ys) in found.items()}
 
 
-def _own_text(table: Table) -> str:
-    """What the answer of a result is called among those that there are."""
-    model = MODELS.from_attributes(table.attrs)
+def _own_text(data: xr.Dataset) -> str:
+    """What a result is called among those of other options."""
+    model = MODELS.from_attributes(data.attrs)
     if model.name == "newmark":
-        return "Newmark"
-    given = table.coords.get("decay_rate")
-    decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.values.size == 1 else "λ as given"
+        return NEWMARK
+    given = data.coords.get("decay_rate")
+    decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
     return f"{decay}, stop by {'Eq. 12' if model.options['recoupling'] == 'eq12' else 'integration'}"
 
 
 # -------------------------------------------------------------------------- jumps and gaps
 
 
-def _sides(panel: Panel) -> dict[str, Any]:
-    return sides_of(panel.lines["limiting_acceleration"])
-
-
-def _on_limit(panel: Panel, name: str, model: Model | None = None, **changed: Any) -> Variable | None:
+def _on_limit(panel: Panel, name: str, model: Model | None = None, **changed: Any) -> xr.DataArray | None:
     """A result on both sides of the mode limit, if the curves are over the amplitude and there is a limit."""
-    if "limiting_acceleration" not in panel.lines or panel.x not in DRIVES:
+    data = panel.data
+    if "limit_line" not in data or panel.x not in DRIVES:
         return None
-    return reliable(solve(panel.table, [name, "validity"], model, **changed, **_sides(panel)), name, panel.look)
+    return reliable(solve(data, [name, "validity"], model, **changed, **sides_of(data["limit_line"])), name, panel.look)
 
 
-def _curves(panel: Panel, drawn: Variable, on_limit: Variable | None = None) -> list[Curve]:
+def _curves(panel: Panel, rows: Floats, on_limit: xr.DataArray | None = None) -> list[Curve]:
     """The curves of a panel, broken where the amplitude passes the mode limit: the jump is no line.
 
     With the results on the limit they go there from either side.
     """
-    xs, rows = panel.values(panel.x), panel.grid(drawn)
-    if "limiting_acceleration" not in panel.lines:
+    xs, data = panel.values(panel.x), panel.data
+    if "limit_line" not in data:
         return [(xs, ys) for ys in rows]
-    limit = panel.grid(panel.lines["limiting_acceleration"])
-    beyond = panel.grid(panel.table["amplitude"]) > limit
+    limit = panel.grid("limit_line")
+    beyond = panel.grid("amplitude") > limit
     if panel.x not in DRIVES:
         return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, strict=True)]
     scale = panel.look.scale(panel.x, panel.g)
     if panel.x == "displacement_amplitude":
-        scale = scale / (2 * math.pi * panel.grid(panel.table["frequency"])) ** 2
-    edges = panel.grid(on_limit, SIDE) if on_limit else [None] * len(rows)
+        scale = scale / (2 * math.pi * panel.grid("frequency")) ** 2
+    edges = [None] * len(rows) if on_limit is None else panel.grid(on_limit, SIDE)
     return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, (limit * scale)[:, 0], edges, strict=True)]
 
 
@@ -271,7 +294,9 @@ def _above_zero(curve: Curve) -> Curve:
 def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: dict[str, Any]) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
     xs, ys = _above_zero(curve)
-    text = panel.member(member) or "all frequencies"
+    several = panel.x != "frequency" and "frequency" in panel.data.dims
+    single = NEWMARK if panel.data.attrs["model"] == "newmark" else "this result"
+    text = panel.member(member) or ("all frequencies" if several else single)
     sheet.legend[text] = plot_curve(panel.axes, xs, ys, member / members, label=text, **look)
     for at in np.flatnonzero(np.isnan(ys[1:-1]) & (xs[1:-1] == xs[2:])) + 1:
         ends = [at - 1, at + 1]
@@ -281,39 +306,62 @@ def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, l
 
 
 def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]) -> None:
-    """Draw Newmark's curve beside one of a family, with the same dash."""
+    """Draw Newmark's curve beside one of a family, with the same dash; beside one curve, dashed."""
     xs, ys = _above_zero(curve)
-    panel.axes.plot(xs, ys, linestyle=look["linestyle"], gid="newmark", **_NEWMARK)
-    sheet.remarks["Newmark (same dash)" if panel.y else "Newmark"] = Line2D([], [], **_NEWMARK)
+    more = {"linestyle": look["linestyle"]} if panel.y else {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
+    panel.axes.plot(xs, ys, gid="newmark", **{**_NEWMARK, **more})
+    sheet.remarks[f"{NEWMARK} (same dash)" if panel.y else NEWMARK] = Line2D(
+        [], [], **(_NEWMARK if panel.y else {**_NEWMARK, **more})
+    )
 
 
 def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> None:
-    """Put a broad grey line under what a caution is about: in units of `factor`, without one dimensionless."""
-    drawn = panel.result(name)
-    flagged = broadcast(validity_has(panel.table["validity"], CAUTIONS), panel.table, drawn.dims)
-    cautious = replace(drawn, values=np.where(flagged & (drawn.values > 0), drawn.values, np.nan))
-    if factor:
-        # the limit itself is cautious, and a jump there is no line
-        curves = [(xs, ys * factor) for xs, ys in _curves(panel, cautious, _on_limit(panel, name))]
-    else:
-        found = dimensionless_curves(panel, cautious)
-        curves = [curve for (_, frequency), curve in found.items() if frequency == 0]
-    for xs, ys in curves:
-        panel.axes.plot(xs, ys, gid="caution", **_CAUTION)
-    if np.isfinite(cautious.values).any():
-        values = reliable(sheet.table.data_vars, name, sheet.look).values
-        flags = np.bitwise_or.reduce(sheet.table["validity"].values[values > 0].astype(int))
-        names = [(flag.name or "").lower() for flag in CAUTIONS & Validity(int(flags))]
-        sheet.remarks["caution:\n" + "\n".join(names)] = Line2D([], [], **_CAUTION)
+    """Put a broad grey line under what a caution is about, and a barred one under what no block does.
+
+    In units of `factor`, without one dimensionless.
+    """
+    data = panel.data
+    drawn = data["drawn"]
+    flagged = (drawn > 0) & has_flags(data["validity"], CAUTIONS)
+    marks = [(flagged, "caution", _CAUTION)]
+    if "unsound" in data:
+        marks.append((data["unsound"], "unsound", _UNSOUND))
+    for cells, gid, look in marks:
+        marked = drawn.where(cells).transpose(*drawn.dims)
+        if factor:
+            # the limit itself is cautious, and a jump there is no line
+            edge = _on_limit(panel, name) if gid == "caution" else None
+            curves = [(xs, ys * factor) for xs, ys in _curves(panel, panel.grid(marked), edge)]
+        else:
+            found = dimensionless_curves(panel, marked)
+            curves = [curve for (_, frequency), curve in found.items() if frequency == 0]
+        for xs, ys in curves:
+            panel.axes.plot(xs, ys, gid=gid, **look)
+        if not cells.any():
+            continue
+        if gid == "unsound":
+            sheet.remarks[UNSOUND] = Line2D([], [], **_UNSOUND)
+        else:
+            codes = sheet.data["validity"].values[(sheet.data["drawn"] > 0).transpose(*sheet.data["validity"].dims)]
+            names = [flag_name(flag) for flag in CAUTIONS & Validity(int(np.bitwise_or.reduce(codes.astype(int))))]
+            sheet.remarks["caution:\n" + "\n".join(names)] = Line2D([], [], **_CAUTION)
 
 
 def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
-    """Upright lines where the amplitude passes a threshold that all curves of a panel share."""
+    """Vertical lines where the amplitude passes a threshold that all curves of a panel share."""
+    low, high = panel.axes.get_xlim()
+    data = panel.data
+    if panel.x in ("yield_coefficient", "yield_acceleration") and data["amplitude"].size == 1:
+        place = data["amplitude"].item() / (panel.g if panel.x == "yield_coefficient" else 1.0)
+        place *= panel.look.scale(panel.x, panel.g)
+        if low < place < high:
+            panel.axes.axvspan(place, high, facecolor="none", edgecolor="0.7", hatch="..", linewidth=0, zorder=0.5)
+            sheet.remarks[f"{NO_SLIDING}: Üy above A"] = Patch(facecolor="none", edgecolor="0.7", hatch="..")
     if panel.x != "amplitude":
         return
-    for name, threshold in panel.lines.items():
-        text, look = LINES[name]
-        place = threshold.values.flat[0] * panel.look.scale("amplitude", panel.g)
-        low, high = panel.axes.get_xlim()
-        if threshold.values.size == 1 and low <= place <= high:
+    for name, (text, look) in LINES.items():
+        if name not in data or data[name].size > 1:
+            continue
+        place = data[name].item() * panel.look.scale("amplitude", panel.g)
+        if low <= place <= high:
             sheet.remarks[text] = panel.axes.axvline(place, gid=name, **{**look, "linewidth": 1.0, "zorder": 1.7})

@@ -1,14 +1,14 @@
 """The chart of a displacement hazard: mean annual rate against displacement."""
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from slipsweep.charts.sheet import add_caption, add_legend, curve_looks, new_panels
-from slipsweep.charts.style import model_text, plain
+from slipsweep.charts.sheet import Drawing, curve_looks
+from slipsweep.charts.style import Look, model_text, plain
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table
 from slipsweep.studies.suite_statistics import point_names
 
 Floats = NDArray[np.float64]
@@ -20,32 +20,35 @@ _MOST_CURVES, _POINTS = 8, 121
 _MOST_MARKS = 20
 
 
-def drawn_thresholds(table: Table, asked: Floats) -> Floats:
-    """Displacements that a curve is drawn through: those asked for, and as many as a smooth one needs.
+def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
+    """Displacements that a curve is drawn through: those requested, and as many as a smooth one needs.
 
     Parameters
     ----------
-    table : Table
+    data : Dataset
         The displacements under the suite.
-    asked : array
+    requested : array
         Displacements, m, increasing.
     """
-    most = max(np.nanmax(table["permanent_displacement"].values), asked[-1])
-    least = min([one for one in asked if one > 0.0] + [most]) / 10.0
-    return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], asked)
+    most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
+    least = min([one for one in requested if one > 0.0] + [most]) / 10.0
+    return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], requested)
 
 
-def hazard_chart(rates: Table, axes: Axes | None = None, marked: Floats | None = None) -> Figure:
+def hazard_chart(
+    rates: xr.Dataset, axes: Axes | None = None, marked: Floats | None = None, look: Look | None = None
+) -> Figure:
     """Draw the mean annual rate of exceedance over the displacement.
 
     Parameters
     ----------
-    rates : Table
-        What `slipsweep.studies.hazard.hazard_table` returns.
+    rates : Dataset
+        What `slipsweep.displacement_hazard` returns.
     axes : Axes, optional
         What to draw in, instead of a new figure.
     marked : array, optional
         Its displacements that are marked; by default all, if they are few.
+    look : Look, optional
 
     Returns
     -------
@@ -65,32 +68,31 @@ def hazard_chart(rates: Table, axes: Axes | None = None, marked: Floats | None =
     wanted = rates["threshold"].values
     if marked is None:
         marked = wanted if wanted.size <= _MOST_MARKS else wanted[:0]
-    asked = np.isin(wanted, marked)
+    marks = np.isin(wanted, marked)
     lines, held = (rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate"))
-    if not (lines[:, asked if asked.any() else slice(None)] > 0.0).any():
+    if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
         raise InputError("no motion exceeds any of the given displacements: there is nothing to draw")
-    figure, grid = new_panels(axes, 1, 1, (6.4, 4.8))
-    panel = grid[0, 0]
+    drawing = Drawing(look or Look(), 1, 1, (6.4, 4.8), axes)
+    panel = drawing.grid[0, 0]
     panel.set_xscale("log")
     panel.set_yscale("log")
     panel.grid(color="0.9", which="both")
-    entries = {}
-    for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
+    for style, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
         shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
         above = part > 0.5 * line
         joined = above | np.append(False, above[:-1]) | np.append(above[1:], False)  # no gaps between the two
-        dashed = {"color": look["color"], "linestyle": look["linestyle"]}
+        dashed = {"color": style["color"], "linestyle": style["linestyle"]}
         panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
-        panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":")
-        (entries[plain(name) or "asked for"],) = panel.plot(
-            wanted[asked] * 1000.0, shown[asked], **{**look, "linestyle": "none"} if asked.any() else dashed
+        panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=style["color"], linestyle=":")
+        (line_shown,) = panel.plot(
+            wanted[marks] * 1000.0, shown[marks], **{**style, "linestyle": "none"} if marks.any() else dashed
         )
+        if name:
+            drawing.legend[plain(name)] = line_shown
     panel.set_xlabel("permanent displacement d (mm)")
     panel.set_ylabel("mean annual rate of u > d (1/year)")
-    if names != [""]:
-        add_legend(figure, axes, entries, "outside right upper")
-    about = [model_text(rates.attrs), f"hazard curve {plain(str(rates.attrs['hazard_curve']))}"]
+    texts = [model_text(rates.attrs), f"hazard curve: {plain(str(rates.attrs['hazard_curve']))}"]
     if (held > 0.5 * lines).any():
-        about.append("dotted: more than half of the rate is from above the largest amplitude, where P is held constant")
-    add_caption(figure, axes, about)
-    return figure
+        texts.append("Dotted: more than half of the rate comes from above the largest amplitude of the sweep, "
+                     "where P is held constant.")  # fmt: skip
+    return drawing.finish(texts)

@@ -1,56 +1,57 @@
-"""The kinds of charts: what each shows of a result, over which axes, and how it is made from a slice.
+"""The kinds of charts: over which axes each is drawn by default, and how it is made from a slice.
 
 The command line and `Dataset.slipsweep.chart` both come here.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slipsweep.charts import curves, maps, sensitivity_figures, suite_figures, uncertainty_figures
-from slipsweep.charts.sheet import DRIVES, Sheet
-from slipsweep.charts.slices import NAMED, Cut, Result
-from slipsweep.charts.style import Look
-from slipsweep.charts.whole import DRAWN_WHOLE, WholeResult, whole_kind
+from slipsweep.charts import curves, maps, sensitivity_figures, suite_figures, uncertainty_figures, whole
+from slipsweep.charts.answers import DISPLACEMENT, DRIVES
+from slipsweep.charts.sheet import Sheet
+from slipsweep.charts.slices import NAMED, Kept, Result
+from slipsweep.charts.style import Look, figure_width
 from slipsweep.errors import InputError
-from slipsweep.files.results import ResultFile, result_file
+from slipsweep.files.selection import At
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import INTENSITY_MEASURES, RESULTS, STRENGTHS
+from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, RESULTS, STRENGTHS
 
 #: Most curves of a family, frequencies shown to collapse, and panels across and down, that a page can show.
 _CURVES, _FREQUENCIES, _PANELS = 6, 3, 3
 
 _CODES = ("sliding_mode", "validity")
 
-#: Displacements of a fragility under a suite where none are asked for, m.
+#: Displacements of a fragility under a suite where none are requested, m.
 _THRESHOLDS = (0.01, 0.1, 1.0)
 
-#: Axes of statistics that are no parameters.
-_OWN = ("quantile", "threshold")
+#: Inputs that charts of a sweep need, or A = ω²d, or Newmark's yield coefficient.
+_BLOCK, _SHAKEN_BLOCK = ("theta", "mu_s", "amplitude"), ("theta", "mu_s", "amplitude", "frequency")
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What is asked of a chart.
+class Request:
+    """What is requested of a chart.
 
     Attributes
     ----------
     x, y : str, optional
         Axis to draw over; vertical axis of a map, or the curve parameter.
     at : mapping of axis name to value
-        Where to cut other axes; several values choose curves or panels.
+        Where to cut other axes; several values select curves or panels.
     variable : str
         What contours and families show.
     panels : sequence of str
         Axes that panels lie along, across and down.
-    whole : bool
-        Show more of the result: panels lie along axes that would be cut otherwise.
+    more_panels : bool
+        Panels lie along axes that would be cut otherwise.
     axes : Axes, optional
         What to draw the one panel of a chart in, instead of a new figure.
     look : Look
@@ -58,76 +59,79 @@ class Wish:
 
     x: str | None = None
     y: str | None = None
-    at: Mapping[str, Cut] = field(default_factory=dict)
-    variable: str = "permanent_displacement"
+    at: Mapping[str, At] = field(default_factory=dict)
+    variable: str = DISPLACEMENT
     panels: Sequence[str] = ()
-    whole: bool = False
+    more_panels: bool = False
     axes: Axes | None = None
     look: Look = field(default_factory=Look)
 
 
+Drawn = Result | whole.WholeResult
+
+
+def drawable(data: xr.Dataset, name: str | Path) -> Drawn:
+    """What can be drawn of a dataset: slices of a result, or one chart of the whole (InputError if neither)."""
+    kind = whole.whole_kind(data)
+    return Result(data, str(name)) if kind is None else whole.WholeResult(data, str(name), kind)
+
+
 def check_kind(kind: str) -> str:
     """`kind` if there is such a chart (InputError otherwise)."""
-    known = (*KINDS, *DRAWN_WHOLE)
+    known = (*KINDS, *whole.DRAWN_WHOLE)
     if kind not in known:
         raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, known)}")
     return kind
 
 
-@contextmanager
-def opened(source: Path | ResultFile) -> Iterator[Result | WholeResult]:
-    """Open what can be drawn: a result that slices are drawn of, or one that is drawn whole.
-
-    Raises
-    ------
-    InputError
-        It is neither.
-    """
-    with ExitStack() as stack:
-        file = stack.enter_context(result_file(source)) if isinstance(source, Path) else source
-        kind = whole_kind(file)
-        yield Result(file) if kind is None else WholeResult(file, kind)
-
-
-def fitting(result: Result | WholeResult) -> tuple[str, ...]:
-    """The kinds that a result's sort has."""
-    if isinstance(result, WholeResult):
+def fitting(result: Drawn, request: Request) -> tuple[str, ...]:
+    """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
+    if isinstance(result, whole.WholeResult):
         return (result.kind,)
-    return tuple(kind for kind in SORTS[result.sort] if kind != "sensitivity" or "total_index" in result.variables)
+    kinds = SORTS[result.sort]
+    if result.sort == "sweep":
+        free = [dim for dim in result.groups if dim not in (*request.at, *request.panels)]
+        several = any(len(places) > 1 for places in result.places(request.at).values())
+        if DISPLACEMENT in result.variables and len(free) == 1:
+            return ("families",) if several or request.panels else ("curve",)
+        unfit = {"curve"}
+        if result.is_newmark:  # the ratio is 1, and without θ and μs there are no other options
+            unfit |= {"newmark", *(["spread"] if "yield_coefficient" in result.data.coords else [])}
+        if DISPLACEMENT not in result.variables:
+            unfit = {*kinds} - {"modes"}
+        return tuple(kind for kind in kinds if kind not in unfit)
+    return tuple(kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables)
 
 
-def draw(result: Result | WholeResult, kind: str | None, wish: Wish) -> Figure:
-    """Draw one chart of a result, the first of those that it has if none is named.
+def draw(result: Drawn, kind: str | None, request: Request) -> Figure:
+    """Draw one chart of a result, the first of those that fit if none is named.
 
     Raises
     ------
     InputError
-        The chart cannot be drawn of it, or what is asked for is not there.
+        The chart cannot be drawn of it, or what is requested is not there.
     """
-    if len(wish.panels) > 2:
-        raise InputError(f"--panels {','.join(wish.panels)}: must be one axis or two")
-    kind = fitting(result)[0] if kind is None else check_kind(kind)
-    allowed = (result.kind,) if isinstance(result, WholeResult) else SORTS[result.sort]
+    if len(request.panels) > 2:
+        raise InputError(f"--panels {','.join(request.panels)}: must be one axis or two")
+    kind = fitting(result, request)[0] if kind is None else check_kind(kind)
+    allowed = (result.kind,) if isinstance(result, whole.WholeResult) else SORTS[result.sort]
     if kind not in allowed:
-        what = _SORT_TEXT[result.kind if isinstance(result, WholeResult) else result.sort]
+        what = _SORT_TEXT[result.kind if isinstance(result, whole.WholeResult) else result.sort]
         one_of = "one of " if len(allowed) > 1 else ""
-        raise InputError(f"{result.path}: --kind {kind}: is {what}: must be {one_of}{', '.join(allowed)}")
-    if isinstance(result, WholeResult):
-        _check_unused(result, wish)
-        return result.draw(wish.axes)
-    return KINDS[kind](result, wish)
-
-
-def _check_unused(result: WholeResult, wish: Wish) -> None:
-    """Refuse what says how a slice is drawn, where the whole is drawn (InputError)."""
-    given = {"--at": wish.at, "--x": wish.x, "--y": wish.y, "--panels": wish.panels, "--levels": wish.look.levels}
-    for option, value in given.items():
-        if value:
-            raise InputError(f"{result.path}: {option}: not with {result.kind}, which is drawn as a whole")
+        raise InputError(f"{result.name}: --kind {kind}: is {what}: must be {one_of}{', '.join(allowed)}")
+    with mpl.rc_context({"font.size": request.look.font}):
+        if isinstance(result, Result):
+            return KINDS[kind](result, request)
+        given = {"--at": request.at, "--x": request.x, "--y": request.y, "--panels": request.panels,
+                 "--levels": request.look.levels}  # fmt: skip
+        for option, value in given.items():
+            if value:
+                raise InputError(f"{result.name}: {option}: not with {kind}, which is drawn as a whole")
+        return result.draw(request.axes, request.look)
 
 
 def draw_all(
-    result: Result | WholeResult, kinds: Iterable[str], wish: Wish, *, strict: bool
+    result: Drawn, kinds: Iterable[str], request: Request, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
     """Draw several charts; where not `strict`, those that cannot be drawn are named with the reason.
 
@@ -136,344 +140,339 @@ def draw_all(
     InputError
         As `draw`; or none can be drawn.
     """
-    if isinstance(result, Result) and result.sort != "suite" and not result.wide:
-        raise InputError(
-            f"{result.path}: no chart can be drawn: it has no axis of two values or more (its dimensions: "
-            f"{', '.join(f'{dim}, {values.size}' for dim, values in result.axes.items()) or 'none'})"
-        )
     if isinstance(result, Result):
-        result.places(wish.at)
+        if result.sort != "suite" and not result.wide:
+            sizes = ", ".join(f"{dim}, {result.data.sizes[dim]}" for dim in result.dims) or "none"
+            raise InputError(
+                f"{result.name}: no chart can be drawn: it has no axis of two values or more (its dimensions: {sizes})"
+            )
+        result.places(request.at)
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
     for kind in kinds:
         try:
-            figures[kind] = draw(result, kind, wish)
+            figures[kind] = draw(result, kind, request)
         except InputError as error:
             if strict:
                 raise
-            left_out[kind] = str(error).removeprefix(f"{result.path}: ")
+            left_out[kind] = str(error).removeprefix(f"{result.name}: ")
     if not figures:
         reasons = "; ".join(dict.fromkeys(left_out.values()))
-        raise InputError(f"{result.path}: no chart can be drawn from it: {reasons}")
+        raise InputError(f"{result.name}: no chart can be drawn from it: {reasons}")
     return figures, left_out
 
 
-def levels_of(result: Result | WholeResult, name: str, levels: Sequence[float | str]) -> tuple[float, ...]:
-    """Contour levels in a variable's own unit, in order; under a suite the displacements to exceed.
+def look_of(
+    result: Drawn, variable: str, levels: Sequence[float | str], units: Any, show_cautions: bool,
+    width: float | str | None, grey: bool,
+) -> Look:  # fmt: skip
+    """What a reader chooses about charts, checked.
+
+    Levels are contours in a variable's own unit, in order; under a suite the displacements to exceed.
 
     Raises
     ------
     InputError
-        One is no number with a unit of the result, or not above zero.
+        A level is no number with a unit of the result, or not above zero; no figure can be so wide.
     """
-    own = RESULTS.get(name, {}).get("units") == "m"
-    found = [
-        quantity("levels", one, "displacement_amplitude" if own else "mu_s", result.g)
-        if isinstance(one, str)
-        else float(one)
-        for one in levels
-    ]
+    own = "displacement_amplitude" if RESULTS.get(variable, {}).get("units") == "m" else "mu_s"
+    found = [quantity("levels", one, own, result.g) if isinstance(one, str) else float(one) for one in levels]
     for level in found:
         if not 0 < level < float("inf"):
             raise InputError(f"levels: {level:g}: must be > 0")
     if len(set(found)) == 1 and not (isinstance(result, Result) and result.sort == "suite"):
         raise InputError(f"levels: {', '.join(map(str, levels))}: must be two different values or more")
-    return tuple(sorted(set(found)))
+    return Look(units, show_cautions, tuple(sorted(set(found))), figure_width(width), grey)
 
 
 # ------------------------------------------------------------------------------ the axes
 
 
-def _check_panels(result: Result, wish: Wish, dims: Sequence[str], others: Sequence[str | None]) -> None:
-    for name in wish.panels:
-        if result.axis(name) in others or list(wish.panels).count(name) > 1:
-            raise InputError(f"--panels {name}: must be an axis that the chart is not drawn over, and be given once")
-        if name not in dims:
-            raise InputError(f"{result.path}: --panels {name}: the result does not vary along it")
+def _several(result: Result, request: Request) -> list[str]:
+    """Axes of which several values are requested: they tell curves apart, or panels."""
+    return [dim for dim, found in result.places(request.at).items() if len(found) > 1 and dim not in request.panels]
 
 
-def _several(result: Result, wish: Wish) -> list[str]:
-    """Axes of which several values are asked for: they tell curves apart, or panels."""
-    return [dim for dim, found in result.places(wish.at).items() if len(found) > 1 and dim not in wish.panels]
+def _free(result: Result, request: Request, variable: str) -> list[str]:
+    """Axes that a chart of a result may be drawn over."""
+    dims = result.data[result.result(variable)].dims
+    return [d for d in result.wide if d in PARAMETERS and d in dims and d not in (*request.panels, *request.at)]
 
 
-def _free(result: Result, wish: Wish, dims: Sequence[str]) -> list[str]:
-    """Axes that a chart may be drawn over."""
-    return [d for d in dims if d in result.wide and d not in (*wish.panels, *wish.at)]
-
-
-def _axes(
-    result: Result, wish: Wish, variable: str, x: Sequence[str], y: Sequence[str], several: Sequence[str] = ()
-) -> tuple[str, str]:
-    """The two axes asked for, or the first free ones of `x` and `y` along which the variable varies."""
-    named = {result.axis(name) for name in (wish.x, wish.y) if name is not None}
-    dims = result.dims(result.result(variable))
-    for name in named:
-        if name not in dims:
+def _axis(
+    result: Result, request: Request, variable: str, option: str, preferred: Sequence[str], taken: str | None = None
+) -> str:
+    """The axis that an option names, or the first of those preferred, or any, that is left for it."""
+    given = {"x": request.x, "y": request.y}[option]
+    free = _free(result, request, variable)
+    if given is not None:
+        result.axis(given)
+        if given == taken:
+            raise InputError(f"--x {request.x} --y {request.y}: must be two different axes")
+        dims = [str(dim) for dim in result.data[variable].dims]
+        if given not in PARAMETERS and given not in NAMED:
             raise InputError(
-                f"{result.path}: {name}: {variable} does not vary along it; it lies along {', '.join(dims)}"
+                f"{result.name}: --{option} {given}: must be a parameter: {', '.join(free) or 'none left'}"
             )
-    if wish.x is not None and wish.x == wish.y:
-        raise InputError(f"--x {wish.x} --y {wish.y}: must be two different axes")
-    free = [d for d in (*several, *_free(result, wish, dims)) if d in dims and d not in named]
-    chosen = []
-    for asked, preferred in ((wish.y, (*several, *y)), (wish.x, x)):
-        taken = asked or next((p for p in (*preferred, *free) if p in free), None)
-        if taken is None:
+        if given not in dims:
             raise InputError(
-                f"{result.path}: a chart needs two axes of two values or more that --at does not cut; "
-                f"{variable} has {', '.join(d for d in dims if d in result.wide) or 'none'}"
+                f"{result.name}: {given}: {variable} does not vary along it; it varies along {', '.join(dims)}"
             )
-        if taken in free:
-            free.remove(taken)
-        chosen.append(taken)
-    return chosen[1], chosen[0]
-
-
-def _map_axes(result: Result, wish: Wish, variable: str, x: Sequence[str]) -> tuple[str, str]:
-    found = _axes(result, wish, variable, x, DRIVES)
-    if "case" in found:
-        raise InputError(f"{result.path}: case: the cases have no order; use them for curves (--y) or panels")
+        return given
+    others = [dim for dim in free if dim not in (taken, request.x, request.y)]
+    found = next((dim for dim in (*preferred, *others) if dim in others), None)
+    if found is None:
+        needed = "one axis" if taken is None and option == "x" else "two axes"
+        fixed = f" --at fixes {', '.join(request.at)}." if request.at else ""
+        raise InputError(
+            f"{result.name}: this chart needs {needed} with two values or more; "
+            f"{variable} has {', '.join(free) or 'none'} left.{fixed}"
+        )
     return found
 
 
+def _map_axes(result: Result, request: Request, variable: str, x: Sequence[str]) -> tuple[str, str]:
+    up = _axis(result, request, variable, "y", DRIVES, request.x)
+    across = _axis(result, request, variable, "x", x, up)
+    if "case" in (across, up):
+        raise InputError(f"{result.name}: case: the cases have no order; use them for curves (--y) or panels")
+    return across, up
+
+
 def _sheet(
-    result: Result, wish: Wish, names: Sequence[str], x: str, y: str | None, family: bool = False,
-    also: Mapping[str, slice | list[int]] | None = None,
-    same: Sequence[str] = (),
+    result: Result, request: Request, names: Sequence[str], x: str, y: str | None, *, family: bool = False,
+    also: Mapping[str, Kept] | None = None, same: Sequence[str] = (),
 ) -> Sheet:  # fmt: skip
     """The slice of a chart, in panels.
 
     `family` says that `y` tells curves apart, `also` what else is kept, `same` along what the chart does not vary.
     """
-    dims = result.dims(names[0])
+    dims = [str(dim) for dim in result.data[names[0]].dims]
     taken = (x, y, *(also or {}))
-    _check_panels(result, wish, dims, taken)
-    panels = wish.panels or [dim for dim in _several(result, wish) if dim not in taken]
-    if wish.whole and not panels:
-        panels = [dim for dim in dims if dim in result.groups and dim not in (*taken, *same, *wish.at)]
+    for name in request.panels:
+        if result.axis(name) in taken or list(request.panels).count(name) > 1:
+            raise InputError(f"--panels {name}: must be an axis that the chart is not drawn over, and be given once")
+        if name not in dims:
+            raise InputError(f"{result.name}: --panels {name}: the result does not vary along it")
+    panels = list(request.panels) or [dim for dim in _several(result, request) if dim not in taken]
+    if request.more_panels and not panels:
+        panels = [dim for dim in dims if dim in result.groups and dim not in (*taken, *same, *request.at)]
     panels = panels[:2]
-    keep: dict[str, Any] = {x: result.thinned(x), **(also or {})}
-    at = dict(wish.at)
+    at = dict(request.at)
     if x in at:
-        raise InputError(f"{result.path}: {x} = {at[x]}: is an axis of this chart; it cannot have one value")
+        raise InputError(f"{result.name}: {x} = {at[x]}: is an axis of this chart; it cannot have one value")
+    keep: dict[str, Any] = {x: result.thinned(x), **(also or {})}
+    if y and not family and y in at:
+        raise InputError(f"{result.name}: {y} = {at[y]}: is an axis of this chart; it cannot have one value")
     if y:
         keep[y] = result.members(y, _CURVES, at) if family else result.thinned(y)
     for name in panels:
         keep[name] = result.members(name, _PANELS, at)
-    for name in (*panels, *([y] if y and family else [])):
-        at.pop(name, None)
+    at = {name: value for name, value in at.items() if name not in (*panels, y)}
     across, down, *_ = (*panels, None, None)
-    return Sheet(result.select(names, keep, at), x, y, wish.look, across, down, wish.axes)
+    return Sheet(result.select(names, keep, at), x, y, request.look, across, down, request.axes)
 
 
-# ---------------------------------------------------------------------------- the charts
+def _check_no_family(result: Result, request: Request, kind: str) -> None:
+    if request.y is not None:
+        raise InputError(f"{result.name}: --y {request.y}: not with {kind}, drawn over one axis, --x; use --panels")
+
+
+# ----------------------------------------------------------------------- of a sweep
+
+
+def _names(result: Result, name: str) -> list[str]:
+    """The results that a chart of one of them reads, with Newmark's displacement if the file has it."""
+    beside = ["newmark_displacement"] if name == DISPLACEMENT and "newmark_displacement" in result.variables else []
+    return [result.result(name), "validity", *beside]
 
 
 def _quantity(result: Result, name: str) -> str:
     result.result(name)
     if name in _CODES:
-        raise InputError(f"{result.path}: --variable {name}: is a code, not a quantity; --kind modes shows the modes")
+        raise InputError(f"{result.name}: --variable {name}: is a code, not a quantity; --kind modes shows the modes")
     return name
-
-
-def _contours(result: Result, wish: Wish) -> Figure:
-    name = _quantity(result, wish.variable)
-    x, y = _map_axes(result, wish, name, ("frequency", "theta", "mu_s"))
-    result.require("theta", "mu_s", "amplitude", "frequency")
-    return maps.contours(_sheet(result, wish, [name, "validity"], x, y), name)
-
-
-def _modes(result: Result, wish: Wish) -> Figure:
-    x, y = _map_axes(result, wish, "sliding_mode", ("theta", "mu_s", "frequency"))
-    result.require("theta", "mu_s", "amplitude")
-    return maps.modes(_sheet(result, wish, ["sliding_mode", "validity"], x, y, same=_same(result)))
-
-
-def _newmark(result: Result, wish: Wish) -> Figure:
-    name = result.result("permanent_displacement")
-    if result.attrs["model"] == "newmark":
-        raise InputError(f"{result.path}: is of Newmark's block itself; there is no difference to show")
-    x, y = _map_axes(result, wish, name, ("theta", "mu_s", "frequency"))
-    result.require("theta", "mu_s", "amplitude", "frequency")
-    return maps.newmark_ratio(_sheet(result, wish, [name, "validity"], x, y, same=_same(result)))
 
 
 def _same(result: Result) -> list[str]:
     """With the amplitude given, modes and ratios of displacements do not depend on the frequency."""
-    return ["frequency"] if "displacement_amplitude" not in result.coordinates else []
+    return ["frequency"] if "displacement_amplitude" not in result.data.coords else []
 
 
-def _families(result: Result, wish: Wish) -> Figure:
-    name = _quantity(result, wish.variable)
-    x, y = _axes(result, wish, name, DRIVES, ("frequency", "mu_s", "theta"), _several(result, wish)[:1])
-    result.require("theta", "mu_s", "amplitude", "frequency")
-    return curves.families(_sheet(result, wish, [name, "validity"], x, y, family=True), name)
+def _contours(result: Result, request: Request) -> Figure:
+    name = _quantity(result, request.variable)
+    x, y = _map_axes(result, request, name, ("frequency", "theta", "mu_s"))
+    result.require(*_SHAKEN_BLOCK)
+    return maps.contours(_sheet(result, request, _names(result, name), x, y), name)
 
 
-def _spread(result: Result, wish: Wish) -> Figure:
-    name = result.result("permanent_displacement")
-    if wish.y is not None:
-        raise InputError(f"{result.path}: --y {wish.y}: not with spread, which is drawn over one axis, --x")
-    free = _free(result, wish, result.dims(name))
-    x = result.axis(wish.x) if wish.x else next((d for d in (*DRIVES, *free) if d in free), None)
-    if x is None:
-        raise InputError(f"{result.path}: a chart needs an axis of two values or more that --at does not cut")
-    result.require("theta", "mu_s", "amplitude", "frequency")
-    return curves.spread(_sheet(result, wish, [name, "validity"], x, None))
+def _modes(result: Result, request: Request) -> Figure:
+    x, y = _map_axes(result, request, "sliding_mode", ("theta", "yield_coefficient", "mu_s", "frequency"))
+    result.require(*_BLOCK)
+    return maps.modes(_sheet(result, request, ["sliding_mode", "validity"], x, y, same=_same(result)))
 
 
-def _dimensionless(result: Result, wish: Wish) -> Figure:
-    name = result.result("permanent_displacement")
-    if wish.x not in (None, *DRIVES):
-        raise InputError(f"{result.path}: --x {wish.x}: the dimensionless chart is drawn over A / Üy")
-    drive = result.axis(next((d for d in DRIVES if d in result.axes), "amplitude"))
-    also: dict[str, slice | list[int]] = {}
-    if "frequency" in result.wide and "frequency" not in wish.at:
+def _newmark(result: Result, request: Request) -> Figure:
+    if result.is_newmark:
+        raise InputError(f"{result.name}: the result is of Newmark's block itself: the ratio is 1 everywhere")
+    x, y = _map_axes(result, request, DISPLACEMENT, ("theta", "mu_s", "frequency"))
+    result.require(*_SHAKEN_BLOCK)
+    return maps.newmark_ratio(_sheet(result, request, _names(result, DISPLACEMENT), x, y, same=_same(result)))
+
+
+def _families(result: Result, request: Request) -> Figure:
+    name = _quantity(result, request.variable)
+    several = _several(result, request)[:1]
+    if several and request.y is None and several[0] != request.x:
+        y = several[0]
+    else:
+        y = _axis(result, request, name, "y", ("frequency", "yield_coefficient", "mu_s", "theta"), request.x or "")
+    x = _axis(result, request, name, "x", DRIVES, y)
+    result.require(*_SHAKEN_BLOCK)
+    return curves.families(_sheet(result, request, _names(result, name), x, y, family=True), name)
+
+
+def _curve(result: Result, request: Request) -> Figure:
+    name = _quantity(result, request.variable)
+    _check_no_family(result, request, "curve")
+    x = _axis(result, request, name, "x", (*DRIVES, "yield_coefficient", "frequency"))
+    result.require(*_SHAKEN_BLOCK)
+    return curves.families(_sheet(result, request, _names(result, name), x, None), name)
+
+
+def _spread(result: Result, request: Request) -> Figure:
+    _check_no_family(result, request, "spread")
+    x = _axis(result, request, DISPLACEMENT, "x", DRIVES)
+    if "yield_coefficient" in result.data.coords:
+        raise InputError(f"{result.name}: the result has ky alone: other options of the model need theta and mu_s")
+    result.require(*_SHAKEN_BLOCK)
+    return curves.spread(_sheet(result, request, _names(result, DISPLACEMENT), x, None))
+
+
+def _dimensionless(result: Result, request: Request) -> Figure:
+    if request.x not in (None, *DRIVES):
+        raise InputError(f"{result.name}: --x {request.x}: the dimensionless chart is drawn over A / Üy")
+    drive = result.axis(next((d for d in reversed(DRIVES) if d in result.dims), "amplitude"))
+    also: dict[str, Kept] = {}
+    free = _free(result, request, DISPLACEMENT)
+    if "frequency" in free:
         also["frequency"] = result.spread("frequency", _FREQUENCIES)
-    free = _free(result, wish, ("mu_s", "theta", "yield_acceleration"))
-    family = result.axis(wish.y) if wish.y else next(iter(free), None)
+    preferred = ("mu_s", "theta", "yield_acceleration", "yield_coefficient")
+    family = result.axis(request.y) if request.y else next((d for d in preferred if d in free), None)
+    if family is None and (several := [d for d in _several(result, request) if d not in also]):
+        family = several[0]
     if family in (drive, *also):
-        raise InputError(f"{result.path}: --y {family}: must be an axis other than {', '.join((drive, *also))}")
-    result.require("theta", "mu_s", "amplitude", "frequency")
-    return curves.dimensionless(_sheet(result, wish, [name, "validity"], drive, family, family=True, also=also))
-
-
-def _statistic_axes(result: Result, wish: Wish, variable: str, family: str | None) -> tuple[str, str | None]:
-    """The axis that statistics are drawn over, and the one that tells curves apart, if there is one."""
-    result.result(variable)
-    for asked in (wish.x, wish.y):
-        if asked is not None:
-            result.axis(asked)
-    free = _free(result, wish, result.dims(variable))
-    x = wish.x or next((d for d in (*DRIVES, *free) if d in free and d not in (*_OWN, wish.y)), None)
-    if x is None or x not in free or x in _OWN:
-        raise InputError(f"{result.path}: {variable} needs an axis of two values or more that --at does not cut")
-    chosen = wish.y or (family if family in free else None)
-    if chosen == x or (chosen is not None and chosen not in (*free, *NAMED)):
-        raise InputError(f"{result.path}: --y {chosen}: must be another axis that {variable} has, and that is not cut")
-    return x, chosen
+        raise InputError(f"{result.name}: --y {family}: must be an axis other than {', '.join((drive, *also))}")
+    result.require(*_SHAKEN_BLOCK)
+    names = _names(result, DISPLACEMENT)
+    return curves.dimensionless(_sheet(result, request, names, drive, family, family=True, also=also))
 
 
 # ------------------------------------------------------------------- under recorded motions
 
 
-def _recorded(result: Result, wish: Wish, x: str, *, y: str | None = None, more: Sequence[str] = ()) -> Sheet:
-    """The slice of a chart of recorded motions: those of a suite stay, all of them but where some are asked for."""
-    names = [result.result(name) for name in ("permanent_displacement", "validity", *more)]
-    suite = [dim for dim in suite_figures.SUITE if dim in result.axes] if result.sort == "suite" else []
-    chosen: dict[str, Any] = {dim: places for dim, places in result.places(wish.at).items() if dim in suite}
-    others = {name: cut for name, cut in wish.at.items() if name not in suite}
+def _recorded(result: Result, request: Request, x: str, *, y: str | None = None, more: Sequence[str] = ()) -> Sheet:
+    """The slice of a chart of recorded motions: those of a suite stay, all of them but where some are requested."""
+    names = [result.result(name) for name in (DISPLACEMENT, "validity", *more)]
+    suite = [dim for dim in suite_figures.SUITE if dim in result.dims] if result.sort == "suite" else []
+    chosen: dict[str, Any] = {dim: places for dim, places in result.places(request.at).items() if dim in suite}
+    others = {name: cut for name, cut in request.at.items() if name not in suite}
     also = {dim: chosen.get(dim, slice(None)) for dim in suite}
-    return _sheet(result, replace(wish, at=others), names, x, y, family=y is not None, also=also)
+    return _sheet(result, replace(request, at=others), names, x, y, family=y is not None, also=also)
 
 
-def _record_axis(result: Result, wish: Wish) -> str:
-    """What a chart of recorded motions is drawn over: how strong they are, else the yield acceleration, or any axis."""
-    dims = result.dims(result.result("permanent_displacement"))
-    free = [dim for dim in _free(result, wish, dims) if dim != wish.y and dim not in suite_figures.SUITE]
-    preferred = (*STRENGTHS, "yield_acceleration", "yield_coefficient", *free)
-    x = result.axis(wish.x) if wish.x else next((dim for dim in preferred if dim in free), None)
-    if x is None or x not in free:
-        raise InputError(
-            f"{result.path}: --x {x}: must be an axis of two values or more that --at does not cut: "
-            f"{', '.join(free) or 'there is none'}"
-        )
+def _record_axis(result: Result, request: Request) -> str:
+    """What a chart of recorded motions is drawn over: how strong they are, else Üy or ky, or any axis."""
+    x = _axis(result, request, DISPLACEMENT, "x", (*STRENGTHS, "yield_acceleration", "yield_coefficient"))
+    if x in suite_figures.SUITE:
+        raise InputError(f"{result.name}: --x {x}: must be an axis other than {', '.join(suite_figures.SUITE)}")
     return x
 
 
-def _check_no_family(result: Result, wish: Wish, kind: str) -> None:
-    if wish.y is not None:
-        raise InputError(f"{result.path}: --y {wish.y}: not with {kind} of a suite; --panels draws panels over an axis")
+def _beside(result: Result) -> list[str]:
+    return ["newmark_displacement"] if "newmark_displacement" in result.variables else []
 
 
-def _motions(result: Result, wish: Wish) -> Figure:
-    x = _record_axis(result, wish)
+def _motions(result: Result, request: Request) -> Figure:
     if result.sort == "suite":
-        _check_no_family(result, wish, "motions")
-        beside = [name for name in ("newmark_displacement",) if name in result.variables]
-        return suite_figures.motions(_recorded(result, wish, x, more=beside))
-    dims = result.dims("permanent_displacement")
-    free = [dim for dim in (*_several(result, wish), *_free(result, wish, dims)) if dim != x]
-    family = result.axis(wish.y) if wish.y else next(iter(free), None)
+        _check_no_family(result, request, "motions of a suite")
+        return suite_figures.motions(_recorded(result, request, _record_axis(result, request), more=_beside(result)))
+    x = _record_axis(result, replace(request, y=None) if request.x else request)
+    free = [d for d in (*_several(result, request), *_free(result, request, DISPLACEMENT)) if d not in (x, "polarity")]
+    family = result.axis(request.y) if request.y else next(iter(free), None)
     if family == x:
-        raise InputError(f"{result.path}: --y {family}: must be an axis other than {x}")
-    return suite_figures.curves(_recorded(result, wish, x, y=family))
+        raise InputError(f"{result.name}: --y {family}: must be an axis other than {x}")
+    return suite_figures.curves(_recorded(result, request, x, y=family, more=_beside(result)))
 
 
-def _intensity(result: Result, wish: Wish) -> Figure:
-    _check_no_family(result, wish, "intensity")
-    measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.coordinates]
-    default = "arias_intensity" if "pgv" in result.axes else "pgv"
-    measure = wish.x or default
+def _intensity(result: Result, request: Request) -> Figure:
+    _check_no_family(result, request, "intensity")
+    measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.data.coords]
+    measure = request.x or ("arias_intensity" if "pgv" in result.dims else "pgv")
     if measure not in measures:
         raise InputError(
-            f"{result.path}: --x {measure}: must be an intensity measure of the motions: "
+            f"{result.name}: --x {measure}: must be an intensity measure of the motions: "
             f"{', '.join(measures) or 'the file has none'}"
         )
-    factor = [] if "scale" in result.coordinates else ["motion_factor"]
-    return suite_figures.intensity(_recorded(result, wish, "motion", more=factor), measure)
+    factor = [] if "scale" in result.data.coords else ["motion_factor"]
+    return suite_figures.intensity(_recorded(result, request, "motion", more=factor), measure)
 
 
-def _histogram(result: Result, wish: Wish) -> Figure:
-    _check_no_family(result, wish, "histogram")
-    if wish.x is not None:
-        raise InputError(f"{result.path}: --x {wish.x}: not with histogram, which is drawn over the displacement")
-    return suite_figures.histogram(_recorded(result, wish, "motion"))
-
-
-def _suite_fragility(result: Result, wish: Wish) -> Figure:
-    _check_no_family(result, wish, "fragility")
-    sheet = _recorded(result, wish, _record_axis(result, wish))
-    return suite_figures.fragility(sheet, wish.look.levels or _THRESHOLDS)
+def _histogram(result: Result, request: Request) -> Figure:
+    _check_no_family(result, request, "histogram")
+    if request.x is not None:
+        raise InputError(f"{result.name}: --x {request.x}: not with histogram, which is drawn over the displacement")
+    return suite_figures.histogram(_recorded(result, request, "motion"))
 
 
 # ----------------------------------------------------------------------- of uncertain inputs
 
 
-def _fragility(result: Result, wish: Wish) -> Figure:
+def _fragility(result: Result, request: Request) -> Figure:
     if result.sort == "suite":
-        return _suite_fragility(result, wish)
-    if wish.look.levels:
-        raise InputError(f"{result.path}: levels: not with statistics, whose thresholds are those in the file")
+        _check_no_family(result, request, "fragility of a suite")
+        sheet = _recorded(result, request, _record_axis(result, request))
+        return suite_figures.fragility(sheet, request.look.levels or _THRESHOLDS)
+    if request.look.levels:
+        raise InputError(f"{result.name}: levels: not with statistics, whose thresholds are those in the file")
     result.result("valueless_share")
     result.require("threshold")
-    x, family = _statistic_axes(result, wish, "exceedance_probability", "threshold")
+    x = _axis(result, request, "exceedance_probability", "x", (*DRIVES, *STRENGTHS))
+    free = [*_free(result, request, "exceedance_probability"), "threshold", *NAMED, *_several(result, request)]
+    several = "threshold" in result.wide and "threshold" not in request.at
+    family = request.y or ("threshold" if several else next(iter(_several(result, request)), None))
+    if family == x or (family is not None and result.axis(family) not in free):
+        raise InputError(f"{result.name}: --y {family}: must be another axis that --at does not fix")
     names = ["exceedance_probability", "valueless_share"]
-    return uncertainty_figures.fragility(_sheet(result, wish, names, x, family, family=True))
+    return uncertainty_figures.fragility(_sheet(result, request, names, x, family, family=True))
 
 
-def _quantiles(result: Result, wish: Wish) -> Figure:
-    if wish.y is not None:
-        raise InputError(f"{result.path}: --y {wish.y}: not with quantiles, whose bands lie over one axis, --x")
+def _quantiles(result: Result, request: Request) -> Figure:
+    _check_no_family(result, request, "quantiles")
     result.result("valueless_share")
     result.require("quantile")
-    x, _ = _statistic_axes(result, wish, "displacement_quantile", None)
+    x = _axis(result, request, "displacement_quantile", "x", (*DRIVES, *STRENGTHS))
     names = ["displacement_quantile", "valueless_share"]
-    also: dict[str, slice | list[int]] = {"quantile": slice(None)}
-    return uncertainty_figures.quantile_bands(_sheet(result, wish, names, x, None, also=also))
+    return uncertainty_figures.quantile_bands(_sheet(result, request, names, x, None, also={"quantile": slice(None)}))
 
 
-def _sensitivity(result: Result, wish: Wish) -> Figure:
+def _sensitivity(result: Result, request: Request) -> Figure:
     if "total_index" not in result.variables:
-        raise InputError(f"{result.path}: holds no Sobol indices; sensitivity = true in [uncertainty] asks for them")
-    if wish.y is not None:
-        raise InputError(f"{result.path}: --y {wish.y}: not with sensitivity, whose curve parameter is the input")
+        raise InputError(f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them")
+    _check_no_family(result, request, "sensitivity")
     names = sensitivity_figures.NAMES
-    for name in names:
-        result.result(name)
-    keep: dict[str, slice | list[int]] = {"bound": slice(None)}
-    if wish.x is None and not _free(result, wish, result.dims("total_index")):
-        return sensitivity_figures.bars(_sheet(result, wish, names, "input", None, also=keep), result.inputs)
-    x, _ = _statistic_axes(result, wish, "total_index", None)
-    sheet = _sheet(result, wish, names, x, None, also={**keep, "input": slice(None)})
-    return sensitivity_figures.curves(sheet, result.inputs)
+    keep: dict[str, Kept] = {"bound": slice(None)}
+    if request.x is None and not _free(result, request, "total_index"):
+        return sensitivity_figures.bars(_sheet(result, request, names, "input", None, also=keep))
+    x = _axis(result, request, "total_index", "x", (*DRIVES, *STRENGTHS))
+    return sensitivity_figures.curves(_sheet(result, request, names, x, None, also={**keep, "input": slice(None)}))
 
 
-KINDS: dict[str, Callable[[Result, Wish], Figure]] = {
+KINDS: dict[str, Callable[[Result, Request], Figure]] = {
     "contours": _contours,
     "modes": _modes,
     "families": _families,
+    "curve": _curve,
     "dimensionless": _dimensionless,
     "newmark": _newmark,
     "spread": _spread,
@@ -487,7 +486,7 @@ KINDS: dict[str, Callable[[Result, Wish], Figure]] = {
 
 #: Those of a sweep under harmonic motion, of statistics, and of a sweep under recorded motions.
 SORTS: dict[str, tuple[str, ...]] = {
-    "sweep": ("contours", "modes", "families", "dimensionless", "newmark", "spread"),
+    "sweep": ("contours", "modes", "families", "curve", "dimensionless", "newmark", "spread"),
     "statistics": ("fragility", "quantiles", "sensitivity"),
     "suite": ("motions", "fragility", "intensity", "histogram"),
     "record": ("motions",),

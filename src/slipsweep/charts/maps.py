@@ -9,41 +9,37 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import BoundaryNorm, Colormap, LinearSegmentedColormap
+import xarray as xr
+from matplotlib.colors import BoundaryNorm, Colormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
+from scipy import ndimage
 
-from slipsweep.charts.answers import SIDE, newmark, sides_of, solve
-from slipsweep.charts.sheet import (
-    DRIVES,
+from slipsweep.charts.answers import DISPLACEMENT, DRIVES, SIDE, newmark, sides_of, solve, thresholds
+from slipsweep.charts.sheet import Panel, Sheet, has_flags, is_log, over, reliable
+from slipsweep.charts.style import (
+    COLOURS,
     LINES,
-    Panel,
-    Sheet,
-    broadcast,
-    is_log,
-    ratios,
-    reliable,
-    validity_has,
-)  # fmt: skip
-from slipsweep.charts.style import length_text, unit
-from slipsweep.grid.tables import Variable
+    MODE_TEXT,
+    NO_SLIDING,
+    UNSOUND,
+    flag_name,
+    length_text,
+    ratio_colours,
+    ratio_text,
+    unit,
+)
 from slipsweep.model.variables import RESULTS, SlidingMode, Validity
 
 Floats = NDArray[np.float64]
 
-#: Pale to dark in even steps of lightness, read alike with any kind of colour vision; black lines show on all of it.
-COLOURS = LinearSegmentedColormap.from_list("pale", mpl.colormaps["YlGnBu"](np.linspace(0.03, 0.68, 64)))
-
-#: Diverging, white in the middle; black lines show on all of it.
-RATIO_COLOURS = LinearSegmentedColormap.from_list("pale", mpl.colormaps["PuOr_r"](np.linspace(0.12, 0.88, 64)))
-
 #: Colour and hatch of each mode: from light to dark.
 MODES = {
-    SlidingMode.STUCK: ("#EEF3F8", ""),
+    SlidingMode.STUCK: ("white", ""),
     SlidingMode.STICK_SLIP: ("#F2C56B", "//"),
     SlidingMode.CONTINUOUS: ("#B07AA8", "\\\\"),
 }
@@ -61,11 +57,17 @@ HATCHES = {
     Validity.NEAR_MODE_LIMIT: "..",
 }
 
+#: Hatching of displacements that have a trend which no block has.
+UNSOUND_HATCH = "///"
+
+#: Least thickness of a hatched region, inches: a thinner one is a scrap of hatch; the caption counts its cells.
+_SCRAP = 0.09
+
 #: Displacements that people design for, m.
 _LEAST, _MOST = 1e-3, 1.0
 
 #: What a contour's label takes to each side, and what it needs to the next contour, inches.
-_LABEL_ROOM, _LINE_ROOM = 0.28, 0.11
+_LABEL_SPACE, _LINE_SPACE = 0.28, 0.11
 
 #: Ratios above one at which the colour changes; below one their inverses do.  The first is as good as one.
 _RATIOS = (1.1, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
@@ -80,16 +82,21 @@ def contours(sheet: Sheet, name: str) -> Figure:
     Parameters
     ----------
     sheet : Sheet
-        Of a slice that holds the result and, if there is hatching to be, `validity`.
+        Of a slice that holds the result and `validity`.
     name : str
         The result.
     """
-    _set_axes(sheet)
-    drawn = reliable(sheet.table.data_vars, name, sheet.look).values
-    levels = list(sheet.look.levels) or _levels(name, drawn)
+    drawn = reliable(sheet.data, name, sheet.look)
+    _prepare(sheet, drawn, name)
+    if name == DISPLACEMENT:
+        theirs = newmark(sheet.data)
+        if sheet.data.attrs["model"] != "newmark":
+            sheet.notes += ratio_text((drawn / theirs).values)
+        sheet.find_unsound(drawn, theirs, f"Hatched {UNSOUND_HATCH}")
+    levels = list(sheet.look.levels) or _levels(name, drawn.values)
     if not levels or not np.isfinite(drawn).any():
-        sheet.notes.append(_without_levels(name, drawn))
-        return _finish(sheet)
+        sheet.notes.append(_without_levels(name, drawn.values))
+        return _finish(sheet, name)
     places = np.log10(levels)
     colours = COLOURS.resampled(len(levels) + 1)
     norm = BoundaryNorm(places, colours.N, extend="both")
@@ -97,115 +104,121 @@ def contours(sheet: Sheet, name: str) -> Figure:
         norm = BoundaryNorm(places, colours.N, extend="min")
     texts = {place: _value_label(name, level) for place, level in zip(places, levels, strict=True)}
 
-    def at_limit(panel: Panel) -> Variable:
-        found = solve(panel.table, [name, "validity"], **sides_of(panel.lines["limiting_acceleration"]))
-        return reliable(found, name, panel.look)
-
-    # what is below the lowest level, or nothing, is a hundredth of it
+    # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is covered later
     def logarithms(values: Floats) -> Floats:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.maximum(np.log10(values), places[0] - 2)
+        return np.maximum(np.log10(values), places[0] - 2)
 
-    areas = None
-    for panel in sheet.panels:
-        areas = _fill(panel, panel.result(name), at_limit, logarithms, colours, norm, texts) or areas
-    _colour_bar(sheet, areas, places, texts, RESULTS[name]["long_name"])
-    if name == "permanent_displacement":
-        sheet.note_newmark()
-    sheet.note_left_out(name)
-    return _finish(sheet)
+    _fill_panels(sheet, logarithms, colours, norm, texts, RESULTS[name]["long_name"])
+    return _finish(sheet, name)
+
+
+def newmark_ratio(sheet: Sheet) -> Figure:
+    """Draw the ratio of the permanent displacement to that of Newmark's block."""
+    ours = reliable(sheet.data, DISPLACEMENT, sheet.look)
+    theirs = newmark(sheet.data)
+    _prepare(sheet, (ours / theirs).where(theirs > 0), DISPLACEMENT, ratio=True)
+    ratio = sheet.data["drawn"].values
+    sheet.notes += ratio_text(ratio)
+    sheet.find_unsound(ours, theirs, f"Hatched {UNSOUND_HATCH}")
+    there = ratio[np.isfinite(ratio) & (ratio > 0)]
+    if not there.size:
+        sheet.notes.append("No ratio: no displacement above zero.")
+        return _finish(sheet, DISPLACEMENT)
+    farthest = float(np.abs(np.log10(there)).max())
+    above = [level for level in _RATIOS if level == _RATIOS[0] or math.log10(level) < farthest]
+    levels = [1 / level for level in reversed(above)] + above
+    places = np.log10(levels)
+    colours = ratio_colours(len(above))
+    norm = BoundaryNorm(places, colours.N, extend="both")
+    texts = {place: f"{level:.2g}" if level < 1 else f"{level:g}" for place, level in zip(places, levels, strict=True)}
+
+    def logarithms(values: Floats) -> Floats:
+        return np.where(values > 0, np.log10(values), np.nan)
+
+    _fill_panels(sheet, logarithms, colours, norm, texts, "displacement over that of Newmark's block")
+    return _finish(sheet, DISPLACEMENT)
 
 
 def modes(sheet: Sheet) -> Figure:
     """Draw the sliding mode of every cell, by colour and hatch."""
     _set_axes(sheet)
+    sheet.data = sheet.data.merge(thresholds(sheet.data))
     for panel in sheet.panels:
-        codes = panel.grid(panel.table["sliding_mode"])
+        codes = panel.grid("sliding_mode")
         for mode, (colour, hatch) in MODES.items():
-            label = mode.name.lower().replace("_", "–")
-            _mark(sheet, panel, codes == int(mode), label, facecolor=colour, edgecolor="white", hatch=hatch, zorder=0.5)
-    return _finish(sheet)
+            look = {"facecolor": colour, "edgecolor": "white", "hatch": hatch, "zorder": 0.5}
+            entry = {**look, "edgecolor": "0.6"} if mode is SlidingMode.STUCK else look
+            _mark(sheet, panel, codes == int(mode), MODE_TEXT[mode], look, entry)
+    return _finish(sheet, "sliding_mode")
 
 
-def newmark_ratio(sheet: Sheet) -> Figure:
-    """Draw the ratio of the permanent displacement to that of Newmark's block, in colours that diverge from 1."""
+# ------------------------------------------------------------------- what is drawn, per panel
+
+
+def _prepare(sheet: Sheet, drawn: xr.DataArray, name: str, ratio: bool = False) -> None:
+    """Set the axes, and add what the panels draw to the slice: values, thresholds, and values on the mode limit."""
     _set_axes(sheet)
-    name = "permanent_displacement"
-    ours = reliable(sheet.table.data_vars, name, sheet.look)
-    ratio = ratios(ours, newmark(sheet.table), sheet.table)
-    there = ratio[np.isfinite(ratio) & (ratio > 0)]
-    if not there.size:
-        sheet.notes.append("No ratio: no displacement above zero.")
-        return _finish(sheet)
-    farthest = float(np.abs(np.log10(there)).max())
-    above = [level for level in _RATIOS if level == _RATIOS[0] or math.log10(level) < farthest]
-    levels = [1 / level for level in reversed(above)] + above
-    places = np.log10(levels)
-    colours = RATIO_COLOURS.resampled(len(levels) + 1)
-    norm = BoundaryNorm(places, colours.N, extend="both")
-    texts = {place: f"{level:.2g}" if level < 1 else f"{level:g}" for place, level in zip(places, levels, strict=True)}
-
-    def at_limit(panel: Panel) -> Variable:
-        sides = sides_of(panel.lines["limiting_acceleration"])
-        found = reliable(solve(panel.table, [name, "validity"], **sides), name, panel.look)
-        return Variable(found.dims, ratios(found, newmark(panel.table, **sides), panel.table))
-
-    def logarithms(values: Floats) -> Floats:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(values > 0, np.log10(values), np.nan)
-
-    areas = None
-    for panel in sheet.panels:
-        ours = panel.result(name)
-        quotient = Variable(ours.dims, ratios(ours, newmark(panel.table), panel.table))
-        areas = _fill(panel, quotient, at_limit, logarithms, colours, norm, texts) or areas
-    _colour_bar(sheet, areas, places, texts, "displacement over that of Newmark's block")
-    sheet.note_newmark()
-    sheet.note_left_out(name)
-    return _finish(sheet)
+    data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn)
+    if "limit_line" in data and (sheet.x in DRIVES or sheet.y in DRIVES):
+        sides = sides_of(data["limit_line"])
+        edge = reliable(solve(sheet.data, [name, "validity"], **sides), name, sheet.look)
+        edge = edge / newmark(sheet.data, **sides) if ratio else edge
+        data["edge"] = edge.reset_coords(drop=True)
+    sheet.data = data
 
 
 # ------------------------------------------------------------------------- filled contours
 
 
-def _fill(
-    panel: Panel, drawn: Variable, at_limit: Any, logarithms: Any, colours: Colormap, norm: BoundaryNorm,
-    texts: dict[float, str],
-) -> Any:  # fmt: skip
+def _fill_panels(
+    sheet: Sheet, logarithms: Any, colours: Colormap, norm: BoundaryNorm, texts: dict[float, str], label: str
+) -> None:
     """Fill between contours and label them; both end on the mode limit, where the result jumps."""
     places, areas = sorted(texts), None
-    taken = _line_points(panel)
-    for xs, ys, values in _sides(panel, drawn, at_limit):
-        logs = np.ma.masked_invalid(logarithms(values))
-        if not logs.count():
-            continue
-        look: dict[str, Any] = {"cmap": colours, "norm": norm, "extend": norm.extend}
-        areas = panel.axes.contourf(xs, ys, logs, places, zorder=0.5, **look)
-        lines = panel.axes.contour(xs, ys, logs, places, colors="black", linewidths=0.7, linestyles="solid", zorder=1)
-        lines.set_gid("contours")
-        _label_contours(panel, lines, texts, taken)
-    return areas
+    look: dict[str, Any] = {"cmap": colours, "norm": norm}
+    for panel in sheet.panels:
+        taken = _line_points(panel)
+        columns, rows = (_edges(panel.values(axis)) for axis in (panel.x, str(panel.y)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # what contours leave open beside cells without a value has the colours of the cells
+            cells = np.ma.masked_invalid(logarithms(panel.grid("drawn")))
+            panel.axes.pcolormesh(columns, rows, cells, zorder=0.4, rasterized=True, **look)
+            for xs, ys, values in _sides(panel):
+                logs = np.ma.masked_invalid(logarithms(values))
+                if not logs.count():
+                    continue
+                areas = panel.axes.contourf(xs, ys, logs, places, zorder=0.5, extend=norm.extend, **look)
+                line: dict[str, Any] = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
+                lines = panel.axes.contour(xs, ys, logs, places, **line)
+                lines.set_gid("contours")
+                _label_contours(panel, lines, texts, taken)
+    if areas is None:
+        return
+    bar = sheet.figure.colorbar(areas, ax=[panel.axes for panel in sheet.panels], ticks=places, pad=0.02)
+    bar.ax.set_yticklabels([texts[place] for place in places], fontsize=sheet.look.font)
+    bar.ax.minorticks_off()
+    bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
 
 
-def _sides(panel: Panel, drawn: Variable, at_limit: Any) -> list[tuple[Floats, Floats, Floats]]:
+def _sides(panel: Panel) -> list[tuple[Floats, Floats, Floats]]:
     """x, y and values of the cells below and beyond the mode limit, as grids that end on the limit.
 
     Cells on the other side are moved onto the limit and have the result there.
     """
     xs, ys = np.meshgrid(panel.values(panel.x), panel.values(str(panel.y)))
-    values = panel.grid(drawn)
-    if "limiting_acceleration" not in panel.lines:
+    values = panel.grid("drawn")
+    if "limit_line" not in panel.data:
         return [(xs, ys, values)]
-    beyond = panel.grid(panel.table["amplitude"]) > panel.grid(panel.lines["limiting_acceleration"])
-    line = threshold_line(panel, "limiting_acceleration")
+    beyond = panel.grid("amplitude") > panel.grid("limit_line")
+    line = threshold_line(panel, "limit_line")
     if line is None or not (beyond.any() and not beyond.all()):  # the limit is no line of this plane
         return [(xs, ys, np.where(side, values, np.nan)) for side in (~beyond, beyond) if side.any()]
     upright = panel.y in DRIVES
-    edges = broadcast(at_limit(panel), panel.table, (str(panel.x if upright else panel.y), SIDE))
+    edges = over(panel.data["edge"], panel.data, (panel.x if upright else panel.y, SIDE))
     # along the amplitude first; one more cell, on the limit, for lines that leave the map beside it
-    along, other, cells, over = (ys, xs, values, beyond) if upright else (xs.T, ys.T, values.T, beyond.T)
+    along, other, cells, above = (ys, xs, values, beyond) if upright else (xs.T, ys.T, values.T, beyond.T)
     sides = []
-    for number, (away, end) in enumerate(((over, -1), (~over, 0))):
+    for number, (away, end) in enumerate(((above, -1), (~above, 0))):
         limit = np.where(np.isfinite(line[upright]), line[upright], along[end])
         at = len(along) if end else 0
         grids = (
@@ -213,8 +226,8 @@ def _sides(panel: Panel, drawn: Variable, at_limit: Any) -> list[tuple[Floats, F
             np.insert(other, at, other[0], axis=0),
             np.insert(np.where(away, edges[:, number], cells), at, edges[:, number], axis=0),
         )
-        place, beside, found = grids if upright else (one.T for one in grids)
-        sides.append((beside, place, found) if upright else (place, beside, found))
+        place, across, found = grids if upright else (one.T for one in grids)
+        sides.append((across, place, found) if upright else (place, across, found))
     return sides
 
 
@@ -226,71 +239,61 @@ def threshold_line(panel: Panel, name: str) -> tuple[Floats, Floats] | None:
     tuple of ndarray or None
         x and y of the line; None if neither axis is one of amplitude.
     """
-    table = panel.table
     for drive, other, swapped in ((str(panel.y), panel.x, False), (panel.x, str(panel.y), True)):
         if drive not in DRIVES:
             continue
         along = panel.values(other)
-        values = broadcast(panel.lines[name], table, (other,)) * panel.look.scale(drive, panel.g)
+        values = over(panel.data[name], panel.data, (other,)) * panel.look.scale(drive, panel.g)
         if drive == "displacement_amplitude":
-            values = values / (2 * math.pi * broadcast(table["frequency"], table, (other,))) ** 2
+            values = values / (2 * math.pi * over(panel.data["frequency"], panel.data, (other,))) ** 2
         return (values, along) if swapped else (along, values)
     return None
 
 
 def _line_points(panel: Panel) -> list[Floats]:
-    """A few dozen points of the threshold lines, in inches: they say well enough where there is room."""
+    """A few dozen points of the threshold lines, in inches: labels keep away from them."""
     to_inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
-    shown = [line for name in panel.lines if (line := threshold_line(panel, name)) is not None]
+    shown = [line for name in LINES if name in panel.data and (line := threshold_line(panel, name)) is not None]
     return [to_inches.transform(np.column_stack(line)[:: math.ceil(line[0].size / 60)]) for line in shown]
 
 
 def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str], taken: list[Floats]) -> None:
-    """Label each contour where it is farthest from edges, other contours and `taken`, if there is room.
+    """Label each contour where it is farthest from edges, other contours and `taken`, if there is space.
 
     `taken` holds points of lines and labels, in inches; the new labels are added.
     """
     to_inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
     corners = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted()).get_points()
-    contours = [to_inches.transform(np.concatenate([*segments, np.empty((0, 2))])) for segments in drawn.allsegs]
-    contours = [points[np.isfinite(points).all(axis=1)] for points in contours]
-    contours = [points[:: math.ceil(len(points) / 300)] for points in contours if len(points)]
+    lines = [to_inches.transform(np.concatenate([*segments, np.empty((0, 2))])) for segments in drawn.allsegs]
+    lines = [points[np.isfinite(points).all(axis=1)] for points in lines]
+    lines = [points[:: math.ceil(len(points) / 300)] for points in lines if len(points)]
     positions = []
-    for points in contours:
-        room = np.minimum(points - corners[0], corners[1] - points).min(axis=1)
+    for points in lines:
+        space = np.minimum(points - corners[0], corners[1] - points).min(axis=1)
         for obstacle in taken:
-            room = np.minimum(room, _apart(points, obstacle))
+            space = np.minimum(space, _distance(points, obstacle))
         # another contour may come nearer than the end of a label
-        for other in contours:
+        for other in lines:
             if other is not points:
-                room = np.minimum(room, _apart(points, other) * _LABEL_ROOM / _LINE_ROOM)
-        best = int(np.argmax(room))
-        if room[best] > _LABEL_ROOM:
+                space = np.minimum(space, _distance(points, other) * _LABEL_SPACE / _LINE_SPACE)
+        best = int(np.argmax(space))
+        if space[best] > _LABEL_SPACE:
             taken.append(points[best : best + 1])
             positions.append(tuple(to_inches.inverted().transform(points[best])))
     if positions:
         labels = panel.axes.clabel(
             drawn, manual=positions, fmt=lambda place: texts[min(texts, key=lambda one: abs(one - place))],
-            fontsize=8, colors="black",
+            fontsize=0.8 * panel.look.font, colors="black",
         )  # fmt: skip
         for label in labels:
             label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
-def _apart(points: Floats, others: Floats) -> Floats:
+def _distance(points: Floats, others: Floats) -> Floats:
     """How far each point is from the nearest of some others."""
     there = others[np.isfinite(others).all(axis=1)]
     apart = points[:, None] - there[None]
     return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(axis=1, initial=np.inf))
-
-
-def _colour_bar(sheet: Sheet, areas: Any, places: Floats, texts: dict[float, str], label: str) -> None:
-    if areas is None:
-        return
-    bar = sheet.figure.colorbar(areas, ax=[panel.axes for panel in sheet.panels], ticks=places, pad=0.02)
-    bar.ax.set_yticklabels([texts[place] for place in places])
-    bar.ax.minorticks_off()
-    bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
 
 
 def _levels(name: str, values: Floats) -> list[float]:
@@ -299,7 +302,7 @@ def _levels(name: str, values: Floats) -> list[float]:
     if not there.size:
         return []
     low, high = float(there.min()), float(there.max())
-    if name == "permanent_displacement" and low < _MOST and high > _LEAST:
+    if name == DISPLACEMENT and low < _MOST and high > _LEAST:
         low, high = max(low, _LEAST), min(high, _MOST)
     else:
         low = max(low, high * 1e-5)
@@ -334,15 +337,38 @@ def _set_axes(sheet: Sheet) -> None:
         sheet.set_axis(side, name)
 
 
-def _finish(sheet: Sheet) -> Figure:
-    """Threshold lines, hatching, legend and caption of a map."""
+def _finish(sheet: Sheet, name: str) -> Figure:
+    """Area of no sliding, threshold lines, hatching, legend and caption of a map."""
+    scraps: dict[str, int] = {}
     for panel in sheet.panels:
-        for name in panel.lines:
-            text, look = LINES[name]
-            if _draw_threshold(panel, name, look):
+        if name != "sliding_mode":
+            _cover_no_sliding(sheet, panel)
+        for line, (text, look) in LINES.items():
+            if line in panel.data and _draw_threshold(panel, line, look):
                 sheet.remarks[text] = Line2D([], [], **look)
-        _hatch(sheet, panel)
-    return sheet.finish()
+        hatches = {flag_name(flag): (has_flags(panel.data["validity"], flag), hatch) for flag, hatch in HATCHES.items()}
+        if "unsound" in panel.data:
+            hatches[UNSOUND] = panel.data["unsound"], UNSOUND_HATCH
+        for text, (cells, hatch) in hatches.items():
+            look = {"facecolor": "none", "edgecolor": "0.2", "hatch": hatch}
+            scraps[text] = scraps.get(text, 0) + _mark(sheet, panel, panel.grid(cells), text, look, scraps=False)
+    small = [f"{' '.join(text.split())} ({count} cell{'s' * (count > 1)})" for text, count in scraps.items() if count]
+    if small:
+        sheet.notes.append(f"Also, in regions too small to hatch: {'; '.join(small)}.")
+    if name != "sliding_mode":
+        sheet.note_left_out(name)
+    return sheet.done(beside=False)
+
+
+def _cover_no_sliding(sheet: Sheet, panel: Panel) -> None:
+    """Leave white, up to the line of yield, what does not slide: no colour of a displacement stands for it."""
+    excess = np.ma.masked_invalid(panel.grid("amplitude") - panel.grid("yield_line"))
+    if not excess.count() or excess.min() >= 0:
+        return
+    if excess.max() > 0:
+        xs, ys = panel.values(panel.x), panel.values(str(panel.y))
+        panel.axes.contourf(xs, ys, excess, [float(excess.min()) - 1.0, 0.0], colors="white", zorder=1.05)
+    sheet.legend[NO_SLIDING] = Patch(facecolor="white", edgecolor="0.6", linewidth=0.6)
 
 
 def _draw_threshold(panel: Panel, name: str, look: dict[str, Any]) -> bool:
@@ -353,7 +379,7 @@ def _draw_threshold(panel: Panel, name: str, look: dict[str, Any]) -> bool:
         corners = np.array([panel.axes.get_xlim(), panel.axes.get_ylim()])
         inside = [(values >= low) & (values <= high) for values, (low, high) in zip(line, corners, strict=True)]
         return bool((inside[0] & inside[1]).any())
-    excess = np.ma.masked_invalid(panel.grid(panel.table["amplitude"]) - panel.grid(panel.lines[name]))
+    excess = np.ma.masked_invalid(panel.grid("amplitude") - panel.grid(name))
     if not excess.count() or not excess.min() < 0 < excess.max():
         return False
     drawn = panel.axes.contour(
@@ -364,25 +390,39 @@ def _draw_threshold(panel: Panel, name: str, look: dict[str, Any]) -> bool:
     return True
 
 
-def _hatch(sheet: Sheet, panel: Panel) -> None:
-    """Hatch the cells of each flag that means no value or a caution."""
-    if "validity" not in panel.table:
-        return
-    for flag, hatch in HATCHES.items():
-        name = (flag.name or "").lower()
-        cells = panel.grid(validity_has(panel.table["validity"], flag))
-        _mark(sheet, panel, cells, name, facecolor="none", edgecolor="0.2", hatch=hatch)
+def _mark(
+    sheet: Sheet, panel: Panel, cells: NDArray[np.bool_], label: str, look: dict[str, Any],
+    entry: dict[str, Any] | None = None, scraps: bool = True,
+) -> int:  # fmt: skip
+    """Cover cells with a colour or hatch, and give the legend an entry.
 
-
-def _mark(sheet: Sheet, panel: Panel, cells: NDArray[np.bool_], label: str, **look: Any) -> None:
-    """Cover cells with a colour or hatch, and give the legend an entry."""
-    if not cells.any():
-        return
-    look = {"linewidth": 0, **look}
+    Without `scraps` regions that are too small for a hatch are left; returns how many cells they have.
+    """
     columns, rows = (_edges(panel.values(axis)) for axis in (panel.x, str(panel.y)))
-    with mpl.rc_context({"hatch.linewidth": 0.6}):
-        panel.axes.add_patch(PathPatch(_outline(cells, columns, rows), gid=label, **look))
-        sheet.legend[label] = Patch(**{**look, "linewidth": 0.6})
+    left = 0
+    if not scraps and cells.any():
+        large = _large(panel, cells, columns, rows)
+        left, cells = int((cells & ~large).sum()), large
+    if cells.any():
+        look = {"linewidth": 0, **look}
+        with mpl.rc_context({"hatch.linewidth": 0.6}):
+            panel.axes.add_patch(PathPatch(_outline(cells, columns, rows), gid=label, **look))
+            sheet.legend[label] = Patch(**{**(entry or look), "linewidth": 0.6})
+    return left
+
+
+def _large(panel: Panel, cells: NDArray[np.bool_], columns: Floats, rows: Floats) -> NDArray[np.bool_]:
+    """The cells of connected regions that are thick enough for a hatch."""
+    to_inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
+    xs = to_inches.transform(np.column_stack([columns, np.full_like(columns, rows[0])]))[:, 0]
+    ys = to_inches.transform(np.column_stack([np.full_like(rows, columns[0]), rows]))[:, 1]
+    regions, number = ndimage.label(cells, np.ones((3, 3)))
+    large = np.zeros(number + 1, bool)
+    for at, (row, column) in enumerate(ndimage.find_objects(regions), start=1):
+        extents = xs[column.stop] - xs[column.start], ys[row.stop] - ys[row.start]
+        covered = float(np.mean(regions[row, column] == at)) * math.prod(extents)
+        large[at] = covered >= _SCRAP * max(extents)
+    return np.asarray(large[regions])
 
 
 def _edges(values: Floats) -> Floats:
@@ -398,20 +438,12 @@ def _edges_of(values: Floats) -> Floats:
 
 
 def _outline(cells: NDArray[np.bool_], columns: Floats, rows: Floats) -> Path:
-    """The cells that are true as rectangles: runs along a row, put together where the next row has the same."""
-    open_runs: dict[tuple[int, int], int] = {}
-    rectangles: list[tuple[int, int, int, int]] = []
-    for row in range(cells.shape[0] + 1):
-        runs: set[tuple[int, int]] = set()
-        if row < cells.shape[0]:
-            change = np.flatnonzero(np.diff(np.concatenate([[0], cells[row].astype(np.int8), [0]])))
-            runs = set(zip(change[::2].tolist(), change[1::2].tolist(), strict=True))
-        ended = [run for run in open_runs if run not in runs]
-        rectangles += [(*run, open_runs.pop(run), row) for run in ended]
-        for run in runs:
-            open_runs.setdefault(run, row)
+    """The cells that are true as rectangles, one for each run along a row."""
     paths = []
-    for left, right, bottom, top in rectangles:
-        x0, x1, y0, y1 = columns[left], columns[right], rows[bottom], rows[top]
-        paths.append(Path([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], closed=True))
+    for bottom, top, row in zip(rows[:-1], rows[1:], cells, strict=True):
+        change = np.flatnonzero(np.diff(np.concatenate([[0], row.astype(np.int8), [0]])))
+        for left, right in zip(columns[change[::2]], columns[change[1::2]], strict=True):
+            paths.append(
+                Path([(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)], closed=True)
+            )
     return Path.make_compound_path(*paths)

@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slipsweep.charts.sheet import Sheet, broadcast, curve_looks, plot_curve
+from slipsweep.charts.sheet import Sheet, curve_looks, over, plot_curve
 from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, plain
 from slipsweep.errors import InputError
+from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import SENSITIVITY_STATUS_TEXT, SensitivityStatus
 
 #: Results that the charts show, and how: name, interval, text, colour of bars.
@@ -24,25 +25,24 @@ NAMES = ("total_index", "total_interval", "first_order_index", "first_order_inte
 _LABEL = "Sobol index of the permanent displacement"
 
 
-def bars(sheet: Sheet, inputs: list[str]) -> Figure:
+def bars(sheet: Sheet) -> Figure:
     """Draw both indices of every input at one grid point, with their intervals, the largest total index first.
 
     Parameters
     ----------
     sheet : Sheet
         Of a slice over `input` and `bound` that holds `NAMES`.
-    inputs : list of str
-        Names of the inputs.
     """
     _check_there(sheet)
+    inputs = axis_labels(sheet.data, "input")
     _legend(sheet)
-    totals = broadcast(sheet.table["total_index"], sheet.table, ("input", sheet.across, sheet.down))
+    totals = over(sheet.data["total_index"], sheet.data, ("input", sheet.across, sheet.down))
     order = np.argsort(np.nan_to_num(totals).reshape(len(inputs), -1).sum(axis=1))
     places = np.arange(len(inputs))
     for panel in sheet.panels:
         for number, (name, interval, _, colour) in enumerate(_INDICES):
-            values = panel.table[name].values[order]
-            low, high = broadcast(panel.table[interval], panel.table, ("bound", "input"))[:, order]
+            values = over(panel.data[name], panel.data, ("input",))[order]
+            low, high = over(panel.data[interval], panel.data, ("bound", "input"))[:, order]
             at = places + (0.2, -0.2)[number]
             panel.axes.barh(at, values, height=0.36, color=colour)
             there = np.isfinite(values + low + high)
@@ -54,26 +54,25 @@ def bars(sheet: Sheet, inputs: list[str]) -> Figure:
         panel.axes.set_xlim(*_ends(sheet, [interval for _, interval, _, _ in _INDICES]))
         panel.axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
         panel.axes.set_xlabel(_LABEL)
-    return sheet.finish("outside right upper")
+    return sheet.done()
 
 
-def curves(sheet: Sheet, inputs: list[str]) -> Figure:
+def curves(sheet: Sheet) -> Figure:
     """Draw the indices of every input over one axis, the total one with a band, its 95 % interval.
 
     Parameters
     ----------
     sheet : Sheet
         Of a slice over its abscissa, `input` and `bound` that holds `NAMES`.
-    inputs : list of str
-        Names of the inputs.
     """
     _check_there(sheet)
+    inputs = axis_labels(sheet.data, "input")
     sheet.set_axis("x", sheet.x)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
         xs = panel.values(panel.x)
-        total, first = (broadcast(panel.table[name], panel.table, ("input", panel.x)) for name, *_ in _INDICES)
-        low, high = broadcast(panel.table["total_interval"], panel.table, ("bound", "input", panel.x))
+        total, first = (over(panel.data[name], panel.data, ("input", panel.x)) for name, *_ in _INDICES)
+        low, high = over(panel.data["total_interval"], panel.data, ("bound", "input", panel.x))
         for at, look in enumerate(curve_looks(len(inputs))):
             panel.axes.fill_between(xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0)
             text = _symbol(inputs[at])
@@ -86,18 +85,18 @@ def curves(sheet: Sheet, inputs: list[str]) -> Figure:
     sheet.remarks["total"] = Line2D([], [], **plain_look)
     sheet.remarks["first order"] = Line2D([], [], linestyle=(0, (3, 1.5)), linewidth=1.0, **plain_look)
     sheet.remarks["95 % interval (total)"] = Patch(alpha=0.15, linewidth=0, **plain_look)
-    status = sheet.table["sensitivity_status"].values
+    status = sheet.data["sensitivity_status"].values
     for one in SensitivityStatus:
         if one is not SensitivityStatus.COMPUTED and (status == int(one)).any():
             sheet.notes.append(f"No indices where {SENSITIVITY_STATUS_TEXT[one]}.")
-    return sheet.finish("outside right upper")
+    return sheet.done()
 
 
 def _check_there(sheet: Sheet) -> None:
     """Refuse a slice without indices (InputError)."""
-    if np.isfinite(sheet.table["total_index"].values).any():
+    if np.isfinite(sheet.data["total_index"].values).any():
         return
-    status = {int(one) for one in np.unique(sheet.table["sensitivity_status"].values)}
+    status = {int(one) for one in np.unique(sheet.data["sensitivity_status"].values)}
     reasons = [text for one, text in SENSITIVITY_STATUS_TEXT.items() if int(one) in status and int(one)]
     raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons) or 'missing'}; choose another slice (--at)")
 
@@ -110,8 +109,8 @@ def _legend(sheet: Sheet) -> None:
 
 def _ends(sheet: Sheet, intervals: Sequence[str] = ()) -> tuple[float, float]:
     """Ends of the axis of indices: 0 to 1 and what lies beyond, of intervals not more than half as much again."""
-    values = np.concatenate([sheet.table[name].values.ravel() for name, *_ in _INDICES])
-    beside = [np.clip(sheet.table[name].values.ravel(), -0.5, 1.5) for name in intervals]
+    values = np.concatenate([sheet.data[name].values.ravel() for name, *_ in _INDICES])
+    beside = [np.clip(sheet.data[name].values.ravel(), -0.5, 1.5) for name in intervals]
     low, high = (float(function(np.concatenate([values, *beside]))) for function in (np.nanmin, np.nanmax))
     return min(-0.05, 1.05 * low), max(1.05, 1.05 * high)
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slipsweep.charts.sheet import Sheet, broadcast, check_positive, curve_looks, log_axis_of, plot_curve
+from slipsweep.charts.sheet import Sheet, check_positive, curve_looks, log_axis, over, plot_curve
 from slipsweep.charts.style import BLUE, length_text
 
 #: Least displacement of a logarithmic axis, mm, where the largest is far above.
@@ -30,15 +30,15 @@ def fragility(sheet: Sheet) -> Figure:
         A dotted line shows the share of samples without a value, where there are any.
     """
     sheet.set_axis("x", sheet.x)
-    fixed = None if "threshold" in (sheet.y, sheet.across, sheet.down) else length_text(sheet.table["threshold"].item())
+    fixed = None if "threshold" in (sheet.y, sheet.across, sheet.down) else length_text(sheet.data["threshold"].item())
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
-        curves = panel.grid(panel.table["exceedance_probability"])
+        curves = panel.grid("exceedance_probability")
         for member, (curve, look) in enumerate(zip(curves, curve_looks(len(curves)), strict=True)):
             text = panel.member(member) or f"d = {fixed}"
             line = plot_curve(panel.axes, panel.values(panel.x), curve, member / len(curves), label=text, **look)
             sheet.legend[text] = line
-        shares = panel.grid(panel.table["valueless_share"])
+        shares = panel.grid("valueless_share")
         if shares.any():
             plain: dict[str, Any] = {"color": "0.4", "linestyle": ":"}
             panel.axes.plot(panel.values(panel.x), shares.max(axis=0), **plain)
@@ -46,7 +46,7 @@ def fragility(sheet: Sheet) -> Figure:
         panel.axes.set_ylim(-0.02, 1.02)
         given = "u > d" if fixed is None or sheet.y is None else f"u > {fixed}"
         panel.axes.set_ylabel(f"probability of exceedance P({given})")
-    return sheet.finish("outside right upper")
+    return sheet.done()
 
 
 def quantile_bands(sheet: Sheet) -> Figure:
@@ -57,18 +57,19 @@ def quantile_bands(sheet: Sheet) -> Figure:
     sheet : Sheet
         Of a slice over its abscissa and `quantile` that holds `displacement_quantile` and `valueless_share`.
     """
-    everything = sheet.table["displacement_quantile"].values * 1000.0
+    everything = sheet.data["displacement_quantile"].values * 1000.0
     check_positive("permanent displacement", everything)
     sheet.set_axis("x", sheet.x)
-    quantiles = np.atleast_1d(sheet.table["quantile"].values)
+    quantiles = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
-        floor = log_axis_of(panel.axes, everything, _LEAST)
-        dims = ("quantile", panel.x)
-        values = broadcast(panel.table["displacement_quantile"], panel.table, dims) * 1000.0
+        floor = log_axis(panel.axes, everything, _LEAST, zeros=True)
+        data = panel.data
+        values = over(data["displacement_quantile"], data, ("quantile", panel.x)) * 1000.0
         shown, xs = np.where(np.isnan(values), np.nan, np.maximum(values, floor)), panel.values(panel.x)
         pairs = [(low, quantiles.size - 1 - low) for low in range(quantiles.size // 2)]
         for number, (low, high) in enumerate(pairs):
-            look: dict[str, Any] = {"color": mpl.colormaps["Blues"](0.2 + 0.3 * number / len(pairs)), "linewidth": 0}
+            colour = mpl.colormaps["Blues"](0.2 + 0.3 * number / len(pairs))
+            look: dict[str, Any] = {"facecolor": colour, "linewidth": 0}
             panel.axes.fill_between(xs, shown[low], shown[high], **look)
             sheet.legend[f"{quantiles[low] * 100:g} to {quantiles[high] * 100:g} %"] = Patch(**look)
         if quantiles.size % 2:
@@ -76,7 +77,7 @@ def quantile_bands(sheet: Sheet) -> Figure:
             text = "median" if quantiles[middle] == 0.5 else f"{quantiles[middle] * 100:g} %"
             sheet.legend[text] = panel.axes.plot(xs, shown[middle], color=BLUE, linewidth=1.8, label=text)[0]
         panel.axes.set_ylabel("permanent displacement (mm)")
-    most = float(sheet.table["valueless_share"].values.max())
+    most = float(sheet.data["valueless_share"].max())
     if most > 0:
         sheet.notes.append(f"Without a value: up to {most:.1%} of the samples.")
-    return sheet.finish("outside right upper")
+    return sheet.done()

@@ -1,56 +1,36 @@
 """Results that are drawn as a whole, not in slices: histories, limits, tests on a shaking table, annual rates."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slipsweep.charts import calibration_figures, figures, hazard_figures, limit_figures
-from slipsweep.charts.slices import check_units
+from slipsweep.charts import calibration_figures, hazard_figures, history_figures, limit_figures
+from slipsweep.charts.sheet import without_colour
+from slipsweep.charts.style import Look
 from slipsweep.errors import InputError
-from slipsweep.files.results import ResultFile, read_table
-from slipsweep.grid.tables import Table
-from slipsweep.model.variables import (
-    CALIBRATION_SERIES,
-    HALF_WAVES,
-    HAZARD_RESULTS,
-    HISTORY,
-    LIMIT_RESULTS,
-    PARAMETERS,
-    SLIDES,
-    STATISTIC_COORDINATES,
-)
 
-#: A variable that only a result of the kind has, and what draws it.
-DRAWN_WHOLE: dict[str, tuple[str, Callable[[Table, Axes | None], Figure]]] = {
-    "limit": ("limit_amplitude", limit_figures.limit_chart),
-    "calibration": ("computed_ground_acceleration", calibration_figures.calibration),
-    "friction": ("friction_ratio", calibration_figures.friction),
-    "hazard": ("annual_rate", hazard_figures.hazard_chart),
-    "history": ("relative_displacement", figures.history),
+#: A variable that only a result of the kind has.
+DRAWN_WHOLE: dict[str, str] = {
+    "limit": "limit_amplitude",
+    "calibration": "computed_ground_acceleration",
+    "friction": "friction_ratio",
+    "hazard": "annual_rate",
+    "history": "relative_displacement",
 }
 
-#: Variables that the charts take in the units that slipsweep writes.
-_DESCRIBED = {
-    **PARAMETERS,
-    **STATISTIC_COORDINATES,
-    **HISTORY,
-    **HALF_WAVES,
-    **LIMIT_RESULTS,
-    **HAZARD_RESULTS,
-    **SLIDES,
-    **CALIBRATION_SERIES,
+#: What draws a test on a shaking table, which has a size and a caption of its own.
+_TESTS: dict[str, Callable[[Any, Axes | None], Figure]] = {
+    "calibration": calibration_figures.calibration,
+    "friction": calibration_figures.friction,
 }
 
-#: Samples of the record that a file carries: no chart shows them.
-_SAMPLES = ("record_time", "record_acceleration")
 
-
-def whole_kind(file: ResultFile) -> str | None:
+def whole_kind(data: xr.Dataset) -> str | None:
     """The kind of chart of a result that is drawn as a whole; None of others."""
-    return next((kind for kind, (name, _) in DRAWN_WHOLE.items() if name in file), None)
+    return next((kind for kind, name in DRAWN_WHOLE.items() if name in data), None)
 
 
 class WholeResult:
@@ -58,41 +38,34 @@ class WholeResult:
 
     Parameters
     ----------
-    file : ResultFile
+    data : Dataset
+    name : str
+        What it is called in errors.
     kind : str
         What `whole_kind` says of it.
-
-    Attributes
-    ----------
-    path : Path
-    g : float
-        Gravity, m/s².
-
-    Raises
-    ------
-    InputError
-        Another program has put values into other units.
     """
 
-    def __init__(self, file: ResultFile, kind: str) -> None:
-        self.path: Path = file.path
-        self.kind = kind
-        check_units(file, _DESCRIBED)
-        self.g = float(file.attrs.get("g", 9.81))
-        dims = set(file[DRAWN_WHOLE[kind][0]].dims)
-        names = [
-            name
-            for name in file.results
-            if name not in _SAMPLES and not file[name].is_text and (kind != "limit" or dims.issuperset(file[name].dims))
-        ]
-        self._table = read_table(file, names)
-        if file.labels:
-            self._table.attrs["labels"] = {"case": file.labels}
+    def __init__(self, data: xr.Dataset, name: str, kind: str) -> None:
+        self.name, self.kind = name, kind
+        self.g = float(data.attrs.get("g", 9.81))
+        self._data = data.load()
 
-    def draw(self, axes: Axes | None) -> Figure:
+    def draw(self, axes: Axes | None, look: Look) -> Figure:
         """Draw it, in `axes` if it is one panel (InputError if not, or if something is missing)."""
         try:
-            return DRAWN_WHOLE[self.kind][1](self._table, axes)
+            if self.kind == "limit":
+                return limit_figures.limit_chart(self._data, axes, look)
+            if self.kind == "hazard":
+                return hazard_figures.hazard_chart(self._data, axes, look=look)
+            if self.kind == "history":
+                return history_figures.history(self._data, axes, look)
+            figure = _TESTS[self.kind](self._data, axes)
         except KeyError as error:
             missing: Any = error.args[0]
-            raise InputError(f"{self.path}: {missing}: not there, but a chart of {self.kind} needs it") from None
+            raise InputError(f"{self.name}: {missing}: not there, but a chart of {self.kind} needs it") from None
+        if look.width is not None:
+            width, height = figure.get_size_inches()
+            figure.set_size_inches(look.width, height * look.width / width)
+        if look.grey:
+            without_colour(figure)
+        return figure

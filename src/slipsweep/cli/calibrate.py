@@ -14,20 +14,18 @@ from slipsweep.cli.common import (
     Quiet,
     Theta,
     check_ending,
-    examples,
     typed_command,
     write_figure,
 )
-from slipsweep.cli.help import Panel
+from slipsweep.cli.help import Panel, examples
 from slipsweep.cli.options import BLOCK, chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
-
-    from slipsweep.grid.tables import Table
 
 FRICTION_EXAMPLE = examples(
     "slipsweep friction test.csv --theta 5 --mu-s 0.38",
@@ -178,7 +176,7 @@ def _checked(output: list[Path] | None, overwrite: bool, test: Path, allowed: tu
     return paths
 
 
-def _write(paths: list[Path], table: "Table", figure: Callable[[], "Figure"], overwrite: bool) -> None:
+def _write(paths: list[Path], table: "xr.Dataset", figure: Callable[[], "Figure"], overwrite: bool) -> None:
     from slipsweep.files import netcdf, outputs
 
     for path in paths:
@@ -198,7 +196,7 @@ def _write(paths: list[Path], table: "Table", figure: Callable[[], "Figure"], ov
             temporary.write_text(table.attrs["model_table"], encoding="utf-8")
 
 
-def _summarize(table: "Table") -> None:
+def _summarize(table: "xr.Dataset") -> None:
     import numpy as np
 
     typer.echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")

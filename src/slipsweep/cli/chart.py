@@ -1,5 +1,6 @@
 """`slipsweep chart`: design charts of a result."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -20,9 +21,9 @@ def chart(
     kind: Annotated[
         list[str] | None,
         CHART(
-            "contours, modes, families, dimensionless, newmark or spread; of uncertain inputs fragility, "
+            "contours, modes, families, curve, dimensionless, newmark or spread; of uncertain inputs fragility, "
             "quantiles or sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated "
-            "(default: all that fit).",
+            "(default: all that fit; with one axis left, its curve).",
             "--kind",
             "-k",
             metavar="KIND",
@@ -47,6 +48,8 @@ def chart(
     show_cautions: Annotated[
         bool, LOOK("Draw values flagged not_recoupled or upslope, too.", "--show-cautions")
     ] = False,
+    width: Annotated[str | None, LOOK("Width of the figure: 90mm, 3.5inch.", metavar="LENGTH")] = None,
+    grey: Annotated[bool, LOOK("Draw without colour.", "--grey")] = False,
     output: Annotated[
         list[Path] | None,
         OUTPUT(
@@ -65,23 +68,26 @@ def chart(
 
     from slipsweep.charts import book, kinds
     from slipsweep.charts.slices import Result
-    from slipsweep.charts.style import Look
     from slipsweep.files import outputs
+    from slipsweep.files.opening import read_result
 
-    asked = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
-    if levels is not None and asked and {"contours", "fragility"}.isdisjoint(asked):
+    requested = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
+    if levels is not None and requested and {"contours", "fragility"}.isdisjoint(requested):
         raise InputError(f"--levels {levels}: only with --kind contours or fragility")
-    with kinds.opened(file) as result:
-        chosen = asked or list(kinds.fitting(result))
+    with read_result(file) as data:
+        result = kinds.drawable(data, file)
+        chosen_levels = levels.split(",") if levels else ()
+        look = kinds.look_of(result, variable, chosen_levels, units, show_cautions, width, grey)
+        request = kinds.Request(x, y, cuts(at), variable, panels.split(",") if panels else (), look=look)
+        chosen = requested or list(kinds.fitting(result, request))
         together = bool(given) and len(chosen) > 1
         for path in given:
             if together and path.suffix != ".pdf":
                 raise InputError(f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several")
         wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in chosen}
         outputs.check_outputs(given or [wanted[name][0] for name in chosen], overwrite, reads=[file])
-        look = Look(units, show_cautions, kinds.levels_of(result, variable, levels.split(",") if levels else ()))
-        wish = kinds.Wish(x, y, cuts(at), variable, panels.split(",") if panels else (), together, look=look)
-        figures, left_out = kinds.draw_all(result, chosen, wish, strict=bool(asked))
+        request = replace(request, more_panels=together)
+        figures, left_out = kinds.draw_all(result, chosen, request, strict=bool(requested))
         if together and isinstance(result, Result):  # what is drawn whole has one chart, hence no book
             for path in given:
                 with outputs.complete_or_absent(path, overwrite) as temporary:

@@ -1,17 +1,18 @@
 """What several commands share: options, progress, the shares of modes and flags, the command as typed."""
 
+import io
 import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.help import Panel
+from slipsweep.cli.help import Panel, printable
 from slipsweep.cli.options import BLOCK
 from slipsweep.errors import InputError
 from slipsweep.model.variables import (
@@ -28,10 +29,9 @@ from slipsweep.model.variables import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from slipsweep.files.zarr_store import Place
+    from slipsweep.files.jobs import Job
+    from slipsweep.files.storing import Place, Report
     from slipsweep.grid.tally import Indices, Tally
-    from slipsweep.runs.jobs import Job
-    from slipsweep.runs.store import Report
 
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
@@ -45,16 +45,14 @@ Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrit
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
 
 Resume = Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", "--resume")]
-Split = Annotated[bool, LARGE("Write a folder with a netCDF file for each chunk.", "--split")]
-Shared = Annotated[bool, LARGE("The workers of --scheduler write the output themselves.", "--shared")]
 Memory = Annotated[str | None, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", metavar="SIZE")]
 Workers = Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", metavar="N")]
 Scheduler = Annotated[str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")]
 
 
-def examples(*lines: str) -> str:
-    """Put commands under a command's `--help`, a line each."""
-    return "\n".join(("Examples:", *lines))
+def echo(text: object = "") -> None:
+    """Print a line; text that comes from a file sends no control sequences to the terminal."""
+    typer.echo("\n".join(map(printable, str(text).split("\n"))))
 
 
 def echo_tally(tally: "Tally") -> None:
@@ -97,7 +95,7 @@ def _echo_indices(indices: "Indices") -> None:
 
 def place_of(text: str) -> "Place":
     """An output as typed: a path, or the address of a store."""
-    from slipsweep.files.zarr_store import is_address
+    from slipsweep.files.opening import is_address
 
     return text if is_address(text) else Path(text)
 
@@ -111,8 +109,10 @@ def write_figure(figure: "Figure", path: Path, overwrite: bool) -> None:
     """Write a figure in the format that the name ends in."""
     from slipsweep.files import outputs
 
+    drawn = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+    figure.savefig(drawn, format=path.suffix[1:], dpi=150)
     with outputs.complete_or_absent(path, overwrite) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+        temporary.write_bytes(drawn.getvalue())
 
 
 def check_ending(path: Path, endings: Sequence[str]) -> None:
@@ -147,39 +147,28 @@ def taken_as(values: Mapping[str, float], g: float) -> str:
 @contextmanager
 def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Callable[[int], None] | None]:
     """Yield what to call with a number of cells done: a progress bar, if there is a terminal to see it."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        ProgressColumn,
-        Task,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     from slipsweep.jit import compiling
 
-    before = compiling.seconds()
+    watch, done = Watch(), 0
 
-    class Speed(ProgressColumn):
-        def render(self, task: Task) -> str:
-            seconds = (task.elapsed or 0.0) - (compiling.seconds() - before)
-            if not task.completed or seconds <= 0.0 or task.description:
-                return ""
-            return f"{task.completed / seconds:.3g} {unit}/s"
+    def advance(more: int) -> None:
+        nonlocal done
+        done += more
+        bar.update(task, completed=done, description=f"{watch.speed(done):.3g} {unit}/s")
 
     def compiled(kernel: str | None) -> None:
-        text = f"compiling for this processor, once: {kernel}" if kernel else ""
-        bar.update(task, description=text)
+        bar.update(task, description=f"compiling for this processor, once: {kernel}" if kernel else "")
 
-    columns = (BarColumn(), TaskProgressColumn(), Speed(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar, compiling.watched(compiled):
         task = bar.add_task("", total=cells)
-        yield lambda done: bar.advance(task, done)
+        yield advance
 
 
 class Watch:
@@ -191,12 +180,16 @@ class Watch:
         self._compiling = compiling.seconds
         self._started, self._before = time.perf_counter(), compiling.seconds()
 
-    def text(self, count: int, unit: str, seconds: float | None = None) -> str:
-        """The time, `seconds` if given, and what was solved in it a second, compilation apart."""
-        total = time.perf_counter() - self._started if seconds is None else seconds
-        compiling = min(self._compiling() - self._before, total)
+    def speed(self, count: int) -> float:
+        """What was solved in a second, compilation apart."""
+        seconds = time.perf_counter() - self._started - (self._compiling() - self._before)
+        return count / max(seconds, 1e-9)
+
+    def text(self, count: int, unit: str) -> str:
+        """The time, and the speed."""
+        compiling = self._compiling() - self._before
         apart = f" ({compiling:.2f} s to compile, once)" if compiling > 0.0 else ""
-        return f"{total:.2f} s{apart}, {count / max(total - compiling, 1e-9):.3g} {unit}/s"
+        return f"{time.perf_counter() - self._started:.2f} s{apart}, {self.speed(count):.3g} {unit}/s"
 
 
 def typed_command() -> str:
@@ -209,15 +202,11 @@ class Chunks:
 
     overwrite: bool
     resume: bool
-    split: bool
     memory: str | None
     workers: int | None
     scheduler: str | None
-    shared: bool = False
 
     def __post_init__(self) -> None:
-        if self.shared and self.scheduler is None:
-            raise InputError("--shared: is for the workers of --scheduler only")
         if self.resume and self.overwrite:
             raise InputError(
                 "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
@@ -228,33 +217,19 @@ class Chunks:
         others = {**asdict(self), "overwrite": None}
         return [f"--{name}" for name, value in others.items() if value not in (None, False)]
 
-    def run(self, job: "Job", path: "Path | str", quiet: bool, unit: str = "cells") -> "Report":
+    def run(self, job: "Job", path: "Place", quiet: bool, unit: str = "cells") -> "Report":
         """Solve and write what a command asks for."""
+        from slipsweep.files import storing
         from slipsweep.grid.resources import parse_size
-        from slipsweep.runs import solving, store
 
-        store.check_output(job, path, overwrite=self.overwrite or self.resume, split=self.split)
         memory = None if self.memory is None else parse_size("--memory", self.memory)
-        with ExitStack() as stack:
-            solved: solving.Solved = solving.solve_here
-            shared = None
-            if self.workers is not None or self.scheduler is not None:
-                from slipsweep.runs.cluster import cluster
-
-                solved = stack.enter_context(cluster(workers=self.workers, scheduler=self.scheduler))
-                shared = solving.cells_shared(job.plan, self.workers)
-            return store.run(
+        with progress_bar(job.plan.cells, quiet, unit) as progress:
+            return storing.run(
                 job,
                 path,
                 command=typed_command(),
                 overwrite=self.overwrite,
                 resume=self.resume,
-                split=self.split,
-                shared=self.workers is not None
-                or self.shared
-                or (self.scheduler is not None and isinstance(path, str)),
-                chunk_cells=None if memory is None else solving.cells_within(memory, job.plan, self.workers or 0),
-                shared_cells=shared,
-                progress=stack.enter_context(progress_bar(job.plan.cells, quiet, unit)),
-                solved=solved,
+                means=storing.Means(memory, self.workers, self.scheduler),
+                progress=progress,
             )

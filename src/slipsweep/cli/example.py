@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, examples
+from slipsweep.cli.common import Overwrite, echo
+from slipsweep.cli.help import examples
 
 EXAMPLE = examples("slipsweep example", "slipsweep example paper")
 
@@ -21,7 +22,7 @@ def example(
 
     if name is None:
         for one, title in shipped.titles().items():
-            typer.echo(f"{one:<14}{title}")
+            echo(f"{one:<14}{title}")
         return
     for path in shipped.write(name, Path(), overwrite=overwrite):
-        typer.echo(path)
+        echo(path)

@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import OUTPUT, Overwrite, check_ending
+from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, check_ending, echo
+from slipsweep.cli.help import examples
 from slipsweep.errors import InputError
 
-EXAMPLE = "Example: slipsweep explore design_chart.nc -o design_chart.html"
+EXAMPLE = examples("slipsweep explore design_chart.nc -o design_chart.html")
 
 _UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9}
 
@@ -23,7 +24,7 @@ def explore(
     size: Annotated[
         str, OUTPUT("Largest size of the page; larger results are thinned to it.", metavar="SIZE")
     ] = "10MB",
-    quiet: Annotated[bool, OUTPUT("No summary.", "--quiet", "-q")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a page for the browser in which to explore a result."""
     from slipsweep.explore import page as pages
@@ -38,8 +39,8 @@ def explore(
     for dim, length in excerpt.lengths.items():
         shown = excerpt.sizes[dim]
         thinned = "" if shown == length else f"  thinned: {shown} of {length} (more with --size)"
-        typer.echo(f"{dim:<24}{shown} values{thinned}")
-    typer.echo(f"{path}  {size_text(path.stat().st_size)}")
+        echo(f"{dim:<24}{shown} values{thinned}")
+    echo(f"{path}  {size_text(path.stat().st_size)}")
 
 
 def parse_size(text: str) -> int:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, examples, progress_bar
-from slipsweep.cli.help import Panel
+from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, progress_bar
+from slipsweep.cli.help import Panel, examples
 
 #: The group of options that only this command has.
 TABLE = Panel("Table")
@@ -20,12 +20,13 @@ EXAMPLE = examples(
 
 
 def export(
-    file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")],
+    file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
     output: Annotated[Path, OUTPUT("Table to write: .csv, .parquet or .xlsx.", "--output", "-o", metavar="FILE")],
     variables: Annotated[
         list[str] | None, TABLE("Result to export (default: all); may be repeated.", "--variable", metavar="NAME")
     ] = None,
     words: Annotated[bool, TABLE("Sliding modes and flags as words, not codes.", "--words")] = False,
+    in_g: Annotated[bool, TABLE("Accelerations in g, not in m/s².", "--in-g")] = False,
     at: Annotated[
         list[str] | None,
         TABLE(
@@ -54,6 +55,7 @@ def export(
         output,
         variables=variables or None,
         words=words,
+        in_g=in_g,
         at=cuts(at),
         rows=rows.split(",") if rows else (),
         columns=columns,

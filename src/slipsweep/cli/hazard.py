@@ -7,105 +7,161 @@ import typer
 
 from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, write_figure
 from slipsweep.cli.help import Panel
+from slipsweep.cli.lengths import displacements
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
-    from slipsweep.grid.tables import Table
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from slipsweep.studies.hazard_curves import HazardCurve
+
+#: The part of a rate that is worth a sentence.
+_MUCH = 0.05
 
 #: The group of options that only this command has.
 HAZARD = Panel("Hazard")
 
-EXAMPLE = "Example: slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 0.3 -o hazard.png"
+EXAMPLE = "Example: slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml"
 
 
 def hazard(
-    file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A result under a suite, with an axis amplitude.")],
-    curve: Annotated[Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high.', metavar="HAZARD.csv")],
+    file: Annotated[
+        Path, typer.Argument(metavar="OUT.nc", help="A result under a suite or [uncertainty], with an axis amplitude.")
+    ],
+    curve: Annotated[
+        Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high; or OpenQuake\'s.', metavar="HAZARD.csv")
+    ],
     displacement: Annotated[
         list[str], HAZARD("To exceed: 50mm, 0.05 (m); may be repeated.", "--displacement", "-d", metavar="LENGTH")
     ],
+    site: Annotated[int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", metavar="N")] = None,
     at: Annotated[
         list[str] | None, HAZARD("One value of another axis: mu_s=0.4 (default: all).", metavar="NAME=VALUE")
     ] = None,
     output: Annotated[
-        list[Path] | None, OUTPUT("Write .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE")
+        list[Path] | None,
+        OUTPUT(
+            "Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated.",
+            "--output",
+            "-o",
+            metavar="FILE",
+        ),
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Compute the mean annual rate of exceeding a displacement.
 
-    From a hazard curve and the fragility under a suite of recorded motions.
+    From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
     """
     paths = output or []
     for path in paths:
-        check_ending(path, FIGURES)
-    from slipsweep.files import outputs, results
-    from slipsweep.files.cuts import stored_places
+        check_ending(path, (*FIGURES, ".xml"))
+    from slipsweep.files import outputs
+    from slipsweep.studies.fragility import fragility, openquake_fragility
+    from slipsweep.studies.hazard import displacement_hazard
+    from slipsweep.studies.hazard_curves import read_hazard_curve
 
     outputs.check_outputs(paths, overwrite, reads=[file, curve])
-    from slipsweep.model.parameters import check_values
-    from slipsweep.model.units import quantity
-    from slipsweep.studies.hazard import hazard_table, read_hazard_curve
-
-    with results.result_file(file) as opened:
-        table = results.read_table(opened, ("permanent_displacement", "validity"))
-        axes = [dim for dim in table["permanent_displacement"].dims if dim not in ("amplitude", "motion")]
-        places = stored_places(opened, cuts(at), axes)
-    for name, found in places.items():
-        if found.size > 1:
-            raise InputError(f"{file}: --at {name}: {found.size} values; must be one")
-    if "g" not in table.attrs:
-        raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
-    g = float(table.attrs["g"])
-    lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
-    check_values("displacement", lengths, "--displacement")
-    given = read_hazard_curve(curve, g)
-    table = table.pick({name: int(found[0]) for name, found in places.items()})
-    rates = hazard_table(table, given, thresholds=lengths)
-    if paths:
-        from slipsweep.charts import hazard_figures
-
-        marked = rates["threshold"].values
-        drawn = hazard_table(table, given, thresholds=hazard_figures.drawn_thresholds(table, marked))
-        figure = hazard_figures.hazard_chart(drawn, marked=marked)
-        for path in paths:
-            write_figure(figure, path, overwrite)
+    result = _read(file, at)
+    g = float(result.attrs["g"])
+    lengths = displacements(displacement, g)
+    given = read_hazard_curve(curve, g, site)
+    rates = displacement_hazard(result, given, lengths)
+    for path in paths:
+        if path.suffix == ".xml":
+            with outputs.complete_or_absent(path, overwrite) as temporary:
+                temporary.write_text(openquake_fragility(fragility(result, lengths)), encoding="utf-8")
+        else:
+            write_figure(_figure(result, given, rates), path, overwrite)
     if not quiet:
         _summarize(rates, g)
         for path in paths:
             typer.echo(path)
 
 
-def _summarize(rates: "Table", g: float) -> None:
+def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
+    """What is needed of a result, cut where one value of an axis is given."""
+    from slipsweep.files.opening import read_result
+    from slipsweep.files.selection import places_at
+
+    result = read_result(file)
+    names = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
+    table = result[[name for name in names if name in result]].load()
+    axes = [str(dim) for dim in table.sizes if dim not in ("amplitude", "motion", "threshold")]
+    places = places_at(table, file, cuts(at), axes)
+    for name, found in places.items():
+        if found.size > 1:
+            raise InputError(f"{file}: --at {name}: {found.size} values; must be one")
+    if "g" not in table.attrs:
+        raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
+    return table.isel({name: int(found[0]) for name, found in places.items()}, missing_dims="ignore")
+
+
+def _figure(result: "xr.Dataset", curve: "HazardCurve", rates: "xr.Dataset") -> "Figure":
+    """The rates over the displacement; of uncertain inputs through the displacements that the result has."""
+    from slipsweep.charts import hazard_figures
+    from slipsweep.studies.hazard import displacement_hazard
+
+    marked = rates["threshold"].values
+    stored = "exceedance_probability" in result
+    drawn = None if stored else hazard_figures.drawn_thresholds(result, marked)
+    return hazard_figures.hazard_chart(displacement_hazard(result, curve, drawn), marked=marked)
+
+
+def _summarize(rates: "xr.Dataset", g: float) -> None:
     import numpy as np
 
     from slipsweep.studies.suite_statistics import point_names
 
     attrs = rates.attrs
+    low, high = (float(one) / g for one in attrs["amplitude_range"])
+    start, end = (float(one) / g for one in attrs["hazard_curve_range"])
+    # P is known between these, and the rate of what lies above and below is not
+    first, last = max(low, start), min(high, end)
     typer.echo(f"P(u > d | PGA): share over {attrs['suite_dimensions'].replace(' ', ' and ')}")
-    for text, name in (("amplitudes of the result", "amplitude_range"), ("hazard curve", "hazard_curve_range")):
-        low, high = attrs[name]
-        typer.echo(f"{text:<25}{low:.6g} to {high:.6g} m/s2 ({low / g:.4g} to {high / g:.4g} g)")
-    typer.echo(
-        "above these amplitudes P is held constant; below them it is taken as 0; "
-        "below the hazard curve no rate is counted"
-    )
-    thresholds = rates["threshold"].values
-    columns = [rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate", "omitted_rate")]
-    shares = rates["valueless_share"].values.reshape(-1)
-    for number, point in enumerate(point_names(rates, rates["valueless_share"].sizes)):
+    typer.echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
+    points = list(np.ndindex(rates["valueless_share"].shape))
+    for index, point in zip(points, point_names(rates, rates["valueless_share"].sizes), strict=True):
         if point:
             typer.echo(point)
-        if shares[number] > 0.0:
-            typer.echo(f"  no value: up to {shares[number]:.1%} of the motions at an amplitude; they are not counted")
-        if np.isnan(columns[0][number]).any():
-            typer.echo("  no annual rate: fewer than two amplitudes have a value")
+        _summarize_point(rates.isel(dict(zip(rates["valueless_share"].dims, index, strict=True))), first, last)
+    if (rates["held_rate"] > _MUCH * rates["annual_rate"]).any():
+        axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
+        typer.echo(f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}")
+    if (rates["omitted_rate"] > _MUCH * rates["annual_rate"]).any():
+        typer.echo(f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower")
+    if rates["omitted_rate"].isnull().where(rates["annual_rate"].notnull(), False).any():
+        typer.echo(
+            f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the rates are too "
+            "small by an unknown part; begin the curve lower"
+        )
+    if (rates["upper_rate"] > 2.0 * rates["lower_rate"]).where(rates["held_rate"] < rates["annual_rate"], False).any():
+        typer.echo(
+            "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; "
+            "put more values on the axis amplitude"
+        )
+
+
+def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
+    """The table of one grid point."""
+    import numpy as np
+
+    share = rates["valueless_share"].item()
+    if share > 0.0:
+        typer.echo(f"  up to {share:.1%} of the motions or samples have no value at an amplitude: left out of P")
+    if np.isnan(rates["annual_rate"]).any():
+        typer.echo("  no annual rate: fewer than two amplitudes have a value")
+        return
+    above, below = f"above {last:.3g} g", f"below {first:.3g} g"
+    typer.echo(f"  {'d (m)':<10}{'annual rate':>12}{'period (years)':>16}{'steps':>14}{above:>14}{below:>16}")
+    for d in rates["threshold"].values:
+        one = {str(name): float(values) for name, values in rates.sel(threshold=d).data_vars.items()}
+        rate = one["annual_rate"]
+        if not rate > 0.0:
+            typer.echo(f"  {d:<10.6g}{0:>12}  not exceeded at any amplitude of the result")
             continue
-        typer.echo(f"  {'d (m)':<12}{'annual rate':>12}{'period (years)':>16}{'held above':>12}{'left out below':>16}")
-        for d, rate, held, omitted in zip(thresholds, *(one[number] for one in columns), strict=True):
-            if rate > 0.0:
-                left = "not known" if np.isnan(omitted) else f"<= {omitted / rate:.2%}"
-                typer.echo(f"  {d:<12.6g}{rate:>12.4g}{1.0 / rate:>16.4g}{held / rate:>12.2%}{left:>16}")
-            else:
-                typer.echo(f"  {d:<12.6g}{0:>12}  exceeded by no motion at any amplitude of the result")
+        left = "not known" if np.isnan(one["omitted_rate"]) else f"<= {one['omitted_rate'] / rate:.2%} more"
+        steps = f"{one['lower_rate'] / rate:.2f} to {one['upper_rate'] / rate:.2f}"
+        typer.echo(f"  {d:<10.6g}{rate:>12.4g}{1.0 / rate:>16.4g}{steps:>14}{one['held_rate'] / rate:>14.2%}{left:>16}")

@@ -5,33 +5,49 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import echo_tally, examples
+from slipsweep.cli.common import echo, echo_tally, place_of
+from slipsweep.cli.help import examples
+from slipsweep.errors import InputError
 
 EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc")
 
 
-def info(file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep wrote.")]) -> None:
+def info(
+    file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
+) -> None:
     """Show what a result holds, how it was made, and its shares of flags."""
-    from slipsweep.files import results
+    from slipsweep.files import contents
+    from slipsweep.files.jobs import RUN
+    from slipsweep.files.motions import read_embedded
+    from slipsweep.files.opening import read_result
+    from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import size_text
+    from slipsweep.motion.records import Record
 
-    contents = results.read_contents(file)
-    typer.echo(f"{contents.path}  {size_text(contents.nbytes)}")
-    for title, entries in (("coordinates", contents.coordinates), ("variables", contents.variables)):
-        typer.echo(f"{title}:")
+    table = read_result(file)
+    echo(f"{Path(file)}  {size_text(nbytes_of(place_of(file)))}")
+    for title, entries in (
+        ("coordinates", contents.coordinate_texts(table)),
+        ("variables", contents.variable_texts(table)),
+    ):
+        echo(f"{title}:")
         for name, text in entries.items():
-            typer.echo(f"  {name:<23} {text}")
-    if contents.motions:
-        typer.echo("motions, as recorded:")
-    for line in contents.motions:
-        typer.echo(f"  {line}")
-    if contents.tally is not None:
-        echo_tally(contents.tally)
-    else:
-        typer.echo(f"modes and flags not counted: {contents.untold}")
-    for name, text in contents.attributes.items():
-        if "\n" in text:
-            typer.echo(f"{name}:")
-            typer.echo("".join(f"  {line}\n" for line in text.splitlines()), nl=False)
-        else:
-            typer.echo(f"{name}: {text}")
+            echo(f"  {name:<23} {text}")
+    recorded = read_embedded(table, Path(file))
+    if isinstance(recorded, Record):
+        echo(f"record: {recorded.summary()}")
+    motions = contents.motions_text(table)
+    if motions:
+        echo("motions, as recorded:")
+    for line in motions:
+        echo(f"  {line}")
+    try:
+        echo_tally(contents.tally_in(table))
+    except InputError as error:
+        echo(f"modes and flags not counted: {error}")
+    for name, value in table.attrs.items():
+        lines = str(value).splitlines()
+        if name != RUN:
+            echo(f"{name}: {lines[0] if len(lines) == 1 else ''}".rstrip())
+            for line in lines if len(lines) > 1 else ():
+                echo(f"  {line}")

@@ -1,6 +1,5 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,8 +14,6 @@ from slipsweep.cli.common import (
     Quiet,
     Resume,
     Scheduler,
-    Shared,
-    Split,
     Workers,
     check_ending,
     echo_found,
@@ -26,13 +23,15 @@ from slipsweep.cli.common import (
     write_figure,
 )
 from slipsweep.cli.help import Panel
+from slipsweep.cli.lengths import displacements
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from slipsweep.files.spec import SweepSpec
-    from slipsweep.files.zarr_store import Place
-    from slipsweep.grid.tables import Table
+    from slipsweep.files.storing import Place
 
 #: The group of options that only this command has.
 LIMIT = Panel("Limit")
@@ -61,23 +60,20 @@ def limit(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     resume: Resume = False,
-    split: Split = False,
     memory: Memory = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    shared: Shared = False,
 ) -> None:
     """Find the limiting PGA for a tolerable displacement.
 
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
-    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler, shared)
+    chunks = Chunks(overwrite, resume, memory, workers, scheduler)
     results: list[Place] = []
     figures: list[Path] = []
     for text in output or []:
         path = Path(text)
-        if not (split and not path.suffix):  # the folder of a split result needs no ending
-            check_ending(path, (".nc", ".zarr", *FIGURES))
+        check_ending(path, (".nc", ".zarr", *FIGURES))
         if path.suffix in FIGURES:
             figures.append(path)
         else:
@@ -86,7 +82,7 @@ def limit(
         raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
 
     from slipsweep.files import outputs, spec
-    from slipsweep.runs.jobs import limit_job
+    from slipsweep.files.jobs import limit_job
 
     if len(results) > 1:
         files = [one for one in results if isinstance(one, Path)]
@@ -96,21 +92,20 @@ def limit(
     outputs.check_outputs(figures, overwrite, reads=checked.files)
     job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
     if results:
-        from slipsweep.runs.stored import stored_table
+        from slipsweep.files.opening import read_result
 
         report = chunks.run(job, results[0], quiet)
         if report.found and not quiet:
             echo_found(report.path)
-        # all of it for a figure only
-        names = job.plan.names if figures else () if quiet else ("limit_amplitude", "limit_status")
-        table = stored_table(job.plan, report.path, report.chunk_cells, names)
+        table = read_result(report.path)
     else:
         with job.named(), progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)
     if figures:
         from slipsweep.charts.limit_figures import limit_chart
 
-        figure = limit_chart(replace(table, attrs={**table.attrs, "labels": {"case": job.labels}}))
+        labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
+        figure = limit_chart(labelled)
         for path in figures:
             write_figure(figure, path, overwrite)
     if not quiet:
@@ -123,24 +118,22 @@ def _asked(
     sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None
 ) -> tuple[float | list[float], float | None]:
     """Tolerable displacements and the end of the search, in SI units."""
-    from slipsweep.model.parameters import check_values
     from slipsweep.model.units import quantity
 
     g = sweep.model.g
-    lengths = sorted({quantity("--displacement", text, "displacement_amplitude", g) for text in displacement})
-    check_values("displacement", lengths, "--displacement")
+    lengths = displacements(displacement, g)
     highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "amplitude", g)
     # one is one number; several are a dimension, in order and without repetition
     return (lengths if len(displacement) > 1 else lengths[0]), highest
 
 
-def _summarize(table: "Table") -> None:
+def _summarize(table: "xr.Dataset") -> None:
     import numpy as np
 
     from slipsweep.grid.resources import grid_text
 
     limits, status = table["limit_amplitude"], table["limit_status"].values
-    grid = grid_text(limits.sizes) or "one cell"
+    grid = grid_text({str(dim): size for dim, size in limits.sizes.items()}) or "one cell"
     typer.echo(f"{limits.values.size} limits ({grid})")
     g = float(table.attrs["g"])
     found = limits.values[~np.isnan(limits.values)]
@@ -160,7 +153,7 @@ def _summarize(table: "Table") -> None:
             typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
 
 
-def _summarize_suite(table: "Table", g: float) -> None:
+def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     """Print the limit of each motion, and the suite's quantiles, at every grid point."""
     from slipsweep.studies.suite_statistics import limit_quantiles, point_names
 

@@ -14,16 +14,13 @@ from slipsweep.cli.common import (
     Quiet,
     Resume,
     Scheduler,
-    Shared,
-    Split,
     Watch,
     Workers,
     echo_found,
     echo_tally,
-    examples,
     place_of,
 )
-from slipsweep.cli.help import Panel
+from slipsweep.cli.help import Panel, examples
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
 
@@ -57,17 +54,15 @@ def run(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     resume: Resume = False,
-    split: Split = False,
     memory: Memory = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    shared: Shared = False,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec
     from slipsweep.grid.resources import grid_text, size_text
 
-    chunks = Chunks(overwrite, resume, split, memory, workers, scheduler, shared)
+    chunks = Chunks(overwrite, resume, memory, workers, scheduler)
     checked = spec.load(sweep)
     if solver is not None and checked.recorded is not None:
         raise InputError(f"--solver {solver}: not allowed with recorded motions, to which the response is exact")
@@ -77,13 +72,11 @@ def run(
     if output is None and checked.output.path is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = place_of(checked.output.path or f"{sweep.stem}.nc" if output is None else output)
-    if split and output is None and isinstance(path, Path):
-        path = path.with_suffix("")
     if isinstance(path, str) and not path.rstrip("/").endswith(".zarr"):
         raise InputError(f"{path}: the name of a store at an address must end in .zarr")
     if isinstance(path, Path) and path.suffix.lower() in _OTHER_FORMATS:
         raise InputError(f"{path}: the name must end in .nc or .zarr, the formats that are written")
-    from slipsweep.runs.jobs import sweep_job
+    from slipsweep.files.jobs import sweep_job
 
     job = sweep_job(checked)
     watch = Watch()
@@ -92,12 +85,11 @@ def run(
     if quiet:
         return
     grid = grid_text(job.plan.sizes) or "no axes"
-    about = job.plan.empty().attrs
+    about = job.plan.template().attrs
     if report.found:
         echo_found(report.path)
     else:
-        # drawing counts, reading the sweep file does not
-        took = watch.text(report.tally.cells, unit, report.seconds if checked.sampling is None else None)
+        took = watch.text(report.tally.cells, unit)
         if checked.sampling is None:
             typer.echo(f"{report.tally.cells} cells ({grid}) in {took}")
         else:
@@ -108,6 +100,8 @@ def run(
             typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{beside}")
             typer.echo(f"{report.tally.cells} samples solved in {took}")
     typer.echo(f"inputs: {about['friction_inputs']}")
+    if checked.recorded is not None:
+        typer.echo(checked.recorded.summary())
     if "duplicate_motions" in about:
         typer.echo(f"the same motion under several labels: {about['duplicate_motions']}")
     echo_tally(report.tally)

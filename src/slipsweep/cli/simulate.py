@@ -13,12 +13,11 @@ from slipsweep.cli.common import (
     Overwrite,
     Quiet,
     check_ending,
-    examples,
     taken_as,
     typed_command,
     write_figure,
 )
-from slipsweep.cli.help import RARE
+from slipsweep.cli.help import RARE, examples
 from slipsweep.cli.options import BLOCK, SHAKING, chooses, option_name, reads_record
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
@@ -36,7 +35,8 @@ from slipsweep.model.variables import (
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.tables import Table
+    import xarray as xr
+
     from slipsweep.motion.records import Record
 
 EXAMPLE = examples(
@@ -69,7 +69,7 @@ def simulate(
     frequency: Annotated[str | None, SHAKING("Excitation frequency, Hz; not with a record.", metavar="VALUE")] = None,
     excitation: Waveform | None = None,
     record: Annotated[
-        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, COSMOS or ESM text.", metavar="FILE")
+        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", metavar="FILE")
     ] = None,
     reading: Mapping[str, Any],
     scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = None,
@@ -88,7 +88,7 @@ def simulate(
     quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    writers: dict[str, Callable[[Table, Path, bool, Waveform | Record], None]] = {
+    writers: dict[str, Callable[[xr.Dataset, Path, bool, Waveform | Record], None]] = {
         ".nc": _write_netcdf,
         ".csv": _write_csv,
         **dict.fromkeys(FIGURES, _write_figure),
@@ -111,12 +111,12 @@ def simulate(
     motion = _motion(record, reading, excitation)
 
     from slipsweep.files import outputs
-    from slipsweep.studies.history import history_table
+    from slipsweep.grid.inputs import Inputs
+    from slipsweep.studies.history import time_history
 
     outputs.check_outputs(paths, overwrite, reads=[record] if record else ())
-    table = history_table(
+    inputs = Inputs(
         mu_s=mu_s,
-        excitation=motion,
         scale=scale,
         time_scale=time_scale,
         polarity=None if polarity is None else int(polarity),
@@ -124,10 +124,9 @@ def simulate(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
-        model=model,
-        points_per_cycle=points,
         **given,
     )
+    table = time_history(inputs, excitation=motion, model=model, points_per_cycle=points)
     flags = Validity(table["validity"].item())
     if flags & VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in flags & VALUELESS)
@@ -136,13 +135,15 @@ def simulate(
         writers[path.suffix](table, path, overwrite, motion)
     if quiet:
         return
+    if not isinstance(motion, Waveform):
+        typer.echo(f"record                  {motion.summary()}")
     _summarize(table)
     typer.echo(f"{'taken as':<24}{taken_as(given, model.g)}")
     for path in paths:
         typer.echo(path)
 
 
-def _summarize(table: "Table") -> None:
+def _summarize(table: "xr.Dataset") -> None:
     typer.echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     typer.echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
@@ -169,7 +170,7 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
     return read_record(record, **reading)
 
 
-def _write_netcdf(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
+def _write_netcdf(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import netcdf
 
     netcdf.write_table(
@@ -182,7 +183,7 @@ def _write_netcdf(table: "Table", path: Path, overwrite: bool, motion: "Waveform
     )
 
 
-def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
+def _write_csv(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import outputs
 
     columns = {name: table[name] for name in ("time", *HISTORY) if name in table}
@@ -195,7 +196,7 @@ def _write_csv(table: "Table", path: Path, overwrite: bool, motion: "Waveform | 
         writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
 
 
-def _write_figure(table: "Table", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
-    from slipsweep.charts import figures
+def _write_figure(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
+    from slipsweep.charts.history_figures import history
 
-    write_figure(figures.history(table), path, overwrite)
+    write_figure(history(table), path, overwrite)

@@ -7,17 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.charts.answers import amplitude_of
-from slipsweep.charts.slices import CODES, check_drawable, check_sweep
+from slipsweep.charts.slices import check_attributes
 from slipsweep.errors import InputError
 from slipsweep.files.results import FileVariable, ResultFile, result_file
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
-from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
-from slipsweep.studies.suite_statistics import suite_table
+from slipsweep.motion.amplitude import peak_acceleration
+from slipsweep.studies.suite_statistics import suite_statistics
+
+#: Codes of cells, and what stands for a missing one.
+CODES = {"sliding_mode": -1, "validity": 0}
+
+#: Largest number that is drawn: products of a few of them are still numbers.
+_MOST = 1e75
 
 #: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
 LAYERS = {
@@ -88,7 +93,7 @@ class Excerpt:
 
     Attributes
     ----------
-    table : Table
+    table : xr.Dataset
         Coordinates (increasing along each dimension) and the results in `SHOWN`.
     map_dims : tuple of str
         Dimensions up and across the map.
@@ -100,7 +105,7 @@ class Excerpt:
         Names along dimensions that have no numbers: cases and motions.
     """
 
-    table: Table
+    table: xr.Dataset
     map_dims: tuple[str, str]
     lengths: dict[str, int]
     sizes: dict[str, int]
@@ -149,7 +154,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
         if 0 in lengths.values():
             raise InputError(f"{path}: holds no cells")
         map_dims = _map_dims(path, lengths)
-        _check_made(file)
+        check_attributes(file.attrs, str(path))
         left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
         if math.prod(left.values()) > cells:
             raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
@@ -158,24 +163,22 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
         results = {name: _read(file[name], keep, SHOWN[name]) for name in names}
         labels = {dim: file.labels if dim == "case" else file.texts(dim) for dim in lengths if dim not in coords}
         labels = {dim: [texts[at] for at in keep[dim]] for dim, texts in labels.items() if texts}
-        table = Table(coords, results, file.attrs)
+        table = xr.Dataset(results, coords, file.attrs)
     if "motion" in left and {"permanent_displacement", "validity"} <= results.keys():
         table = _with_statistics(table)
         left |= {dim: table[dim].values.size for dim in ("quantile", "threshold")}
     return Excerpt(table, map_dims, lengths, left, labels)
 
 
-def _with_statistics(table: Table) -> Table:
+def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
-    found = suite_table(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES, zero=0.0, over=None)
+    found = suite_statistics(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES)
     results = {
-        name: Variable(found[name].dims, found[name].values.astype(kind), _over_motions(found[name].attrs))
+        name: xr.Variable(found[name].dims, found[name].values.astype(kind), _over_motions(found[name].attrs))
         for name, kind in SHOWN.items()
         if name in found.data_vars
     }
-    return Table(
-        table.coords | {dim: found[dim] for dim in ("quantile", "threshold")}, table.data_vars | results, table.attrs
-    )
+    return table.assign(results).assign_coords({dim: found[dim] for dim in ("quantile", "threshold")})
 
 
 def _over_motions(attrs: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,15 +187,16 @@ def _over_motions(attrs: Mapping[str, Any]) -> dict[str, Any]:
     return {**attrs, "long_name": text if "motions" in text else f"{text}, over all motions"}
 
 
-def _check_made(file: ResultFile) -> None:
-    """Refuse a file that does not say any more what was solved (InputError)."""
-    if not {"record", "suite"} & file.attrs.keys():
-        check_sweep(file)
-        return
-    for name in ("model", "g"):
-        if name not in file.attrs:
-            raise InputError(f"{file.path}: attribute {name!r}: missing; it says what was solved")
-    MODELS.from_attributes(file.attrs)
+def amplitude_of(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> xr.Variable:
+    """The amplitude A = ω²d: files do not hold it where d and the frequency span a grid."""
+    return xr.apply_ufunc(peak_acceleration, displacement_amplitude, frequency)
+
+
+def check_drawable(path: Path, name: str, values: NDArray[Any], most: float = _MOST) -> None:
+    """Refuse numbers that no drawing library can place (InputError)."""
+    beyond = values[np.abs(values) > np.float64(most)]  # np.float64: single precision would make it infinite
+    if beyond.size:
+        raise InputError(f"{path}: {name}: holds {beyond.flat[0]:.4g}; what is drawn must be within +-{most:g}")
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
@@ -211,10 +215,10 @@ def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
     return up, across
 
 
-def _coordinates(file: ResultFile, keep: Indices) -> dict[str, Variable]:
+def _coordinates(file: ResultFile, keep: Indices) -> dict[str, xr.Variable]:
     """The parameters along the dimensions of a page."""
     coords = {
-        name: Variable(file[name].dims, file[name].read_floats(keep).astype(np.float64), about)
+        name: xr.Variable(file[name].dims, file[name].read_floats(keep).astype(np.float64), about)
         for name, about in (PARAMETERS | STATISTIC_COORDINATES).items()
         if name in file.coordinates and not file[name].is_text and keep.keys() >= {*file[name].dims}
     }
@@ -232,7 +236,7 @@ def _coordinates(file: ResultFile, keep: Indices) -> dict[str, Variable]:
     return coords
 
 
-def _read(variable: FileVariable, keep: Indices, kind: str) -> Variable:
+def _read(variable: FileVariable, keep: Indices, kind: str) -> xr.Variable:
     """Read a result at some places along each dimension, in the order of `keep`."""
     beyond = [dim for dim in variable.dims if dim not in keep]
     if beyond:
@@ -247,7 +251,7 @@ def _read(variable: FileVariable, keep: Indices, kind: str) -> Variable:
             continue
         source = np.ix_(*(keep[dim][at] - chunk[dim].start for dim, at in inside.items()))
         values[np.ix_(*inside.values())] = _read_chunk(variable, chunk)[source]
-    return Variable(dims, values, _ABOUT[variable.name])
+    return xr.Variable(dims, values, _ABOUT[variable.name])
 
 
 def _read_chunk(variable: FileVariable, chunk: Mapping[str, slice]) -> NDArray[Any]:

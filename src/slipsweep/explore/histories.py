@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.explore.excerpt import Excerpt, Indices, evenly, thinned_lengths
+from slipsweep.grid.inputs import Inputs
 from slipsweep.model.options import MODELS
 from slipsweep.motion.waveforms import WAVEFORMS
-from slipsweep.studies.history import history_table
+from slipsweep.studies.history import time_history
 
 #: Points a cycle, and how many cycles at most.
 POINTS, CYCLES = 64, 3
@@ -85,8 +86,11 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     scale = np.full((*left.values(), len(_COLUMNS)), np.nan, np.float32)
     for at in np.ndindex(*left.values()):
         cell = {dim: int(keep[dim][i]) for dim, i in zip(keep, at, strict=True)}
-        given: dict[str, Any] = {name: variable.pick(cell).item() for name, variable in inputs.items()}
-        history = history_table(times=phase, excitation=motion, model=model, frequency=1.0 / (2.0 * math.pi), **given)
+        given: dict[str, Any] = {
+            name: variable.isel(cell, missing_dims="ignore").item() for name, variable in inputs.items()
+        }
+        one = Inputs(frequency=1.0 / (2.0 * math.pi), **given)
+        history = time_history(one, times=phase, excitation=motion, model=model)
         columns = np.array([history[name].values for name in _COLUMNS])
         if np.isfinite(columns).all():
             largest = np.abs(columns).max(axis=1)

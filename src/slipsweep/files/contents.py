@@ -1,169 +1,127 @@
-"""What a file of results holds, in whatever format: its dimensions, variables and attributes by the CF conventions."""
+"""What a result holds, in words and counts: for `slipsweep info`, and the sheet "about" of a table."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
-from slipsweep.files.motions import embedded
-from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.variables import RECORD_COUNTS, SlidingMode
-from slipsweep.motion.records import Record
-from slipsweep.motion.suites import Suite
+from slipsweep.errors import InputError
+from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
+from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
+from slipsweep.grid.tally import Indices, Tally
+from slipsweep.model.variables import (
+    HISTORY,
+    LIMIT_RESULTS,
+    MOTION_COORDINATES,
+    RECORD_RESULTS,
+    RESULTS,
+    STATISTICS,
+)
 
-#: Results that are whole numbers, -1 where there is no value.
-_WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
+#: All that a command of slipsweep writes, but for the samples of records.
+_RESULTS = {**RECORD_RESULTS, **LIMIT_RESULTS, **HISTORY, **STATISTICS, **RESULTS}
 
-#: Attribute that tells of the run that made a file, for programs.
-RUN = "slipsweep_run"
+#: Columns of the table of motions: what stands above, a coordinate, and how it is written.
+_MOTION_COLUMNS = (
+    ("samples", "motion_samples", ".0f"),
+    ("interval (s)", "motion_interval", ".4g"),
+    ("PGA (m/s2)", "motion_pga", ".4g"),
+    ("PGV (m/s)", "motion_pgv", ".4g"),
+    ("PGD (m)", "motion_pgd", ".4g"),
+    ("Arias (m/s)", "motion_arias_intensity", ".4g"),
+    ("CAV (m/s)", "motion_cav", ".4g"),
+    ("D5-95 (s)", "motion_significant_duration", ".4g"),
+    ("Tm (s)", "motion_mean_period", ".4g"),
+)
 
-#: Checksums of the chunks that the results of a file were written in, a row of 16 bytes each.  In a group of their own:
-#: what other programs do with all variables of a file (means, tables) does not concern them.
-CHECKSUM_GROUP = "checksums"
-CHECKSUMS = f"{CHECKSUM_GROUP}/chunk_checksum"
-CHECKSUM_DIMS = ("chunk", "checksum_byte")
-CHECKSUM_BYTES = 16
-CHECKSUM_ATTRIBUTES = {"long_name": "XXH3-128 of each chunk of results, for slipsweep verify"}
 
+def result_names(table: xr.Dataset) -> list[str]:
+    """Names of the results of a file: slipsweep's own, and those that lie along the same dimensions.
 
-@dataclass(frozen=True)
-class Head:
-    """What a file says beside its results.
-
-    Attributes
-    ----------
-    title : str
-    labels : tuple of str
-        Names of the cases.
-    recorded : Record or Suite, optional
-        The motion, or motions, that the results are the response to: their samples are written with them.
-    sweep : str, optional
-        The text of a sweep file, from which the run can be repeated.
+    The samples of a record do not, nor do bounds of cells that another program added.
     """
+    names = [str(name) for name in table.data_vars]
+    dims = {dim for name in [one for one in names if one in _RESULTS] or names for dim in table[name].dims}
+    dims -= {RECORD_DIM, SUITE_DIM}
+    return [name for name in names if dims.issuperset(table[name].dims)]
 
-    title: str
-    labels: tuple[str, ...] = ()
-    recorded: Record | Suite | None = None
-    sweep: str | None = None
 
+def tally_in(table: xr.Dataset) -> Tally:
+    """Count modes, flags and ratios of a result, read in chunks.
 
-@dataclass(frozen=True, eq=False)
-class Stored:
-    """A variable as a file holds it.
-
-    Attributes
-    ----------
-    dims : tuple of str
-    dtype : dtype
-        That of the numbers; others are texts.
-    attrs : dict
-    fill : float or int, optional
-        What stands for no value.
-    values : ndarray, optional
-        None of a result, whose values come later.
+    Raises
+    ------
+    InputError
+        Its modes and flags are not of the same cells.
     """
-
-    dims: tuple[str, ...]
-    dtype: np.dtype[Any]
-    attrs: Mapping[str, Any]
-    fill: float | int | None = None
-    values: NDArray[Any] | None = None
-
-    @property
-    def is_text(self) -> bool:
-        """Whether its values are texts."""
-        return self.dtype.kind in "OU"
-
-
-@dataclass(frozen=True, eq=False)
-class Contents:
-    """All that a file holds but the values of its results.
-
-    Attributes
-    ----------
-    sizes : dict of str to int
-        Dimensions and their lengths.
-    variables : dict of str to Stored
-    attrs : dict
-    chunks : int
-        There is room for the checksums of so many chunks.
-    compression : int
-        Level at which results are compressed; 0 for not.
-    """
-
-    sizes: dict[str, int]
-    variables: dict[str, Stored]
-    attrs: dict[str, Any] = field(default_factory=dict)
-    chunks: int = 0
-    compression: int = 0
-
-    @property
-    def later(self) -> dict[str, np.dtype[Any]]:
-        """What there is only room for, and the types of its numbers: results, and the checksums of chunks."""
-        results = {name: stored.dtype for name, stored in self.variables.items() if stored.values is None}
-        return results | ({CHECKSUMS: np.dtype(np.uint8)} if self.chunks else {})
-
-    def shape(self, name: str) -> tuple[int, ...]:
-        """Lengths of a variable along its dimensions."""
-        return tuple(self.sizes[dim] for dim in self.variables[name].dims)
+    names = [name for name in ("sliding_mode", "validity") if name in table.data_vars]
+    if len({table[name].size for name in names}) > 1:
+        raise InputError("sliding_mode and validity are not of the same cells")
+    tally = Tally(max((table[name].size for name in names), default=0))
+    moved = ("permanent_displacement", "newmark_displacement")
+    if all(one in table.data_vars for one in moved) and table[moved[0]].sizes == table[moved[1]].sizes:
+        names += moved
+    widest: Any = max((table[name].sizes for name in names), key=len, default={})
+    for chunk in grid_chunks(widest, CHUNK_CELLS) if names else ():
+        tally.merge(Tally.of({name: table[name].isel(chunk, missing_dims="ignore").values for name in names}))
+    if {"sensitivity_status", "first_order_index", "total_index"} <= {*table.data_vars} and "input" in table.coords:
+        order = [*table["sensitivity_status"].dims, "input"]
+        first, total = (table[name].transpose(*order).values for name in ("first_order_index", "total_index"))
+        inputs = [str(one) for one in table["input"].values]
+        tally.indices = Indices.counted(inputs, first, total, table["sensitivity_status"].values)
+    return tally
 
 
-def storable(text: str) -> str:
-    """A text as a file can hold it: bytes of a name that are no UTF-8 are spelled out."""
-    return text.encode(errors="backslashreplace").decode()
+def coordinate_texts(table: xr.Dataset) -> dict[str, str]:
+    """The coordinates in words, but for what the table of motions says."""
+    suite = bool(motions_text(table))
+    return {
+        str(name): f"{one.size} motions" if suite and name == "motion" else values_text(one)
+        for name, one in table.coords.items()
+        if not (suite and name in MOTION_COORDINATES and one.dims == ("motion",))
+    }
 
 
-def contents_of(head: Head, table: Table, dtype: Callable[[str], np.dtype[Any]], history: str) -> Contents:
-    """What a file holds: the coordinates and attributes of a table, its results with the data type that `dtype` says.
-
-    Parameters
-    ----------
-    head : Head
-    table : Table
-        Of its results only dimensions and attributes are looked at.
-    dtype : callable
-        Data type of a result in the file, by its name.
-    history : str
-        The file's `history`, see `slipsweep.files.netcdf.history_of`.
-    """
-    coordinates = {name: _stored(one) for name, one in table.coords.items()}
-    beside: dict[str, Stored] = {}
-    if head.labels:
-        labels = np.array(head.labels, dtype=object)
-        beside["label"] = Stored(("case",), labels.dtype, {"long_name": "name of the case"}, None, labels)
-    sizes = table.sizes
-    # in the order of the results, which that of the coordinates need not be
-    widest = max((result.dims for result in table.data_vars.values()), key=len, default=())
-    sizes = {dim: sizes[dim] for dim in (*widest, *sizes)}
-    # texts along a dimension are labels, and no coordinate variable of it (CF 6.1)
-    both = {**coordinates, **beside}
-    auxiliary = {name: one.dims for name, one in both.items() if name not in sizes or one.is_text}
-    results = {}
-    for name, result in table.data_vars.items():
-        attributes, kind = dict(result.attrs), dtype(name)
-        if attributes.get("ancillary_variables") not in table:
-            attributes.pop("ancillary_variables", None)
-        if own := [other for other, dims in auxiliary.items() if {*dims} <= {*result.dims}]:
-            attributes["coordinates"] = " ".join(own)
-        fill = np.nan if kind.kind == "f" else int(SlidingMode.MISSING) if name in _WITH_MISSING else None
-        results[name] = Stored(result.dims, kind, attributes, fill)
-    if head.recorded is not None:
-        for name, one in embedded(head.recorded).items():
-            beside[name] = _stored(one)
-            sizes |= one.sizes
-    attrs = {**table.attrs, "title": head.title, "Conventions": "CF-1.11", "history": history}
-    attrs |= {} if head.sweep is None else {"sweep": head.sweep}
-    return Contents(sizes, {**coordinates, **results, **beside}, attrs)
+def values_text(values: xr.DataArray) -> str:
+    """The values of a coordinate in words."""
+    if values.dtype.kind in "OUST":
+        return ", ".join(map(str, values.values.ravel()))
+    units = _units_text(values, " ")
+    there = values.values[np.isfinite(values.values)]
+    missing = f", {values.size - there.size} missing" if there.size < values.size else ""
+    if values.size == 1 == there.size:
+        return f"{there.min():.6g}{units}"
+    return (
+        f"{values.size} values" + (f", {there.min():.6g} to {there.max():.6g}{units}" if there.size else "") + missing
+    )
 
 
-def _stored(one: Variable) -> Stored:
-    """An array whose values are known."""
-    values = one.values.astype(object) if one.values.dtype.kind == "U" else one.values
-    return Stored(one.dims, values.dtype, one.attrs, None, values)
+def variable_texts(table: xr.Dataset) -> dict[str, str]:
+    """The variables in words."""
+    return {
+        str(name): f"{one.attrs.get('long_name', '')}{_units_text(one, ', ')} "
+        f"({'text' if one.dtype.kind in 'OUST' else one.dtype})".lstrip(", ")
+        for name, one in table.data_vars.items()
+        if one.dims != (SUITE_DIM,)
+    }
 
 
-def with_run(contents: Contents, run: str) -> Contents:
-    """The same with what tells of the run that makes the file."""
-    return replace(contents, attrs={**contents.attrs, RUN: run})
+def _units_text(variable: xr.DataArray, before: str) -> str:
+    units = str(variable.attrs.get("units", "1"))
+    return "" if units == "1" else f"{before}{units}"
+
+
+def motions_text(table: xr.Dataset) -> tuple[str, ...]:
+    """The motions of a suite as a table, a header and a line each; empty without them."""
+    if "motion" not in table.coords or table["motion"].dims != ("motion",) or table["motion"].dtype.kind not in "OUST":
+        return ()
+    columns = [["motion", *map(str, table["motion"].values)]]
+    for header, name, form in _MOTION_COLUMNS:
+        if name in table.coords and table[name].dims == ("motion",):
+            columns.append([header, *("" if math.isnan(one) else format(one, form) for one in table[name].values)])
+    widths = [max(map(len, column)) for column in columns]
+    rows = (
+        [label.ljust(widths[0]), *map(str.rjust, cells, widths[1:])] for label, *cells in zip(*columns, strict=True)
+    )
+    return tuple("  ".join(row) for row in rows)

@@ -1,22 +1,34 @@
-"""Results as tables in files: CSV, Parquet or a spreadsheet.
+"""Results as tables in files, by pandas: CSV, Parquet or a spreadsheet.
 
-A file is read and written in chunks of `CHUNK_CELLS`, so that memory stays small whatever its size.
+A result is read and written in pieces of `CHUNK_CELLS`, so that memory stays small whatever its size.
 """
 
-import csv
 import importlib
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
-from slipsweep.errors import InputError, RunError
-from slipsweep.files import outputs, spreadsheet
-from slipsweep.files.layout import Cells, Column, Layout, Writer, layouts
-from slipsweep.files.results import result_file
+from slipsweep._version import __version__
+from slipsweep.errors import InputError
+from slipsweep.files.contents import result_names, tally_in, values_text
+from slipsweep.files.jobs import RUN
+from slipsweep.files.netcdf import WITH_MISSING
+from slipsweep.files.opening import read_result
+from slipsweep.files.outputs import check_outputs, complete_or_absent
+from slipsweep.files.selection import axis_values, places_at
+from slipsweep.grid.chunks import grid_chunks
+from slipsweep.model.suggest import did_you_mean
+from slipsweep.model.variables import FLAG_KINDS, LIMIT_RESULTS, MOTION_FILES, RESULTS, VALIDITY_TEXT
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Cells read at a time; text of ten columns takes a hundred times as many bytes.
 CHUNK_CELLS = 2**18
@@ -24,16 +36,29 @@ CHUNK_CELLS = 2**18
 #: Endings of tables, and for those that need one the module and the extra that brings it.
 SUFFIXES = {".csv": None, ".parquet": ("pyarrow.parquet", "parquet"), ".xlsx": ("xlsxwriter", "xlsx")}
 
+#: What a sheet of a spreadsheet can hold, the header included.
+MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384
+
+#: Beginnings of texts that a spreadsheet takes for formulas when it opens a CSV file.
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
+
+#: Attributes that say where a result comes from; the others say what was computed.
+_PROVENANCE = ("source", "history", "references", "Conventions", "sweep", "friction_inputs", RUN)
+
 #: Told how many rows there are, yields what to call with a number of rows just written.
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None] | None]]
 
+#: Writes a piece of a table, given by its number; the first has the header.
+_Write = Callable[["Table", "pd.DataFrame", int], None]
+
 
 def export(
-    source: Path,
+    source: str | Path,
     path: Path,
     *,
     variables: Sequence[str] | None = None,
     words: bool = False,
+    in_g: bool = False,
     at: Mapping[str, str] | None = None,
     rows: Sequence[str] = (),
     columns: str | None = None,
@@ -43,23 +68,23 @@ def export(
 ) -> int:
     """Write a result of slipsweep as a table, complete or not at all.
 
-    Rows of a long table are in the order of the file's dimensions, the last one running fastest; where a file has
-    further dimensions than theta, mu_s, amplitude and frequency, in that order within chunks.
-
     Parameters
     ----------
-    source : Path
+    source : str or Path
         A netCDF file or a Zarr store that slipsweep wrote.
     path : Path
-        The table: .csv (UTF-8; missing values are empty), .parquet (missing values are null) or .xlsx (missing values
-        are empty cells; numbers have 16 digits; the sheet "about" has inputs, estimates, flags and provenance).
+        The table: .csv (UTF-8; every number has the digits that bring it back; missing values are empty; a text that
+        a spreadsheet would take for a formula has an apostrophe in front), .parquet, or .xlsx (the sheet "about" has
+        inputs, estimates, flags and provenance).
     variables : sequence of str, optional
         Results to export, by default all; their coordinates come along.  Dimensions that none of
         them has are left out, with their rows.
     words : bool
         Sliding modes and flags as words instead of codes.
+    in_g : bool
+        Accelerations in g, that of the model, instead of m/s².
     at : mapping of axis to text, optional
-        Values to keep of an axis, see `slipsweep.files.cuts.stored_places`.
+        Values to keep of an axis, see `slipsweep.files.selection.places_at`.
     rows : sequence of str
         With `columns`: the axes along the rows of a pivoted table, by default all others.
     columns : str, optional
@@ -85,33 +110,30 @@ def export(
         Writing failed.
     """
     _check_format(path)
-    outputs.check_outputs([path], overwrite, reads=[source])
-    with ExitStack() as stack:
-        file = stack.enter_context(result_file(source))
-        tables = layouts(file, variables, words, at or {}, rows, columns)
-        make: Callable[[Path, list[Layout]], AbstractContextManager[list[Writer]]] = _csv
+    check_outputs([path], overwrite, reads=[Path(source)])
+    with read_result(source) as opened:
+        whole = _in_g(opened) if in_g else opened
+        tables = _tables(whole, source, variables, words, at or {}, rows, columns)
         if path.suffix == ".xlsx":
-            spreadsheet.check_size(tables)
-            make = spreadsheet.workbook
+            for table in tables:
+                table.check_size(source)
         elif len(tables) > 1:
             raise InputError(
                 f"{path}: a table with --columns has one result; choose it with --variable "
                 f"({', '.join(table.name for table in tables)}), or write .xlsx, which has a sheet for each"
             )
-        elif path.suffix == ".parquet":
-            make = _parquet
-        total = sum(table.rows for table in tables)
-        done = stack.enter_context(progress(total) if progress else nullcontext())
-        temporary = stack.enter_context(outputs.complete_or_absent(path, overwrite))
-        try:
-            with make(temporary, tables) as writers:
-                for table, write in zip(tables, writers, strict=True):
-                    for chunk in table.chunks(chunk_cells):
-                        write(chunk)
-                        if done is not None:
-                            done(chunk.rows)
-        except OSError as error:
-            raise RunError(f"{path}: writing failed: {error.strerror or error}") from error
+        total = sum(table.count for table in tables)
+        formats = {".csv": _csv, ".parquet": _parquet, ".xlsx": _workbook}
+        with (
+            progress(total) if progress else nullcontext() as done,
+            complete_or_absent(path, overwrite) as temporary,
+            formats[path.suffix](temporary, tables, source) as write,
+        ):
+            for table in tables:
+                for number, frame in enumerate(table.frames(chunk_cells)):
+                    write(table, frame, number)
+                    if done is not None:
+                        done(len(frame))
     return total
 
 
@@ -130,62 +152,289 @@ def _check_format(path: Path) -> None:
         ) from None
 
 
+def _in_g(table: xr.Dataset) -> xr.Dataset:
+    """The same with accelerations in g."""
+    g = float(table.attrs.get("g", math.nan))
+    found = table.copy()
+    for name, one in table.variables.items():
+        if one.attrs.get("units") == "m s-2":
+            found[name] = (one.dims, one.values / g, {**one.attrs, "units": "g"})
+    return found
+
+
+# ------------------------------------------------------------------------------- the tables
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: results with one row a cell, or one result pivoted.
+
+    Attributes
+    ----------
+    part : Dataset
+        The results, cut to what is asked for.
+    name : str
+    results : list of str
+    words : bool
+        Codes as words.
+    rows : list of str
+        Dimensions along the rows.
+    columns : str, optional
+        The dimension along the columns of a pivoted table.
+    """
+
+    part: xr.Dataset
+    name: str
+    results: list[str]
+    words: bool
+    rows: list[str]
+    columns: str | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return math.prod(self.part.sizes[dim] for dim in self.rows)
+
+    @cached_property
+    def left(self) -> list[str]:
+        """Coordinates along the rows; of a long table also those of one value."""
+        rows = {*self.rows}
+        return [
+            str(name)
+            for name, one in self.part.coords.items()
+            if rows.issuperset(one.dims) and (one.dims or not self.columns) and name not in MOTION_FILES
+        ]
+
+    def check_size(self, source: object) -> None:
+        """Refuse what a sheet cannot hold, and say what to cut."""
+        width = len(self.left) + (self.part.sizes[self.columns] if self.columns else len(self.results))
+        if width > MOST_COLUMNS:
+            raise InputError(
+                f"{source}: the table has {width} columns, a sheet of .xlsx {MOST_COLUMNS}; give fewer values of "
+                f"{self.columns} with --at, another axis with --columns, or write .csv"
+            )
+        if self.count >= MOST_ROWS:
+            sizes = {dim: self.part.sizes[dim] for dim in self.rows if self.count // self.part.sizes[dim] < MOST_ROWS}
+            what = " or ".join(f"{dim} ({size})" for dim, size in sizes.items()) or "several axes"
+            raise InputError(
+                f"{source}: the table has {self.count} rows, a sheet of .xlsx {MOST_ROWS} with its header; "
+                f"take one value of {what} with --at, or write .csv"
+            )
+
+    def frames(self, cells: int) -> "Iterator[pd.DataFrame]":
+        """The table in pieces of so many cells."""
+        import pandas as pd
+
+        across = self.part.sizes[self.columns] if self.columns else 1
+        for chunk in grid_chunks({dim: self.part.sizes[dim] for dim in self.rows}, max(1, cells // across)):
+            part = self.part.isel(chunk).load()
+            shape = tuple(part.sizes[dim] for dim in self.rows)
+
+            def flat(one: xr.DataArray, shape: tuple[int, ...] = shape) -> Any:
+                missing = [dim for dim in self.rows if dim not in one.dims]
+                ordered = one.expand_dims(missing).transpose(*self.rows).values
+                return np.broadcast_to(ordered, shape).ravel()
+
+            found: dict[str, Any] = {header(part[name]): flat(part[name]) for name in self.left}
+            if self.columns is None:
+                found |= {header(part[name]): self._codes(part[name], flat(part[name])) for name in self.results}
+                yield pd.DataFrame(found)
+                continue
+            (name,) = self.results
+            last = header(part[self.left[-1]]) if self.left else ""
+            corner = f"{self._axis_header}: {header(part[name])}{self._constants}"
+            found[f"{last} \\ {corner}"] = found.pop(last, np.arange(1, math.prod(shape) + 1))
+            for place, value in enumerate(axis_values(self.part, self.columns)):
+                one = part[name].isel({self.columns: place}, missing_dims="ignore")
+                found[value] = self._codes(part[name], flat(one))
+            yield pd.DataFrame(found)
+
+    @property
+    def _axis_header(self) -> str:
+        assert self.columns is not None
+        return header(self.part[self.columns]) if self.columns in self.part.coords else self.columns
+
+    @property
+    def _constants(self) -> str:
+        """What a pivoted table has one value of."""
+        fixed = {str(dim): axis_values(self.part, str(dim))[0] for dim, size in self.part.sizes.items() if size == 1}
+        single = {str(name): one.values[()] for name, one in self.part.coords.items() if not one.dims}
+        texts = []
+        for name, value in {**fixed, **single}.items():
+            if name not in (*self.rows, self.columns):
+                units = self.part[name].attrs.get("units", "1") if name in self.part.coords else "1"
+                number = value if isinstance(value, str) else f"{value:.10g}"
+                texts.append(f"{name} = {number}" + ("" if units == "1" else f" {units}"))
+        return f" at {', '.join(texts)}" if texts else ""
+
+    def _codes(self, one: xr.DataArray, values: Any) -> Any:
+        """Values of a result as a table has them: codes that stand for no value missing, others in words if asked."""
+        import pandas as pd
+
+        if values.dtype.kind not in "iu":
+            return values
+        missing = (values == -1) if one.name in WITH_MISSING else np.zeros(values.shape, bool)
+        about = {**RESULTS.get(str(one.name), LIMIT_RESULTS.get(str(one.name), {})), **one.attrs}
+        if self.words and "flag_meanings" in about:
+            values = pd.Series(values, dtype=object).map(_spelled(about, np.unique(values)))
+            return values.mask(missing)
+        if not missing.any():
+            return values
+        return pd.Series(values, dtype=values.dtype.name.capitalize()).mask(missing)
+
+
+def header(one: xr.DataArray) -> str:
+    """What stands above a column: a name and its unit."""
+    return f"{one.name} ({one.attrs['units']})" if "units" in one.attrs else str(one.name)
+
+
+def _spelled(about: Mapping[str, Any], codes: Any) -> dict[Any, str]:
+    """Codes in the words of a variable's attributes; flags one after the other."""
+    words = str(about["flag_meanings"]).split()
+    if "flag_masks" in about:
+        masks = np.atleast_1d(about["flag_masks"]).astype(int).tolist()
+        return {code: " ".join(w for w, mask in zip(words, masks, strict=False) if code & mask) for code in codes}
+    known = dict(zip(np.atleast_1d(about.get("flag_values", ())).astype(int).tolist(), words, strict=False))
+    return {code: known.get(int(code), str(code)) for code in codes}
+
+
+def _tables(
+    table: xr.Dataset,
+    source: object,
+    wanted: Sequence[str] | None,
+    words: bool,
+    at: Mapping[str, str],
+    rows: Sequence[str],
+    columns: str | None,
+) -> list[Table]:
+    """The tables asked for: a long one, or pivoted ones of a result each."""
+    known = [str(name) for name in table.data_vars]
+    chosen = list(dict.fromkeys(result_names(table) if wanted is None else wanted))
+    for name in chosen:
+        if name not in known:
+            raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, known)}')
+    if not chosen:
+        raise InputError(f"{source}: holds no results")
+    widest = max((table[name].dims for name in chosen), key=len)
+    dims = list(dict.fromkeys(str(dim) for name in chosen for dim in (*widest, *table[name].dims)))
+    part = table[chosen].isel(places_at(table, source, at, dims))
+    if columns is None:
+        if rows:
+            raise InputError(f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns")
+        return [Table(part, Path(str(source)).stem, chosen, words, dims)]
+    for option, names in (("--rows", rows), ("--columns", [columns])):
+        for name in names:
+            if name not in dims:
+                advice = did_you_mean(name, dims) if dims else "the result has none"
+                raise InputError(f"{source}: {option} {name}: no such axis here; {advice}")
+    if columns in rows or len({*rows}) < len(rows):
+        raise InputError(f"--rows {','.join(rows)} --columns {columns}: must be different axes")
+    wide = [dim for dim in dims if dim not in (*rows, columns) and part.sizes[dim] > 1]
+    if not rows and not wide:
+        raise InputError(f"{source}: --columns {columns}: no other axis has more than one value, none is left for rows")
+    if rows and wide:
+        texts = ", ".join(f"{dim} ({part.sizes[dim]} values)" for dim in wide)
+        raise InputError(f"{source}: neither in --rows nor in --columns: {texts}; take one value of it with --at")
+    along = list(rows) or wide
+    fixed = {dim: 0 for dim in dims if dim not in (*along, columns)}
+    return [
+        Table(part[[name]].isel(fixed, missing_dims="ignore"), name, [name], words, along, columns) for name in chosen
+    ]
+
+
 # --------------------------------------------------------------------------------- formats
 
 
 @contextmanager
-def _csv(path: Path, tables: list[Layout]) -> Iterator[list[Writer]]:
-    """Open a CSV file; what is yielded writes a chunk to it."""
+def _csv(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
     with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(field.header for field in tables[0].fields)
 
-        yield [lambda cells: writer.writerows(cells.texts(_text))]
+        def write(table: Table, frame: "pd.DataFrame", number: int) -> None:
+            for name in frame.select_dtypes(["object", "string"]):
+                texts = frame[name].astype(object)
+                risky = texts.map(lambda text: isinstance(text, str) and text.startswith(_FORMULAS))
+                frame[name] = texts.where(~risky, "'" + texts.astype(str))
+            frame.to_csv(file, index=False, header=number == 0, lineterminator="\n")
 
-
-def _text(values: np.ma.MaskedArray) -> NDArray[Any]:
-    """Write numbers with as few digits as bring them back exactly, missing ones as nothing."""
-    # str() of a float has the digits of a double, those of a float32 are fewer
-    numbers = values.data.ravel()
-    text = np.array(list(map(str, numbers if values.dtype == np.float32 else numbers.tolist())), dtype=object)
-    text = text.reshape(values.shape)
-    text[np.ma.getmaskarray(values)] = ""
-    return text
+        yield write
 
 
 @contextmanager
-def _parquet(path: Path, tables: list[Layout]) -> Iterator[list[Writer]]:
-    """Open a Parquet file; what is yielded writes a chunk to it, as a row group."""
+def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
     import pyarrow
     from pyarrow import parquet
 
-    fields = tables[0].fields
-
-    def kind(column: Column) -> Any:
-        if column.is_text:
-            return pyarrow.dictionary(pyarrow.int32(), pyarrow.string())
-        return pyarrow.from_numpy_dtype(column.variable.dtype)
-
-    def about(column: Column) -> dict[str, str]:
-        told = ("long_name", "units", "flag_meanings")
-        return {name: str(column.attributes[name]) for name in told if name in column.attributes}
-
-    schema = pyarrow.schema(
-        [pyarrow.field(str(one.header), kind(one.column), metadata=about(one.column)) for one in fields],
-        metadata={name: str(value) for name, value in tables[0].file.attrs.items()},
-    )
+    (table,) = tables
+    first = pyarrow.Table.from_pandas(next(table.frames(1)).rename(columns=str), preserve_index=False).schema
+    about = {header(table.part[name]): table.part[name].attrs for name in (*table.left, *table.results)}
+    fields = [
+        field.with_metadata({key: str(value) for key, value in about.get(field.name, {}).items()}) for field in first
+    ]
+    schema = pyarrow.schema(fields, {name: str(value) for name, value in table.part.attrs.items()})
     with parquet.ParquetWriter(path, schema) as writer:
 
-        def write(cells: Cells) -> None:
-            arrays = []
-            for field, values, typed in zip(fields, cells.columns, schema, strict=True):
-                flat, missing = (
-                    np.ascontiguousarray(np.broadcast_to(part, cells.shape)).ravel()
-                    for part in (values.data, np.ma.getmaskarray(values))
-                )
-                plain = typed.type.value_type if field.column.is_text else typed.type
-                array = pyarrow.array(flat, type=plain, mask=missing)
-                arrays.append(array.dictionary_encode() if field.column.is_text else array)
-            writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
+        def write(table: Table, frame: "pd.DataFrame", number: int) -> None:
+            writer.write_table(pyarrow.Table.from_pandas(frame.rename(columns=str), schema, preserve_index=False))
 
-        yield [write]
+        yield write
+
+
+@contextmanager
+def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
+    import pandas as pd
+
+    options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True}
+    with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
+        below: dict[str, int] = {}
+
+        def write(table: Table, frame: pd.DataFrame, number: int) -> None:
+            for name in frame.select_dtypes("float32"):  # its shortest digits: those of a double would be 0.10000000149
+                frame[name] = frame[name].astype(str).astype(float)
+            start = below.get(table.name, 0)
+            frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=number == 0, index=False)
+            below[table.name] = start + len(frame) + (number == 0)
+
+        yield write
+        about = pd.DataFrame(_about(tables, source))
+        about.to_excel(book, sheet_name="about", header=False, index=False)
+        book.sheets["about"].set_column(0, 1, 40)
+
+
+def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
+    """Names and texts of what a table is of, under headings."""
+    part = tables[0].part
+    attrs = {str(name): str(value) for name, value in part.attrs.items()}
+    flags = [("validity", "not in the table")]
+    if "validity" in part.data_vars:
+        tally = tally_in(part[["validity"]])
+        flags = [
+            (
+                f"{int(flag)} {(flag.name or '').lower()}",
+                f"{FLAG_KINDS[flag]}: {tally.share(count):.2%} of {tally.cells} cells; {VALIDITY_TEXT[flag]}",
+            )
+            for flag, count in (tally.flags or {}).items()
+        ]
+    results = {name: table.part[name] for table in tables for name in table.results}
+
+    def lines(name: str) -> list[tuple[str, str]]:
+        # line by line: a cell does not hold a long text
+        return [("" if at else name, line) for at, line in enumerate(attrs.get(name, "").splitlines())]
+
+    sections: dict[str, list[tuple[str, str]]] = {
+        "Results": [(header(one), str(one.attrs.get("long_name", ""))) for one in results.values()],
+        "Inputs": [
+            *((str(one.attrs.get("long_name", name)), values_text(one)) for name, one in part.coords.items()),
+            *((name, text) for name, text in attrs.items() if name not in _PROVENANCE),
+        ],
+        "Estimates": [("friction parameters", attrs.get("friction_inputs", "not known"))],
+        "Flags": flags,
+        "Provenance": [
+            ("file", str(source)),
+            ("solved by", attrs.get("source", "not known")),
+            ("table written by", f"slipsweep {__version__}"),
+            ("reference", attrs.get("references", "")),
+            *lines("history"),
+            *lines("sweep"),
+        ],
+    }
+    return [row for heading, rows in sections.items() for row in ((heading, ""), *rows, ("", ""))]

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Variable
 from slipsweep.model.variables import RECORD_SAMPLES
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Pair, Suite
@@ -31,6 +31,7 @@ _READING = {
     "record_units": "record_units",
     "record_channel": "record_channel",
     "record_sha256": "record_sha256",
+    "record_accepted": "record_accepted",
     "baseline": "record_baseline",
 }
 
@@ -43,18 +44,19 @@ _ABOUT: dict[str, dict[str, Any]] = {
     "record_units": {"long_name": "unit of the file of a record"},
     "record_channel": {"long_name": "channel of the file of a record"},
     "record_sha256": {"long_name": "SHA-256 of the file of a record"},
+    "record_accepted": {"long_name": "what is missing or implausible in a record, and was accepted"},
     "record_baseline": {"long_name": "what was taken off a record"},
 }
 
 
-def embedded(motion: Record | Suite) -> dict[str, Variable]:
+def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     """The variables that hold a record or a suite."""
     records = motion.components if isinstance(motion, Suite) else (motion,)
     samples = {
         "record_time": np.concatenate([one.times for one in records]),
         "record_acceleration": np.concatenate([one.acceleration for one in records]),
     }
-    found = {name: Variable((RECORD_DIM,), samples[name], about) for name, about in RECORD_SAMPLES.items()}
+    found = {name: xr.Variable((RECORD_DIM,), samples[name], about) for name, about in RECORD_SAMPLES.items()}
     if isinstance(motion, Record):
         return found
     each = 2 if motion.has_pairs else 1
@@ -68,15 +70,16 @@ def embedded(motion: Record | Suite) -> dict[str, Variable]:
         texts = [one.attrs.get(key, "") for one in records]
         if any(texts):
             columns[name] = np.array(texts, dtype=object)
-    return found | {name: Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
+    return found | {name: xr.Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
 
 
-def read_embedded(file: Any, path: Path) -> Record | Suite | None:
+def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
     """The motion that a file of results holds, if it holds one.
 
     Parameters
     ----------
-    file : ResultFile
+    file : Dataset
+        As `slipsweep.files.opening.read_result` gives it.
     path : Path
         What the file is called in errors.
 
@@ -87,7 +90,7 @@ def read_embedded(file: Any, path: Path) -> Record | Suite | None:
     """
     if any(name not in file for name in RECORD_SAMPLES):
         return None
-    times, acceleration = (file[name].read_floats({}) for name in RECORD_SAMPLES)
+    times, acceleration = (file[name].values.astype(np.float64) for name in RECORD_SAMPLES)
     about = {key: str(text) for key, text in file.attrs.items() if key == "baseline" or key.startswith("record")}
     name = about.get("record", str(path))
     try:
@@ -98,12 +101,12 @@ def read_embedded(file: Any, path: Path) -> Record | Suite | None:
         raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
 
 
-def _suite(file: Any, times: NDArray[Any], acceleration: NDArray[Any]) -> Suite:
-    counts = file[_COUNT].read_codes({}, -1)
+def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) -> Suite:
+    counts = file[_COUNT].values.astype(np.int64)
     columns: dict[str, list[str]] = {
-        key: [str(text) for text in file[one].read({}).data]
+        key: [str(text) for text in file[one].values]
         for key, one in ({"label": _LABEL} | _READING).items()
-        if one in file and file[one].is_text
+        if one in file and file[one].dtype.kind in "OU"
     }
     ends = np.cumsum(counts)
     whole = counts.ndim == 1 and counts.size and (counts > 0).all() and ends[-1] == times.size

@@ -1,6 +1,6 @@
-"""netCDF files of results: made by the CF conventions, and read."""
+"""netCDF-4 files of results by the CF conventions: what stands in them, and how their values are written."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -8,58 +8,18 @@ from typing import Any
 
 import netCDF4
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.files.contents import (
-    CHECKSUM_ATTRIBUTES,
-    CHECKSUM_BYTES,
-    CHECKSUM_DIMS,
-    CHECKSUM_GROUP,
-    CHECKSUMS,
-    Contents,
-    Head,
-    Stored,
-    contents_of,
-    storable,
-)
-from slipsweep.files.names import open_netcdf
+from slipsweep.files.motions import embedded
 from slipsweep.files.outputs import complete_or_absent, writing
-from slipsweep.grid.tables import Table, Variable
+from slipsweep.model.variables import RECORD_COUNTS, SlidingMode
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 
-# --------------------------------------------------------------------------- making a file
-
-
-@contextmanager
-def new_file(temporary: Path, path: Path) -> Iterator[netCDF4.Dataset]:
-    """Open a new netCDF file, and close it whatever happens."""
-    with writing(path):
-        file = open_netcdf(temporary, "w")
-    file.set_fill_off()  # every value is written: filling the file first would write it twice
-    try:
-        yield file
-    except BaseException:
-        with suppress(RuntimeError, OSError):  # the first error is the one to report
-            file.close()
-        raise
-    with writing(path):
-        file.close()
-
-
-def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[str, Any]) -> None:
-    """Set attributes: text as characters in UTF-8, flag values in the type of their variable."""
-    for name, value in attributes.items():
-        if isinstance(value, str):
-            # as bytes: the library would write text beyond ASCII as a netCDF string
-            target.setncattr(name, storable(value).encode())
-        elif name in ("flag_values", "flag_masks"):
-            target.setncattr(name, np.asarray(value, target.dtype))
-        elif np.asarray(value).dtype.kind == "i":
-            target.setncattr(name, np.int32(value))  # not every program reads 64-bit attributes
-        else:
-            target.setncattr(name, value)
+#: Results that are whole numbers, -1 where there is no value.
+WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
 
 def history_of(command: str) -> str:
@@ -67,77 +27,52 @@ def history_of(command: str) -> str:
     return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
 
 
-def write_head(file: netCDF4.Dataset, contents: Contents) -> None:
-    """Write all of a file but its results, for which there is room then."""
-    for dim, length in contents.sizes.items():
-        file.createDimension(dim, length)
-    for name, stored in contents.variables.items():
-        _create(file, name, stored, contents.compression)
-    if contents.chunks:
-        group = file.createGroup(CHECKSUM_GROUP)
-        for dim, length in zip(CHECKSUM_DIMS, (contents.chunks, CHECKSUM_BYTES), strict=True):
-            group.createDimension(dim, length)
-        variable = group.createVariable(CHECKSUMS.rpartition("/")[2], "u1", CHECKSUM_DIMS, contiguous=True)
-        _describe(variable, CHECKSUM_ATTRIBUTES)
-    _describe(file, contents.attrs)
-    file.set_auto_maskandscale(False)
-    for name, stored in contents.variables.items():
-        if stored.values is not None:
-            file[name][...] = _characters(stored.values) if stored.is_text else stored.values
+def storable(text: str) -> str:
+    """A text as a file can hold it: bytes of a name that are no UTF-8 are spelled out."""
+    return text.encode(errors="backslashreplace").decode()
 
 
-def _create(file: netCDF4.Dataset, name: str, stored: Stored, compression: int) -> None:
-    if stored.is_text:
-        # as characters, since few programs read netCDF strings
-        assert stored.values is not None
-        length = f"{name}_length"
-        file.createDimension(length, _characters(stored.values).shape[-1])
-        variable = file.createVariable(name, "S1", (*stored.dims, length))
-        variable.set_auto_chartostring(False)
-        _describe(variable, {**stored.attrs, "_Encoding": "utf-8"})
-        return
-    # zlib and shuffle: what every build of the library has
-    packed = {"zlib": True, "complevel": compression, "shuffle": True}
-    how = packed if compression and stored.values is None and stored.dims else {"contiguous": True}
-    variable = file.createVariable(name, stored.dtype, stored.dims, fill_value=stored.fill, **how)
-    _describe(variable, stored.attrs)
-
-
-def read_head(file: Any, results: Collection[str]) -> Contents:
-    """Read what `write_head` wrote, or of a store what was made of the same contents.
+def described(
+    table: xr.Dataset,
+    *,
+    title: str,
+    history: str,
+    labels: tuple[str, ...] = (),
+    recorded: Record | Suite | None = None,
+    **attrs: str,
+) -> xr.Dataset:
+    """Results as a file holds them: with labels of cases, the samples of records, and global attributes.
 
     Parameters
     ----------
-    file : netCDF4.Dataset or StoreFile
-    results : collection of str
-        Names of the variables whose values do not belong to it.
+    table : Dataset
+    title, history : str
+    labels : tuple of str
+        Names of the cases.
+    recorded : Record or Suite, optional
+        The motion that the results are the response to.
+    attrs : str
+        Further global attributes.
     """
-    variables = {}
-    for name, variable in file.variables.items():
-        attributes = {key: variable.getncattr(key) for key in variable.ncattrs() if key != "_FillValue"}
-        dims, kind, values = tuple(variable.dimensions), variable.dtype, None
-        if name not in results:
-            variable.set_auto_maskandscale(False)
-            variable.set_auto_chartostring(False)
-            values = np.asarray(variable[...])
-        if kind == "S1" and values is not None:
-            attributes.pop("_Encoding", None)
-            dims, kind = dims[:-1], np.dtype(object)
-            rows = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
-            texts = np.array([row.tobytes().rstrip(b"\0").decode() for row in rows], dtype=object)
-            values = texts.reshape(values.shape[:-1])
-        elif kind is str:
-            kind = np.dtype(object)
-        variables[name] = Stored(dims, kind, attributes, None, values)
-    used = {dim for one in variables.values() for dim in one.dims}
-    sizes = {dim: len(length) for dim, length in file.dimensions.items() if dim in used}
-    return Contents(sizes, variables, {key: file.getncattr(key) for key in file.ncattrs()})
+    found = table.copy()
+    if labels:
+        about = {"long_name": "name of the case"}
+        found = found.assign_coords(label=xr.Variable(("case",), np.array(labels, object), about))
+    for name, one in dict(found.variables).items():
+        if one.dtype.kind == "U":  # of any length
+            found[name] = found[name].astype(object)
+        if one.attrs.get("ancillary_variables") not in found.variables:
+            found[name].attrs.pop("ancillary_variables", None)
+    if recorded is not None:
+        found = found.assign(embedded(recorded))
+    return found.assign_attrs(title=title, Conventions="CF-1.11", history=history, **attrs)
 
 
-def _characters(texts: NDArray[Any]) -> NDArray[Any]:
-    """Texts as rows of characters in UTF-8."""
-    encoded = np.array([text.encode() for text in texts.flat])
-    return encoded.view("S1").reshape(*texts.shape, -1)
+def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
+    """What stands in a file for no value."""
+    if dtype.kind == "f":
+        return float("nan")
+    return int(SlidingMode.MISSING) if name in WITH_MISSING else None
 
 
 class TooLarge(InputError):
@@ -159,8 +94,109 @@ def rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[An
     return stored
 
 
+@contextmanager
+def new_file(
+    temporary: Path,
+    path: Path,
+    table: xr.Dataset,
+    dtypes: Mapping[str, np.dtype[Any]],
+    chunks: Mapping[str, int] | None = None,
+    compression: int = 0,
+) -> Iterator[netCDF4.Dataset]:
+    """Make a netCDF file with all that `table` has but its results, which the caller writes.
+
+    Parameters
+    ----------
+    temporary, path : Path
+        The file, and what it is called in errors.
+    table : Dataset
+        As `described` gives it.
+    dtypes : mapping of str to dtype
+        The results, and their types in the file.
+    chunks : mapping of str to int, optional
+        Lengths that compressed results are cut into.
+    compression : int
+        Level of zlib, which every build of the library has; 0 for none.
+
+    Raises
+    ------
+    RunError
+        It cannot be written.
+    """
+    with writing(path):
+        file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
+        file.set_fill_off()  # every value is written: filling the file first would write it twice
+        file.set_auto_maskandscale(False)
+        try:
+            _write_head(file, table, dtypes, chunks or {}, compression)
+            yield file
+        except BaseException:
+            with suppress(RuntimeError, OSError):  # the first error is the one to report
+                file.close()
+            raise
+        file.close()
+
+
+def _write_head(
+    file: netCDF4.Dataset,
+    table: xr.Dataset,
+    dtypes: Mapping[str, np.dtype[Any]],
+    chunks: Mapping[str, int],
+    compression: int,
+) -> None:
+    # in the order of the results, which that of the coordinates need not be
+    widest: Any = max((table[name].dims for name in dtypes), key=len, default=())
+    for dim in dict.fromkeys((*map(str, widest), *map(str, table.sizes))):
+        file.createDimension(dim, table.sizes[dim])
+    # texts along a dimension are labels, and no coordinate variable of it (CF 6.1)
+    auxiliary = [name for name, one in table.coords.items() if name not in table.sizes or one.dtype.kind in "OU"]
+    for name in (*table.coords, *dtypes, *(one for one in table.data_vars if one not in dtypes)):
+        one = table[name].variable
+        if one.dtype.kind in "OU":
+            _write_text(file, str(name), one)
+            continue
+        dtype, attrs = dtypes.get(str(name), one.dtype), dict(one.attrs)
+        how: dict[str, Any] = {"contiguous": True}
+        if name in dtypes and (own := [str(other) for other in auxiliary if {*table[other].dims} <= {*one.dims}]):
+            attrs["coordinates"] = " ".join(own)
+        if name in dtypes and compression and one.dims:
+            sizes = [min(chunks.get(str(dim), size), size) for dim, size in one.sizes.items()]
+            how = {"zlib": True, "complevel": compression, "shuffle": True, "chunksizes": sizes}
+        fill = fill_value(str(name), dtype) if name in dtypes else None
+        variable: Any = file.createVariable(name, dtype, one.dims, fill_value=fill, **how)
+        _describe(variable, attrs)
+        if name not in dtypes:
+            variable[...] = one.values
+    _describe(file, table.attrs)
+
+
+def _write_text(file: netCDF4.Dataset, name: str, one: xr.Variable) -> None:
+    """Write texts as characters in UTF-8, since few programs read netCDF strings."""
+    encoded = np.array([str(text).encode() for text in one.values.flat])
+    characters = encoded.view("S1").reshape(*one.shape, -1)
+    file.createDimension(f"{name}_length", characters.shape[-1])
+    variable: Any = file.createVariable(name, "S1", (*map(str, one.dims), f"{name}_length"))
+    variable.set_auto_chartostring(False)
+    _describe(variable, {**one.attrs, "_Encoding": "utf-8"})
+    variable[...] = characters
+
+
+def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[Any, Any]) -> None:
+    """Set attributes: text as characters in UTF-8, flag values in the type of their variable."""
+    for name, value in attributes.items():
+        if isinstance(value, str):
+            # as bytes: the library would write text beyond ASCII as a netCDF string
+            target.setncattr(name, storable(value).encode())
+        elif name in ("flag_values", "flag_masks"):
+            target.setncattr(name, np.asarray(value, target.dtype))
+        elif np.asarray(value).dtype.kind == "i":
+            target.setncattr(name, np.int32(value))  # not every program reads 64-bit attributes
+        else:
+            target.setncattr(name, value)
+
+
 def write_table(
-    table: Table,
+    table: xr.Dataset,
     path: Path,
     *,
     title: str,
@@ -169,33 +205,30 @@ def write_table(
     recorded: Record | Suite | None = None,
     labels: tuple[str, ...] = (),
 ) -> None:
-    """Write a table that is in memory (a time history) by the rules that sweeps are written by.
+    """Write a Dataset that is in memory (a time history) by the rules that sweeps are written by.
 
     The `recorded` motion that it is the response to is written with it, and the `labels` of its cases.
     """
+    whole = described(table, title=title, history=history_of(command), labels=labels, recorded=recorded)
+    write_whole(whole, path, {str(name): one.dtype for name, one in table.data_vars.items()}, overwrite)
+
+
+def write_whole(
+    table: xr.Dataset, path: Path, dtypes: Mapping[str, np.dtype[Any]], overwrite: bool, compression: int = 0
+) -> None:
+    """Write what `described` gives, with all of its values; the types of its results are those of `dtypes`."""
     with (
         complete_or_absent(path, overwrite) as temporary,
-        new_file(temporary, path) as file,
-        writing(path),
+        new_file(temporary, path, table, dtypes, compression=compression) as file,
     ):
-        head = Head(title, labels, recorded)
-        write_head(file, contents_of(head, table, lambda name: table[name].values.dtype, history_of(command)))
-        for name, array in table.data_vars.items():
-            file[name][...] = array.values
+        for name, dtype in dtypes.items():
+            file[name][...] = rounded(name, table[name].values, dtype)
 
 
-def without_time_axis(table: Table) -> Table:
+def without_time_axis(table: xr.Dataset) -> xr.Dataset:
     """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
 
     A dimension `time` is a time axis of the CF conventions (4.4), whose values are dates.  Seconds
     since the shaking began are none, and given a made-up date they would be read back as dates.
     """
-    dims = {"time": "instant"}
-    coords, data_vars = (
-        {
-            name: Variable(tuple(dims.get(dim, dim) for dim in array.dims), array.values, array.attrs)
-            for name, array in arrays.items()
-        }
-        for arrays in (table.coords, table.data_vars)
-    )
-    return Table(coords, data_vars, table.attrs)
+    return table.swap_dims(time="instant").reset_coords("time").set_coords("time")

@@ -6,9 +6,8 @@ Values come out as the CF conventions (2.5.1, 8.1) mean them; what is missing is
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -16,18 +15,14 @@ from typing import Any
 
 import netCDF4
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.files import guard
-from slipsweep.files.contents import RUN
 from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
 from slipsweep.files.names import open_netcdf
-from slipsweep.files.zarr_store import StoreFile, is_finished, nbytes
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.grid.resources import available_memory, size_text
-from slipsweep.grid.tables import Table, Variable
-from slipsweep.grid.tally import Indices, Tally
 from slipsweep.model.variables import (
     HISTORY,
     LIMIT_RESULTS,
@@ -85,25 +80,10 @@ def result_file(path: Path) -> Iterator["ResultFile"]:
         raise InputError(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    if not is_finished(path):
-        guard.try_out(read_through, path)
     with ResultFile(path) as file:
         if not str(file.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in file.attrs:
             raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
         yield file
-
-
-def read_through(path: Path, next_step: Callable[[], None]) -> None:
-    """Read all of a file that damage may keep from ending: its head, texts, and values that lie in chunks."""
-    next_step()
-    with ResultFile(path) as file:
-        for variable in file.variables.values():
-            left = _TRIED_CELLS if variable.is_text or not variable.in_one_piece else 0
-            for chunk in grid_chunks(variable.sizes, _STEP_CELLS):
-                if left <= 0:
-                    break
-                next_step()
-                left -= variable.read(chunk).size
 
 
 @contextmanager
@@ -385,7 +365,7 @@ class ResultFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         with _library(path):
-            self._file: Any = StoreFile(path) if is_finished(path) else open_netcdf(path)
+            self._file: Any = open_netcdf(path)
         try:
             with _library(path):
                 self._read_head()
@@ -501,7 +481,7 @@ def cut_chunks(
         yield part, {dim: one.stop - one.start for dim, one in chunk.items()}
 
 
-def read_table(file: ResultFile, names: Sequence[str]) -> Table:
+def read_table(file: ResultFile, names: Sequence[str]) -> xr.Dataset:
     """Read some results, and all coordinates along their dimensions.
 
     Raises
@@ -514,158 +494,11 @@ def read_table(file: ResultFile, names: Sequence[str]) -> Table:
             raise InputError(f"{file.path}: {name}: not in this file, which has {', '.join(file.results) or 'nothing'}")
     dims = {dim for name in names for dim in file[name].dims}
 
-    def read(name: str) -> Variable:
+    def read(name: str) -> xr.Variable:
         one = file[name]
         if name == "validity":
-            return Variable(one.dims, one.read_codes({}, 0), one.attrs)
-        return Variable(one.dims, np.asarray(one.read({}).data if one.is_text else one.read_floats({})), one.attrs)
+            return xr.Variable(one.dims, one.read_codes({}, 0), one.attrs)
+        return xr.Variable(one.dims, np.asarray(one.read({}).data if one.is_text else one.read_floats({})), one.attrs)
 
     coords = {name: read(name) for name in file.coordinates if dims.issuperset(file[name].dims)}
-    return Table(coords, {name: read(name) for name in names}, dict(file.attrs))
-
-
-# ------------------------------------------------------------------------------ what it holds
-
-
-@dataclass
-class Contents:
-    """What a file of slipsweep holds and how it was made; coordinates and variables in words.
-
-    The tally is None where it cannot be made, for the reason in `untold`.  `motions` is a table of a suite's, a header
-    and a line each.
-    """
-
-    path: Path
-    nbytes: int
-    attributes: dict[str, str]
-    coordinates: dict[str, str]
-    variables: dict[str, str]
-    tally: Tally | None
-    untold: str = ""
-    motions: tuple[str, ...] = ()
-
-
-#: Columns of the table of motions: what stands above, a coordinate, and how it is written.
-_MOTION_COLUMNS = (
-    ("samples", "motion_samples", ".0f"),
-    ("interval (s)", "motion_interval", ".4g"),
-    ("PGA (m/s2)", "motion_pga", ".4g"),
-    ("PGV (m/s)", "motion_pgv", ".4g"),
-    ("PGD (m)", "motion_pgd", ".4g"),
-    ("Arias (m/s)", "motion_arias_intensity", ".4g"),
-    ("CAV (m/s)", "motion_cav", ".4g"),
-    ("D5-95 (s)", "motion_significant_duration", ".4g"),
-    ("Tm (s)", "motion_mean_period", ".4g"),
-)
-
-
-def read_contents(path: Path) -> Contents:
-    """Describe a file of slipsweep; memory stays small whatever its size.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, is not netCDF, or was not written by slipsweep.
-    """
-    with result_file(path) as file:
-        tally, untold = None, ""
-        try:
-            tally = _count(file)
-        except InputError as error:
-            untold = str(error).removeprefix(f"{path}: ")
-        motions = _motions_text(file)
-        told = {*MOTION_COORDINATES} if motions else set()
-        return Contents(
-            path,
-            nbytes(path) if is_finished(path) else path.stat().st_size,
-            {name: str(value) for name, value in file.attrs.items() if name != RUN},
-            {
-                name: f"{file[name].size} motions" if motions and name == "motion" else values_text(file[name])
-                for name in file.coordinates
-                if not (name in told and file[name].dims == ("motion",))
-            },
-            {name: _variable_text(file[name]) for name in file.results if file[name].dims != (SUITE_DIM,)}
-            | {name: f"not read: {kind}" for name, kind in file.unread.items()},
-            tally,
-            untold,
-            motions,
-        )
-
-
-def _motions_text(file: ResultFile) -> tuple[str, ...]:
-    """The motions of a suite as a table, a header and a line each; empty without them."""
-    if "motion" not in file or not file["motion"].is_text or file["motion"].dims != ("motion",):
-        return ()
-    columns = [["motion", *map(str, file["motion"].read({}).data)]]
-    for header, name, form in _MOTION_COLUMNS:
-        if name in file and file[name].dims == ("motion",) and not file[name].is_text:
-            values = np.ma.filled(file[name].read({}).astype(np.float64), math.nan)
-            columns.append([header, *(format(value, form) for value in values)])
-    widths = [max(map(len, column)) for column in columns]
-    rows = (
-        [label.ljust(widths[0]), *map(str.rjust, cells, widths[1:])] for label, *cells in zip(*columns, strict=True)
-    )
-    return tuple("  ".join(row) for row in rows)
-
-
-def _count(file: ResultFile) -> Tally:
-    tally = Tally()
-    codes = {name: missing for name, missing in (("sliding_mode", -1), ("validity", 0)) if name in file.results}
-    if len({file[name].size for name in codes}) > 1:
-        raise InputError(f"{file.path}: sliding_mode and validity are not of the same cells")
-    for name, missing in codes.items():
-        variable = file[name]
-        tally.cells = variable.size
-        for chunk in grid_chunks(variable.sizes, CHUNK_CELLS):
-            tally.add({name: variable.read_codes(chunk, missing)})
-    both = [file[name] for name in ("permanent_displacement", "newmark_displacement") if name in file.results]
-    if len(both) == 2 and both[0].sizes == both[1].sizes and not any(one.is_text for one in both):
-        for chunk in grid_chunks(both[0].sizes, CHUNK_CELLS):
-            tally.add({one.name: np.ma.filled(one.read(chunk).astype(np.float64), math.nan) for one in both})
-    tally.indices = _indices(file)
-    return tally
-
-
-def _indices(file: ResultFile) -> Indices | None:
-    """Count Sobol indices, where there are any."""
-    if not {"sensitivity_status", "first_order_index", "total_index"} <= file.variables.keys():
-        return None
-    status, found = file["sensitivity_status"], [file["first_order_index"], file["total_index"]]
-    dims = (*status.dims, "input")
-    inputs = file.texts("input")
-    if any(sorted(one.dims) != sorted(dims) or one.is_text for one in found) or not inputs:
-        return None
-    counted = Indices.counted(inputs, np.empty((0, len(inputs))), np.empty((0, len(inputs))), np.empty(0))
-    for chunk in grid_chunks(status.sizes, max(CHUNK_CELLS // max(len(inputs), 1), 1)):
-        first, total = (one.read_floats(chunk).transpose([one.dims.index(dim) for dim in dims]) for one in found)
-        counted = Indices.counted(inputs, first, total, status.read_codes(chunk)).merged(counted)
-    return counted
-
-
-def values_text(variable: FileVariable, where: Mapping[str, NDArray[np.intp]] | None = None) -> str:
-    """The values of a coordinate in words, or of some of it, read in chunks: it may lie over the whole grid."""
-    where = where or {}
-    if variable.is_text:
-        return ", ".join(map(str, variable.read(where).data.ravel()))
-    units = _units_text(variable, " ")
-    low, high, count = math.inf, -math.inf, 0
-    size = 0
-    for part, shape in cut_chunks(variable.sizes, where):
-        size += math.prod(shape.values())
-        there = variable.read(part).compressed()
-        if there.size:
-            low, high, count = min(low, there.min()), max(high, there.max()), count + there.size
-    missing = f", {size - count} missing" if count < size else ""
-    if size == 1 == count:
-        return f"{low:.6g}{units}"
-    return f"{size} values" + (f", {low:.6g} to {high:.6g}{units}" if count else "") + missing
-
-
-def _variable_text(variable: FileVariable) -> str:
-    kind = "text" if variable.is_text else variable.stored
-    return f"{variable.attrs.get('long_name', '')}{_units_text(variable, ', ')} ({kind})".lstrip(", ")
-
-
-def _units_text(variable: FileVariable, before: str) -> str:
-    units = str(variable.attrs.get("units", "1"))
-    return "" if units == "1" else f"{before}{units}"
+    return xr.Dataset({name: read(name) for name in names}, coords, dict(file.attrs))

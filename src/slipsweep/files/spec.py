@@ -16,15 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from slipsweep.errors import InputError
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.outputs import Read
-from slipsweep.files.zarr_store import is_finished
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.tables import Variable
 from slipsweep.model.choices import Family, declared
 from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
 from slipsweep.model.parameters import BOUNDS
@@ -48,6 +47,7 @@ from slipsweep.motion.suites import Suite, suite_in
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
+    from slipsweep.grid.inputs import Inputs
     from slipsweep.studies.sampling import Sampling
 
 Floats = NDArray[np.float64]
@@ -290,10 +290,18 @@ class SweepSpec:
             if self.sampling is None:
                 from slipsweep.grid.plans import plan_sweep
 
-                return plan_sweep(**self.arguments())
+                return plan_sweep(
+                    self.inputs(),
+                    excitation=self.excitation,
+                    model=self.model,
+                    solver=self.solver,
+                    variables=list(self.output.variables),
+                )
             from slipsweep.studies.uncertainty import plan_samples
 
-            return plan_samples(self.sampling, **self._arguments_but("variables"))
+            return plan_samples(
+                self.sampling, self.inputs(), excitation=self.excitation, model=self.model, solver=self.solver
+            )
 
     def limits(self, displacement: float | list[float], maximum_amplitude: float | None = None) -> "AnyPlan":
         """Return the plan of `slipsweep.limit_amplitude` over all axes but the amplitude, by the cycle solver.
@@ -308,8 +316,14 @@ class SweepSpec:
                 raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
             from slipsweep.studies.limits import plan_limits
 
-            given = self._arguments_but("displacement_amplitude", *STRENGTHS, "solver", "variables")
-            return plan_limits(displacement=displacement, maximum_amplitude=maximum_amplitude, **given)
+            inputs = self.inputs().but(dict.fromkeys(("displacement_amplitude", *STRENGTHS)))
+            return plan_limits(
+                displacement,
+                inputs,
+                excitation=self.excitation,
+                model=self.model,
+                maximum_amplitude=maximum_amplitude,
+            )
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -319,25 +333,17 @@ class SweepSpec:
         except InputError as error:
             raise InputError(f"{self.source}: {error}") from None
 
-    def _arguments_but(self, *names: str) -> dict[str, Any]:
-        return {name: value for name, value in self.arguments().items() if name not in names}
+    def inputs(self) -> "Inputs":
+        """Return the parameters of the sweep."""
+        from slipsweep.grid.inputs import Inputs
 
-    def arguments(self) -> dict[str, Any]:
-        """Return keyword arguments for `slipsweep.sweep` (or `slipsweep.grid.plans.plan_sweep`)."""
-        arguments: dict[str, Any] = {}
+        given: dict[str, Any] = {}
         for name, (dim, values) in self.parameters.items():
             if dim is None:
-                arguments[name] = float(values)
-            elif dim == name:
-                arguments[name] = values
+                given[name] = float(values)
             else:
-                arguments[name] = Variable((dim,), values)
-        return arguments | {
-            "excitation": self.excitation,
-            "model": self.model,
-            "solver": self.solver,
-            "variables": list(self.output.variables),
-        }
+                given[name] = values if dim == name else xr.DataArray(values, dims=(dim,))
+        return Inputs(**given)
 
 
 #: How netCDF files begin: netCDF-4, and the classic formats.
@@ -365,8 +371,8 @@ def load(path: str | Path) -> SweepSpec:
         the file, the key, its value and what is allowed.
     """
     path = Path(path)
-    if is_finished(path):
-        return replace(_load_result(path), files=(path, path / "zarr.json"))
+    if (path / "zarr.json").is_file():
+        return replace(_load_result(path), files=(path,))
     try:
         stream = is_stream(path)
         read: Read = 0 if path == _STANDARD_INPUT else path
@@ -398,9 +404,9 @@ def is_stream(path: Path) -> bool:
 
 
 def _load_result(path: Path) -> SweepSpec:
-    from slipsweep.files.results import result_file  # brings along the netCDF library
+    from slipsweep.files.opening import read_result
 
-    with result_file(path) as file:
+    with read_result(path) as file:
         attributes = file.attrs
         recorded = read_embedded(file, path)
     if "sweep" not in attributes:
@@ -507,6 +513,9 @@ def _parameters(file: Any, model: Model, sampling: "Sampling | None") -> dict[st
         sampling.check_given(tuple(given))
         given |= {*sampling.absolute}
     harmonic = _recorded(file.excitation) is None
+    if given >= {"mu_s", "phi"}:
+        raise InputError("axes.phi: not allowed beside mu_s: mu_s = tan(phi); give one of them")
+    given |= {"mu_s"} if "phi" in given else set()
     interface = () if "yield_coefficient" in given else ("theta", "mu_s")
     for name in (*interface, *(["frequency"] if harmonic else [])):
         if name not in given:

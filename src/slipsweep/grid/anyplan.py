@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
+import xarray as xr
 
 from slipsweep.grid.chunks import Chunk
-from slipsweep.grid.tables import Empty, Table
 from slipsweep.grid.tally import Tally
 
 
@@ -41,15 +41,11 @@ class AnyPlan(Protocol):
     def cell_memory(self) -> int:
         """Bytes for each cell of the grid that it takes beside them."""
 
-    @property
-    def is_ordinary(self) -> bool:
-        """Whether no result can be too large for double precision; else only solving can tell."""
-
-    def empty(self) -> Table:
+    def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
-        """Compute everything at once; `progress` and `empty` as in `engine.solve`."""
+    def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
+        """Compute everything at once; `progress` is told of cells as they are finished, from any thread."""
 
     def part(self, chunk: Chunk) -> "AnyPlan":
         """The plan of a part of the grid, which gives the same bits as the whole does there."""

@@ -11,14 +11,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, places
 from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.resources import check_memory, grid_text
-from slipsweep.grid.tables import Empty, Table, Variable
 from slipsweep.grid.tally import Tally
 from slipsweep.model.estimates import friction_inputs
 from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Step
@@ -32,7 +33,6 @@ from slipsweep.model.parameters import (
     number_text,
     shown,
 )
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
@@ -96,10 +96,10 @@ class Task:
             np.dtype(RESULT_DTYPES.get(name, "float64")).itemsize for name in self.names
         )
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Arrays:
-        """Compute the results; `progress` is told of cells as they are finished, `empty` makes the arrays."""
+    def solve(self, progress: Callable[[int], None] | None = None) -> Arrays:
+        """Compute the results; `progress` is told of cells as they are finished."""
         shape = tuple(self.sizes.values())
-        return self.solver(Request(self.problem, shape, self.inputs, self.names, progress, empty))
+        return self.solver(Request(self.problem, shape, self.inputs, self.names, progress))
 
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
@@ -116,21 +116,21 @@ class Plan:
     ----------
     sizes : dict of str to int
         Dimensions of the grid in the order of the results, and their lengths.
-    coords : dict of str to Variable
+    coords : dict of str to xr.Variable
         The parameters.
     tasks : tuple of Task
     names : tuple of str
         Results in the order they are returned in.
     attrs : dict
         What the results say of themselves.
-    cost, together, memory, cell_memory, is_ordinary
+    cost, together, memory, cell_memory
         As in `anyplan.AnyPlan`.
     described : mapping of str to dict
         Attributes of the results.
     """
 
     sizes: dict[str, int]
-    coords: dict[str, Variable]
+    coords: dict[str, xr.Variable]
     tasks: tuple[Task, ...]
     names: tuple[str, ...]
     attrs: dict[str, Any]
@@ -138,7 +138,6 @@ class Plan:
     together: tuple[str, ...] = ()
     memory: int = 0
     cell_memory: int = 0
-    is_ordinary: bool = True
     described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: RESULTS | RECORD_RESULTS)
 
     def __post_init__(self) -> None:
@@ -153,18 +152,15 @@ class Plan:
         """The plan cut to a chunk of its grid."""
         tasks = tuple(task.part(tuple(places(chunk, task.sizes).values())) for task in self.tasks)
         sizes = {dim: cut.stop - cut.start for dim, cut in places(chunk, self.sizes).items()}
-        return replace(
-            self, sizes=sizes, coords={name: one.cut(chunk) for name, one in self.coords.items()}, tasks=tasks
-        )
+        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
+        return replace(self, sizes=sizes, coords=coords, tasks=tasks)
 
     def tally(self, results: Mapping[str, np.ndarray]) -> Tally:
         """Modes and flags in a chunk of results."""
-        tally = Tally()
-        tally.add(results)
-        return tally
+        return Tally.of(results)
 
-    def solve(self, progress: Callable[[int], None] | None = None, empty: Empty = np.empty) -> Table:
-        """Compute everything at once; `progress` and `empty` as in `engine.solve`.
+    def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
+        """Compute everything at once; `progress` is told of cells as they are finished, from any thread.
 
         Raises
         ------
@@ -181,12 +177,10 @@ class Plan:
             sum(task.nbytes for task in self.tasks) + cells * self.cell_memory,
             _ADVICE,
         )
-        for task in self.tasks:
-            engine.expect_kernels(task.solver, task.problem)
         # all tasks cover the same cells: one of them counts
-        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None, empty))
+        return self.table(lambda task: task.solve(progress if task is self.tasks[0] else None))
 
-    def empty(self) -> Table:
+    def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
 
         def zeros(task: Task) -> dict[str, np.ndarray]:
@@ -195,26 +189,31 @@ class Plan:
 
         return self.table(zeros)
 
-    def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> Table:
+    def table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> xr.Dataset:
         """The results, with `evaluate` giving a task's arrays."""
         found = {
-            name: Variable(tuple(task.sizes), values, self.described[name])
+            name: xr.Variable(tuple(task.sizes), values, self.described[name])
             for task in self.tasks
             for name, values in evaluate(task).items()
         }
-        return Table(self.coords, {name: found[name] for name in self.names}, self.attrs)
+        return xr.Dataset({name: found[name] for name in self.names}, self.coords, self.attrs)
 
 
 def plan_sweep(
-    *, excitation: Any = "sine", model: Any = "mendez", solver: Any = "auto", variables: Any = None, **given: Any
+    inputs: Inputs,
+    *,
+    excitation: Any = "sine",
+    model: Any = "mendez",
+    solver: Any = "auto",
+    variables: Any = None,
 ) -> Plan:
     """Plan of a sweep.
 
     Parameters
     ----------
-    excitation, model, solver, variables, given
-        Keyword arguments of `slipsweep.sweep` but for `chunks` and `progress`; arrays with
-        dimensions of their own are `Variable` instead of DataArray.
+    inputs : Inputs
+    excitation, model, solver, variables
+        As `slipsweep.sweep`.
 
     Raises
     ------
@@ -222,23 +221,23 @@ def plan_sweep(
         As `slipsweep.sweep`.
     """
     problem = check_problem(excitation, model, solver)
-    parameters = check_parameters(problem, given)
+    parameters = check_parameters(problem, inputs)
     if isinstance(problem.excitation, (Record, Suite)):
         return _plan_records(problem, parameters, variables)
     return _plan_waveform(problem, parameters, variables)
 
 
-def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, Variable]:
+def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]:
     """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
     motion = problem.excitation
-    parameters = {name: values for name, values in given.items() if values is not None}
+    parameters = inputs.given
     if isinstance(motion, Waveform):
         check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
         if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
             raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
         _check_interface(problem.model, parameters)
         check_given(parameters, ("frequency",))
-        return checked(parameters)
+        return checked(parameters, problem.model.g)
     check_inputs(parameters, RECORD_INPUTS, "a Suite" if isinstance(motion, Suite) else "a Record")
     _check_interface(problem.model, parameters)
     strengths = [name for name in STRENGTHS if name in parameters]
@@ -256,7 +255,8 @@ def check_parameters(problem: Problem, given: Mapping[str, Any]) -> dict[str, Va
     polarity = _polarity(parameters.pop("polarity", 1))
     defaults = {"time_scale": 1.0} if strengths else {"scale": 1.0, "time_scale": 1.0}
     parameters = defaults | parameters
-    found = checked({name: parameters[name] for name in PARAMETERS if name in parameters}) | {"polarity": polarity}
+    found = checked({name: parameters[name] for name in PARAMETERS if name in parameters}, problem.model.g)
+    found["polarity"] = polarity
     found |= motion_coordinates(motion, found)
     if strengths and strengths != ["scale"]:
         _check_moving(motion, found, strengths[0])
@@ -278,32 +278,33 @@ def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
             raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
 
 
-def motion_coordinates(motion: Record | Suite, coords: Mapping[str, Variable]) -> dict[str, Variable]:
+def motion_coordinates(motion: Record | Suite, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
     if not isinstance(motion, Suite):
         return {}
-    found = {"motion": Variable(("motion",), np.array(motion.labels), MOTION)}
-    found |= {name: Variable(("motion",), one, MOTION_COORDINATES[name]) for name, one in motion.measures.items()}
+    found = {"motion": xr.Variable(("motion",), np.array(motion.labels), MOTION)}
+    found |= {name: xr.Variable(("motion",), one, MOTION_COORDINATES[name]) for name, one in motion.measures.items()}
     if motion.has_pairs:
-        azimuth, places = coords["azimuth"], Variable(("motion",), np.arange(len(motion)))
+        azimuth, places = coords["azimuth"], xr.Variable(("motion",), np.arange(len(motion)))
         sizes = grid_sizes({"azimuth": azimuth, "motion": places})
-        values = aligned({"azimuth": azimuth}, sizes)["azimuth"]
-        for name, one in motion.intensities(np.broadcast_to(values, tuple(sizes.values()))).items():
-            found[name] = Variable(tuple(sizes), one, MOTION_COORDINATES[name])
+        both = aligned({"motion": places, "azimuth": azimuth}, sizes)
+        at = np.broadcast_arrays(both["motion"], both["azimuth"], np.empty(tuple(sizes.values())))
+        for name, one in motion.intensities(at[0], at[1]).items():
+            found[name] = xr.Variable(tuple(sizes), one, MOTION_COORDINATES[name])
     return found
 
 
-def inputs_of(problem: Problem, coords: Mapping[str, Variable]) -> dict[str, Variable]:
-    """The coordinates that cells are solved for: of a motion its place in the suite, and no more."""
+def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+    """The coordinates that cells are solved for: no friction angle; of a motion its place in the suite, and no more."""
+    own = {name: one for name, one in coords.items() if name not in ("phi", *MOTION_COORDINATES)}
     suite = problem.excitation
     if not isinstance(suite, Suite):
-        return dict(coords)
+        return own
     places = np.array([suite.index(str(label)) for label in coords["motion"].values], np.float64)
-    own = {name: one for name, one in coords.items() if name not in MOTION_COORDINATES}
-    return own | {"motion": Variable(("motion",), places)}
+    return own | {"motion": xr.Variable(("motion",), places)}
 
 
-def _check_moving(motion: Record | Suite, coords: Mapping[str, Variable], strength: str) -> None:
+def _check_moving(motion: Record | Suite, coords: Mapping[str, xr.Variable], strength: str) -> None:
     """Refuse to scale a motion that has no acceleration."""
     if isinstance(motion, Record):
         if not motion.peak > 0.0:
@@ -313,11 +314,11 @@ def _check_moving(motion: Record | Suite, coords: Mapping[str, Variable], streng
     still = np.argwhere(~(peaks.values > 0.0))
     if still.size:
         at = dict(zip(peaks.dims, still[0], strict=True))
-        where = f" at azimuth {coords['azimuth'].pick(at).item():g}" if motion.has_pairs else ""
+        where = f" at azimuth {float(coords['azimuth'].isel(at, missing_dims='ignore')):g}" if motion.has_pairs else ""
         raise InputError(f"{strength}: {motion.labels[at['motion']]}{where} has no acceleration to scale; give scale")
 
 
-def _polarity(given: Any) -> Variable:
+def _polarity(given: Any) -> xr.Variable:
     """The signs asked for: 1, -1, both."""
     both = isinstance(given, str) and given == "both"
     try:
@@ -327,10 +328,10 @@ def _polarity(given: Any) -> Variable:
     if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
         raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
     dims = ("polarity",) if values.ndim else ()
-    return Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
+    return xr.Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
 
 
-def _plan_records(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+def _plan_records(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a record or a suite; `coords` as `check_parameters` gives them."""
     is_suite = isinstance(problem.excitation, Suite)
     default = DEFAULT_SUITE_RESULTS if is_suite else DEFAULT_RECORD_RESULTS
@@ -343,19 +344,10 @@ def _plan_records(problem: Problem, coords: dict[str, Variable], variables: Any)
         tasks.append(_factor_task(problem, inputs))
     motions = "suite of recorded motions" if is_suite else "recorded motion"
     attrs = about(f"Response of a rigid block to a {motions}", problem, coords)
-    return Plan(
-        sizes,
-        coords,
-        tuple(tasks),
-        wanted,
-        attrs,
-        cost,
-        memory=memory_of(problem),
-        is_ordinary=ordinary(problem, coords),
-    )
+    return Plan(sizes, coords, tuple(tasks), wanted, attrs, cost, memory=memory_of(problem))
 
 
-def _factor_task(problem: Problem, inputs: Mapping[str, Variable]) -> Task:
+def _factor_task(problem: Problem, inputs: Mapping[str, xr.Variable]) -> Task:
     """The factor on each motion, on the dimensions it depends on."""
     strength = next(name for name in STRENGTHS if name in inputs)
     names = [strength, *(["time_scale"] if strength in ("pgv", "arias_intensity") else []), "azimuth", "motion"]
@@ -377,11 +369,11 @@ def _motion_tasks(
     return tasks
 
 
-def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any) -> Plan:
+def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a waveform; `coords` as `check_parameters` gives them."""
     wanted = DEFAULT_RESULTS if variables is None else check_choices("variables", variables, RESULTS)
-    sizes, inputs = grid_sizes(coords), dict(coords)
-    drive: dict[str, Variable] = {
+    sizes, inputs = grid_sizes(coords), inputs_of(problem, coords)
+    drive: dict[str, xr.Variable] = {
         name: coords[name] for name in ("displacement_amplitude", "frequency") if name in coords
     }
     if len(drive) == 2:
@@ -390,7 +382,8 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
         # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
         if any(dims.keys() == set(variable.dims) for variable in drive.values()):
             both = aligned(drive, dims)
-            coords = coords | {"amplitude": Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])}
+            amplitudes = xr.Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])
+            coords = coords | {"amplitude": amplitudes}
 
     tasks = list(_motion_tasks(problem, wanted, MOTION_RESULTS, sizes, aligned(inputs, sizes)))
     if tasks and isinstance(problem.solver, Step):
@@ -413,7 +406,6 @@ def _plan_waveform(problem: Problem, coords: dict[str, Variable], variables: Any
         tuple(name for name in wanted if any(name in task.names for task in tasks)),
         about("Permanent displacement of a rigid block, swept", problem, coords),
         cost,
-        is_ordinary=ordinary(problem, coords),
     )
 
 
@@ -425,11 +417,11 @@ def _check_steps(solver: Step, excitation: Any) -> None:
     check_memory(f"steps_per_cycle = {solver.steps_per_cycle}", needed, "take fewer steps, or shorter ramps")
 
 
-def plan_friction_parameters(*, model: Any = "mendez", **given: Any) -> Plan:
+def plan_friction_parameters(inputs: Inputs, *, model: Any = "mendez") -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
     problem = check_problem("sine", model, "auto")
-    check_given(given, ("theta", "mu_s", "amplitude"))
-    coords = checked({name: values for name, values in given.items() if values is not None})
+    check_given(inputs.given, ("theta", "mu_s", "amplitude"))
+    coords = checked(inputs.given, problem.model.g)
     names = (*(name for name in FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, **MODELS.attributes(problem.model)}
@@ -449,35 +441,39 @@ def check_inputs(given: Collection[str], shaking: Collection[str], what: str) ->
     """Refuse inputs of another kind of shaking."""
     others = {*WAVEFORM_INPUTS, *RECORD_INPUTS} - {*shaking}
     for name in given:
-        if name not in PARAMETERS:
-            raise InputError(f"{name}: unknown; {did_you_mean(name, tuple(PARAMETERS))}")
         if name in others:
             raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
 
 
-def checked(parameters: Mapping[str, Any]) -> dict[str, Variable]:
-    """Every parameter as a float64 array with named dimensions, within its bounds, described."""
+def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
+    """Every parameter as a float64 array with named dimensions, within its bounds, described.
+
+    `g` is what "g" as the unit of an array stands for.
+    """
     checked = {}
     for name, given in parameters.items():
-        if isinstance(given, Variable):
-            variable = Variable(given.dims, check_values(name, given.values), {**given.attrs, **PARAMETERS[name]})
-            if len(set(given.dims)) < len(given.dims):
-                raise InputError(f"{name}: dimensions {', '.join(given.dims)}: must be named each once")
+        if isinstance(given, (xr.Variable, xr.DataArray)):
+            dims = tuple(map(str, given.dims))
+            if len(set(dims)) < len(dims):
+                raise InputError(f"{name}: dimensions {', '.join(dims)}: must be named each once")
+            variable = xr.Variable(dims, check_values(name, given, g=g), {**given.attrs, **PARAMETERS[name]})
         else:
-            values = check_values(name, given)
+            values = check_values(name, given, g=g)
             if values.ndim > 1:
                 raise InputError(
                     f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
                     "that names its dimensions"
                 )
-            variable = Variable((name,) if values.ndim else (), values, PARAMETERS[name])
+            variable = xr.Variable((name,) if values.ndim else (), values, PARAMETERS[name])
         if variable.values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = variable
+        if name == "mu_s" and isinstance(given, xr.DataArray) and "phi" in given.coords:
+            checked["phi"] = given["phi"].variable.to_base_variable()
     return checked
 
 
-def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> None:
+def _check_amplitudes(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> None:
     """Refuse peak displacements that make an amplitude out of its bounds at a frequency of theirs."""
     shared = set(displacement_amplitude.dims) & set(frequency.dims)
     # A grows with both: their extremes, apart along dimensions of their own, have those of A
@@ -486,7 +482,7 @@ def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> 
         for name, variable in (("displacement_amplitude", displacement_amplitude), ("frequency", frequency)):
             own = tuple(at for at, dim in enumerate(variable.dims) if dim not in shared)
             left = tuple(dim for dim in variable.dims if dim in shared)
-            reduced[name] = Variable(left, np.asarray(extreme(variable.values, axis=own)))
+            reduced[name] = xr.Variable(left, np.asarray(extreme(variable.values, axis=own)))
         both = aligned(reduced, grid_sizes(reduced))
         wrong = ~BOUNDS["amplitude"].holds(peak_acceleration(**both))
         if wrong.any():
@@ -497,7 +493,7 @@ def _check_amplitudes(displacement_amplitude: Variable, frequency: Variable) -> 
             )
 
 
-def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, Variable], results: Collection[str]) -> None:
+def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, xr.Variable], results: Collection[str]) -> None:
     """Refuse dimensions, which DataArrays name as they like, that no dataset can have beside what is in it."""
     for dim in sizes:
         if dim in results:
@@ -506,18 +502,18 @@ def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, Variable], r
             raise InputError(f"{dim}: is a dimension of another parameter: must have values along it")
 
 
-def grid_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
+def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
     """Dimensions of the grid in the order of the results, and their lengths."""
     sizes: dict[str, int] = {}
     for name, variable in variables.items():
-        for dim, size in variable.sizes.items():
+        for dim, size in zip(map(str, variable.dims), variable.shape, strict=True):
             if sizes.setdefault(dim, size) != size:
                 raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
     ordered = [dim for dim in DIMENSION_ORDER if dim in sizes] + [dim for dim in sizes if dim not in DIMENSION_ORDER]
     return {dim: sizes[dim] for dim in ordered}
 
 
-def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arrays:
+def aligned(variables: Mapping[str, xr.Variable], sizes: Mapping[str, int]) -> Arrays:
     """Plain arrays with all dimensions, of length 1 where they do not vary."""
     aligned = {}
     for name, variable in variables.items():
@@ -526,7 +522,7 @@ def aligned(variables: Mapping[str, Variable], sizes: Mapping[str, int]) -> Arra
     return aligned
 
 
-def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, Variable]) -> Task:
+def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, xr.Variable]) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
     made = ("displacement_amplitude", "frequency") if "displacement_amplitude" in variables else ()
     own = {name: variable for name, variable in variables.items() if name in (*_FRICTION_INPUTS, *made)}
@@ -536,12 +532,6 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
             raise InputError(f"{drive} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
     sizes = grid_sizes(own)
     return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
-
-
-def ordinary(problem: Problem, coords: Mapping[str, Variable]) -> bool:
-    """Whether no result can be too large for double precision."""
-    own = {name: one for name, one in coords.items() if name not in ("motion", *MOTION_COORDINATES)}
-    return engine.are_ordinary(problem, {name: one.values for name, one in own.items()})
 
 
 def memory_of(problem: Problem) -> int:

@@ -1,9 +1,7 @@
 """What a user may choose, declared once: a class a choice, a field an option.
 
-From these declarations come Python's arguments (`model=Mendez(rise="literal")`), the keys of a sweep
-file's table (`rise = "literal"`), the options of the command line (`--rise literal`), the attributes
-of a result's file, and what a resumed run must have in common with the one before.  An option added
-to a class appears in all of them.
+From these declarations come Python's arguments (`model=Mendez(rise="literal")`), the keys of a sweep file's table
+(`rise = "literal"`), the options of the command line (`--rise literal`), and the attributes of a result's file.
 """
 
 import dataclasses
@@ -46,30 +44,14 @@ def option(
 
 @dataclass(frozen=True)
 class Option:
-    """An option as its class declares it.
-
-    Attributes
-    ----------
-    name : str
-    about : str
-        One line for people.
-    kind : type
-        `str`, `int` or `float`; of one entry, where it is a list.
-    words : tuple of str
-        What a word may be; empty for numbers.
-    is_list : bool
-    default : object
-        `dataclasses.MISSING` where it must be given.
-    least, most, multiple_of
-        Bounds of a number.
-    """
+    """An option as its class declares it."""
 
     name: str
-    about: str
-    kind: type
-    words: tuple[str, ...]
+    about: str  # one line for people
+    kind: type  # str, int or float; of one entry, where it is a list
+    words: tuple[str, ...]  # what a word may be; empty for numbers
     is_list: bool
-    default: Any
+    default: Any  # dataclasses.MISSING where it must be given
     least: float | None
     most: float | None
     multiple_of: int
@@ -148,9 +130,6 @@ def _option(field: "dataclasses.Field[Any]", hint: Any) -> Option:
 
 Some = TypeVar("Some", bound=Choice)
 
-#: Choices that a name has stood for, with all their defaults; they are frozen.
-_BY_NAME: dict[tuple[str, str], Choice] = {}
-
 
 @dataclass(frozen=True)
 class Family(Generic[Some]):
@@ -187,11 +166,7 @@ class Family(Generic[Some]):
         if isinstance(given, self.choices):
             return given
         if isinstance(given, str) and given in self.names:
-            # checked once: a call for a small grid would spend a tenth of its time on it
-            known: Any = _BY_NAME.get((self.keyword, given))
-            if known is None:
-                known = _BY_NAME[self.keyword, given] = self.made(given, {})
-            return known
+            return self.made(given, {})
         objects = ", ".join(f"{choice.__name__}(...)" for choice in self.choices)
         raise InputError(
             f"{self.keyword} = {shown(given)}: must be one of {', '.join(map(repr, self.names))}, or {objects}"
@@ -199,8 +174,7 @@ class Family(Generic[Some]):
 
     def called(self, name: str) -> type[Some]:
         """The class of a choice, by name."""
-        name = self.aliases.get(name, name)
-        return next(choice for choice in self.choices if choice.name == name)
+        return {choice.name: choice for choice in self.choices}[self.aliases.get(name, name)]
 
     def made(self, name: Any, options: Mapping[str, Any], key: Callable[[str], str] = str) -> Some:
         """The choice of a name, with options as a table or a command gives them.

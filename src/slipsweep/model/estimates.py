@@ -11,16 +11,9 @@ _INPUTS = {
 
 
 def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str] | None = None) -> str:
-    """Say where Üy, λ and Δμ of a result come from.
+    """Say where Üy, λ and Δμ of a result come from: given, drawn, or estimated; Newmark's block has only Üy.
 
-    Parameters
-    ----------
-    model : str
-        Name of the model; Newmark's block knows Üy alone.
-    given : collection of str
-        Names of the parameters that were given.
-    drawn : mapping of str to str, optional
-        Uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
+    `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
 
     Examples
     --------

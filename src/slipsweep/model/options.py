@@ -11,9 +11,7 @@ Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
 @dataclass(frozen=True)
 class Mendez(Choice):
-    """The friction law of Mendez, Romo and Botero (2012).
-
-    Eqs. 1-12 of the paper [1]_.
+    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12 of the paper [1]_.
 
     Parameters
     ----------
@@ -21,7 +19,7 @@ class Mendez(Choice):
         Stick-slip rise of the block's acceleration: not below the yield value and never falling, or
         Eq. 4 as printed.
     recoupling : {"eq12", "integrate"}
-        After the plane's acceleration has reversed: Eq. 12, or integration until the stop.
+        After the base's acceleration has reversed: Eq. 12, or integration until the stop.
     g : float
         Gravity, m/s².
 
@@ -57,9 +55,7 @@ class Mendez(Choice):
 
 @dataclass(frozen=True)
 class Newmark(Choice):
-    """Newmark's rigid block: its acceleration is Üy while it slides, and the plane's while it does not.
-
-    It is the sliding block of [1]_.
+    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the base's while it does not.
 
     Parameters
     ----------

@@ -1,6 +1,5 @@
 """What a caller gives, checked: one clear message for the first thing that cannot be.
 
-`sweep`, `friction_parameters`, `simulate` and the sweep-file schema share these bounds.
 NumPy is imported where it is needed: the command line's options, hence `slipsweep --help`, come from here.
 """
 
@@ -8,13 +7,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Set
+from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError
+from slipsweep.model.units import without_unit
+from slipsweep.model.variables import PARAMETERS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,6 +59,7 @@ _POSITIVE_FACTOR = Bound(
 BOUNDS: dict[str, Bound] = {
     "theta": Bound(0.0, True, 90.0, "0 <= theta < 90 degrees", includes_high=False),
     "mu_s": _POSITIVE_FACTOR,
+    "phi": Bound(0.0, False, 90.0, "0 < phi < 90 degrees", includes_high=False),
     "amplitude": _AMOUNT,
     "displacement_amplitude": _AMOUNT,
     "frequency": _POSITIVE_FACTOR,
@@ -75,11 +77,18 @@ BOUNDS: dict[str, Bound] = {
     "pgv": _AMOUNT,
     "arias_intensity": _AMOUNT,
     "time_scale": _POSITIVE_FACTOR,
+    "interval": Bound(0.0, False, LARGEST, f"a finite number > 0 and at most {LARGEST:g}"),
     "azimuth": Bound(0.0, True, 360.0, "0 <= azimuth <= 360 degrees"),
     "g": Bound(1.0 / LARGEST, True, LARGEST, f"a finite number > 0, from {1.0 / LARGEST:g} to {LARGEST:g}"),
     "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1", includes_high=False),
     "threshold": _AMOUNT,
 }
+
+#: Own units of numbers that are no parameters of a sweep.
+_UNITS_OF_OTHERS = {"displacement": "m", "threshold": "m", "maximum_amplitude": "m s-2", "g": "m s-2", "interval": "s"}
+
+#: Gravity of the models by default, m/s²: the value that reproduces the paper's tables.
+GRAVITY = 9.81
 
 #: Steps a cycle when none are asked for: the trapezoid's median error is then 1e-5 (docs/speed.md).
 STEPS_PER_CYCLE = 1024
@@ -99,8 +108,11 @@ def shown(value: Any) -> str:
     """A value as an error shows it: one line, and not a long one."""
     import numpy as np
 
-    with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
-        text = " ".join(repr(value).split())
+    try:
+        with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
+            text = " ".join(repr(value).split())
+    except ValueError:  # Python writes no integer of thousands of digits
+        return "an integer of thousands of digits"
     return text if len(text) <= 160 else f"{text[:157]}..."
 
 
@@ -114,8 +126,6 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     """
     import numpy as np
 
-    if type(values) is float:  # as most are, and none needs what follows
-        return np.asarray(values)
     array: Any = computed(values)
     among = array if isinstance(array, (list, tuple)) else [array]
     masked = sum(int(np.ma.count_masked(one)) for one in among if isinstance(one, np.ma.MaskedArray))
@@ -163,20 +173,59 @@ def check_finite(key: str, value: Any) -> float:
     return float(number)
 
 
-def check_values(name: str, values: Any, key: str | None = None) -> NDArray[np.float64]:
+def check_values(name: str, values: Any, key: str | None = None, g: float = GRAVITY) -> NDArray[np.float64]:
     """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors.
+
+    What brings a unit (a pint Quantity, an array of xarray with the attribute `units`) is converted to the parameter's
+    own; "g" is `g` m/s².
 
     Raises
     ------
     InputError
         Naming the parameter, the first value that is not allowed, and what is.
     """
-    array = check_numbers(key or name, values)
+    own = PARAMETERS[name]["units"] if name in PARAMETERS else _UNITS_OF_OTHERS.get(name)
+    array = check_numbers(key or name, values if own is None else without_unit(key or name, own, values, g))
     bound = BOUNDS[name]
     wrong = ~bound.holds(array)
     if wrong.any():
         raise InputError(f"{key or name} = {number_text(float(array[wrong].flat[0]))}: must be {bound.text}")
     return array
+
+
+def friction_coefficient(phi: Any) -> Any:
+    """Static friction coefficient mu_s = tan phi of a friction angle, degrees: wherever `phi` is an input.
+
+    It lies along the dimensions of a DataArray or Variable, or along the dimension "phi"; but for a Variable it has the
+    angles as its coordinate "phi".  InputError: angles that are not allowed, or dimensions that have no name.
+
+    Examples
+    --------
+    >>> friction_coefficient([20.0, 45.0]).values.round(3).tolist()
+    [0.364, 1.0]
+    """
+    import numpy as np
+    import xarray as xr
+
+    values = check_values("phi", phi)
+    tangents = np.tan(np.radians(values))
+    if isinstance(phi, xr.Variable):
+        return xr.Variable(phi.dims, tangents)
+    if values.ndim > 1 and not isinstance(phi, xr.DataArray):
+        raise InputError(f"phi: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray")
+    dims = phi.dims if isinstance(phi, xr.DataArray) else ("phi",) * values.ndim
+    coords = dict(phi.coords) if isinstance(phi, xr.DataArray) else {}
+    return xr.DataArray(tangents, coords | {"phi": (dims, values, PARAMETERS["phi"])}, dims)
+
+
+def with_friction_coefficient(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters in which `mu_s` = tan phi stands in place of `phi` (InputError: both are given); None is not given."""
+    given = {name: value for name, value in parameters.items() if name != "phi"}
+    if parameters.get("phi") is None:
+        return given
+    if given.get("mu_s") is not None:
+        raise InputError("phi, mu_s: must not both be given; mu_s = tan(phi)")
+    return given | {"mu_s": friction_coefficient(parameters["phi"])}
 
 
 def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:
@@ -212,29 +261,24 @@ def check_list(key: str, values: Any, what: str) -> list[Any]:
     raise InputError(f"{key} = {shown(values)}: must be a list of {what}")
 
 
-def check_progress(progress: Any) -> Callable[[int], None] | None:
-    """Return what is to be told of progress, if it can be called."""
+def check_progress(progress: Any) -> Any:
+    """Return the function that is called with numbers of cells as they are solved, if there is one."""
     if progress is not None and not callable(progress):
         raise InputError(f"progress = {shown(progress)}: must be a function of a number of cells")
-    told: Callable[[int], None] | None = progress
-    return told
+    return progress
 
 
 def check_whole(name: str, value: Any, least: int, most: int | None = None, multiple_of: int = 1) -> int:
     """Return `value` as an int if it is a whole number from `least` to `most`, and a multiple of `multiple_of`."""
     kind = "a whole number" if multiple_of == 1 else f"a multiple of {multiple_of}"
-    if isinstance(value, int) and not isinstance(value, bool):
-        whole = value  # which may have more digits than a double
-    else:
-        try:
-            number = check_finite(name, value)
-        except InputError:
-            number = math.nan
-        if not number.is_integer():
-            raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
-        whole = int(number)
-    if whole < least or whole % multiple_of:
+    # an integer may have more digits than a double
+    is_integer = isinstance(value, int) and not isinstance(value, bool)
+    try:
+        number = value if is_integer else check_finite(name, value)
+    except InputError:
+        number = math.nan
+    if not number >= least or number % multiple_of or number % 1:
         raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
-    if most is not None and whole > most:
+    if most is not None and number > most:
         raise InputError(f"{name} = {shown(value)}: must be {kind} <= {most}")
-    return whole
+    return int(number)

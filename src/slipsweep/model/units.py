@@ -2,6 +2,7 @@
 
 import json
 import re
+from typing import Any
 
 from slipsweep.errors import InputError
 from slipsweep.model.variables import PARAMETERS
@@ -14,11 +15,12 @@ _OWN_UNITS = {
     "m": ("m",),
     "m s-1": ("m s-1", "m/s"),
     "s": ("s",),
-    "1": ("1",),
+    "1": ("1", "dimensionless"),
 }
 
 #: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
 _FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
+_LONGEST = 60
 _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
 
 
@@ -36,13 +38,13 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
     """Return what to multiply a number in `units` by, to have it in the unit `own`; as `unit_factor`."""
     if units is None or units in _OWN_UNITS.get(own, (own,)):
         return 1.0
-    if own == "m s-2" and units == "g":
-        return g
+    if own == "m s-2" and units in ("g", "gal", "Gal"):  # a gallon, to pint
+        return g if units == "g" else 0.01
 
     refusal = InputError(f"{key} = {show(units)}: must be a unit that converts to {own}")
     # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
     text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
-    if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
+    if own == "1" or len(text) > _LONGEST or not _UNIT_GRAMMAR.fullmatch(text):
         raise refusal
 
     import pint  # only here: it takes 0.2 s to import
@@ -63,24 +65,38 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
         raise refusal from None
 
 
-def quantity(key: str, text: str, parameter: str, g: float) -> float:
-    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit.
+def without_unit(key: str, own: str, values: Any, g: float) -> Any:
+    """Return what brings a unit, a pint Quantity or an array of xarray with the attribute `units`, in the unit `own`.
 
-    Parameters
-    ----------
-    key : str
-        What to call it in errors.
-    text : str
-        A number and, unless it is in the parameter's own unit, a unit as in the axes of sweep files.
-    parameter : str
-        A parameter (`slipsweep.model.variables.PARAMETERS`) of the same unit.
-    g : float
-        What "g" as a unit of acceleration stands for, m/s².
+    Other values are returned as they are; "g" is `g` m/s².
 
     Raises
     ------
     InputError
-        It is not a number, or its unit does not convert.
+        Its unit does not convert.
+
+    Examples
+    --------
+    >>> import pint
+    >>> without_unit("amplitude", "m s-2", pint.Quantity(0.5, "standard_gravity"), 9.81)
+    4.903325
+    """
+    data = getattr(values, "data", values) if hasattr(values, "dims") else values
+    if hasattr(data, "magnitude") and hasattr(data, "units"):
+        units: Any = re.sub(r"\s*(/|\*+)\s*", r"\1", f"{data.units:D}")  # long names: "g" would be a gram
+        values = values.copy(data=data.magnitude) if hasattr(values, "dims") else data.magnitude
+    else:
+        units = getattr(values, "attrs", {}).get("units")
+    if not units:
+        return values
+    factor = conversion(f"{key}: units", own, str(units), g)
+    return values if factor == 1.0 else values * factor
+
+
+def quantity(key: str, text: str, parameter: str, g: float) -> float:
+    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit (InputError: it is none).
+
+    `key` is what it is called in errors, `g` what "g" as a unit of acceleration stands for, m/s².
     """
     return quantity_in(key, text, PARAMETERS[parameter]["units"], g)
 
@@ -99,5 +115,8 @@ def quantity_in(key: str, text: str, own: str, g: float) -> float:
 
 def show(value: object) -> str:
     """Write a value as TOML would, on one line of bearable length."""
-    text = json.dumps(value, ensure_ascii=False, default=str)
+    try:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except ValueError:  # Python writes no integer of thousands of digits
+        return "an integer of thousands of digits"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -19,17 +19,11 @@ REFERENCE = (
 class SlidingMode(IntEnum):
     """Sliding mode of a cell.
 
-    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of the paper [1]_.
+    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of the paper.
 
     See Also
     --------
     Validity : what else is to be known of a cell
-
-    References
-    ----------
-    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
-       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
-       https://doi.org/10.1016/j.soildyn.2011.08.007
 
     Examples
     --------
@@ -125,13 +119,8 @@ MAXIMUM_AMPLITUDE_IN_G = 5.0
 
 #: What each flag says of the value: there is none (NaN, and sliding mode missing); there is one, but an assumption
 #: behind it is broken; there is one, and it is sound.
-FLAG_KINDS: dict[Validity, FlagKind] = {
-    Validity.STATICALLY_UNSTABLE: FlagKind.NO_VALUE,
-    Validity.UPLIFT: FlagKind.NO_VALUE,
-    Validity.LIMIT_UNDEFINED: FlagKind.NO_VALUE,
-    Validity.FRICTION_NOT_DECAYING: FlagKind.NO_VALUE,
+FLAG_KINDS: dict[Validity, FlagKind] = dict.fromkeys(Validity, FlagKind.NO_VALUE) | {
     Validity.YIELD_GOVERNS: FlagKind.NOTE,
-    Validity.KD_NOT_POSITIVE: FlagKind.NO_VALUE,
     Validity.NOT_RECOUPLED: FlagKind.CAUTION,
     Validity.FLEXIBLE_BLOCK: FlagKind.CAUTION,
     Validity.UPSLOPE: FlagKind.CAUTION,
@@ -160,8 +149,8 @@ VALIDITY_TEXT: dict[Validity, str] = {
     Validity.UPLIFT: "A tan(theta) >= g: the block loses contact within the cycle",
     Validity.LIMIT_UNDEFINED: "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit",
     Validity.FRICTION_NOT_DECAYING: "calibrated decay rate <= 0 (mu_s xi^2 >= 1)",
-    Validity.YIELD_GOVERNS: "with the monotone rise the block slides at constant yield acceleration, as "
-    "Newmark's; the result does not depend on lambda",
+    Validity.YIELD_GOVERNS: "the yield acceleration governs: the result is that of Newmark's block and does not depend "
+    "on lambda",
     Validity.KD_NOT_POSITIVE: "literal rise: Kd <= 0, Eq. 12 cannot stop the block",
     Validity.NOT_RECOUPLED: "does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable",
     Validity.FLEXIBLE_BLOCK: "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold",
@@ -170,51 +159,58 @@ VALIDITY_TEXT: dict[Validity, str] = {
     Validity.FRICTION_ESTIMATED: "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11",
 }
 
-#: Dimensions of a result, in order; further ones follow.
-DIMENSION_ORDER = (
-    "theta",
-    "mu_s",
-    "amplitude",
-    "displacement_amplitude",
-    "frequency",
-    "yield_acceleration",
-    "yield_coefficient",
-    "decay_rate",
-    "delta_mu",
-    "minimum_friction",
-    "structure_frequency",
-    "scale",
-    "pgv",
-    "arias_intensity",
-    "time_scale",
-    "polarity",
-    "azimuth",
-    "motion",
+
+def _described(units: str, long_name: str, ancillary: str | None = None, **more: str) -> dict[str, Any]:
+    """CF attributes of a variable."""
+    about = {"units": units, "long_name": long_name}
+    return about | ({"ancillary_variables": ancillary} if ancillary else {}) | more
+
+
+def _coded(long_name: str, codes: type[IntEnum], ancillary: str | None = None) -> dict[str, Any]:
+    """CF attributes of a variable of codes; one below 0 is that of a missing value."""
+    known = [code for code in codes if code >= 0]
+    return {
+        "long_name": long_name,
+        "flag_values": [int(code) for code in known],
+        "flag_meanings": " ".join(code.name.lower() for code in known),
+        **({"ancillary_variables": ancillary} if ancillary else {}),
+    }
+
+
+#: Which way u is measured.
+_DIRECTION = (
+    "of the block relative to the base, in the direction of the base's acceleration: horizontal where that is; by "
+    "statics the distance along the plane is that of Newmark's block times cos(phi - theta) / cos(phi), mu_s = tan(phi)"
 )
 
-#: Inputs: attributes of their coordinates.
+
+#: Inputs: attributes of their coordinates, in the order of the dimensions of a result.
 PARAMETERS: dict[str, dict[str, Any]] = {
-    "theta": {"units": "degree", "long_name": "plane inclination"},
-    "mu_s": {"units": "1", "long_name": "static friction coefficient"},
-    "amplitude": {"units": "m s-2", "long_name": "peak ground acceleration"},
-    "displacement_amplitude": {"units": "m", "long_name": "peak ground displacement"},
-    "frequency": {"units": "Hz", "long_name": "excitation frequency"},
-    "yield_acceleration": {"units": "m s-2", "long_name": "yield acceleration"},
-    "yield_coefficient": {"units": "1", "long_name": "yield coefficient, yield acceleration over g"},
-    "decay_rate": {"units": "1", "long_name": "friction decay with loading rate"},
-    "delta_mu": {"units": "1", "long_name": "friction above static"},
-    "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient"},
-    "structure_frequency": {"units": "Hz", "long_name": "natural frequency of the structure"},
-    "scale": {"units": "1", "long_name": "scale factor of the recorded acceleration"},
-    "pgv": {"units": "m s-1", "long_name": "peak ground velocity that motions are scaled to"},
-    "arias_intensity": {"units": "m s-1", "long_name": "Arias intensity that motions are scaled to"},
-    "time_scale": {"units": "1", "long_name": "factor on the time of the record"},
-    "polarity": {"units": "1", "long_name": "sign that the recorded acceleration is taken with"},
-    "azimuth": {"units": "degree", "long_name": "downslope direction, from the first component to the second"},
+    "theta": _described("degree", "base inclination"),
+    "mu_s": _described("1", "static friction coefficient"),
+    "phi": _described("degree", "friction angle of the interface"),
+    "amplitude": _described("m s-2", "peak ground acceleration"),
+    "displacement_amplitude": _described("m", "peak ground displacement"),
+    "frequency": _described("Hz", "excitation frequency"),
+    "yield_acceleration": _described("m s-2", "yield acceleration"),
+    "yield_coefficient": _described("1", "yield coefficient, yield acceleration over g"),
+    "decay_rate": _described("1", "friction decay with loading rate"),
+    "delta_mu": _described("1", "friction above static"),
+    "minimum_friction": _described("1", "minimum friction coefficient"),
+    "structure_frequency": _described("Hz", "natural frequency of the structure"),
+    "scale": _described("1", "scale factor of the recorded acceleration"),
+    "pgv": _described("m s-1", "peak ground velocity that motions are scaled to"),
+    "arias_intensity": _described("m s-1", "Arias intensity that motions are scaled to"),
+    "time_scale": _described("1", "factor on the time of the record"),
+    "polarity": _described("1", "sign that the recorded acceleration is taken with"),
+    "azimuth": _described("degree", "downslope direction, from the first component to the second"),
 }
 
+#: Dimensions of a result, in order; further ones follow.
+DIMENSION_ORDER = (*PARAMETERS, "motion")
+
 #: Inputs of the interface, in place of which Newmark's block may have its yield coefficient alone.
-INTERFACE_INPUTS = ("theta", "mu_s", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
+INTERFACE_INPUTS = ("theta", "mu_s", "phi", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
 
 #: Inputs that the shaking has if it is a waveform, and if it is a record.
 WAVEFORM_INPUTS = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
@@ -232,38 +228,23 @@ DRAWN = (
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
-    "permanent_displacement": {
-        "units": "m",
-        "long_name": "permanent displacement, downslope",
-        "ancillary_variables": "validity",
-    },
-    "peak_relative_velocity": {
-        "units": "m s-1",
-        "long_name": "largest downslope relative velocity",
-        "ancillary_variables": "validity",
-    },
-    "sliding_mode": {
-        "long_name": "sliding mode",
-        "flag_values": [int(mode) for mode in SlidingMode if mode is not SlidingMode.MISSING],
-        "flag_meanings": " ".join(mode.name.lower() for mode in SlidingMode if mode is not SlidingMode.MISSING),
-        "ancillary_variables": "validity",
-    },
+    "permanent_displacement": _described("m", "permanent displacement, downslope", "validity", comment=_DIRECTION),
+    "peak_relative_velocity": _described("m s-1", "largest downslope relative velocity", "validity"),
+    "sliding_mode": _coded("sliding mode", SlidingMode, "validity"),
     "validity": {
-        "long_name": "validity flags; 0 = no flag raised (says nothing about lambda or Uy)",
+        "long_name": "validity flags; 0 = no flag raised",
         "flag_masks": [int(flag) for flag in Validity],
         "flag_meanings": " ".join((flag.name or "").lower() for flag in Validity),
     },
-    "newmark_displacement": {
-        "units": "m",
-        "long_name": "permanent displacement of Newmark's block, downslope",
-        "ancillary_variables": "validity",
-    },
-    "yield_acceleration": {"units": "m s-2", "long_name": "yield acceleration"},
-    "limiting_acceleration": {"units": "m s-2", "long_name": "limiting acceleration (Eq. 7)"},
-    "acceleration_ratio": {"units": "1", "long_name": "peak ground over limiting acceleration"},
-    "minimum_friction": {"units": "1", "long_name": "minimum friction coefficient (Eq. 9)"},
-    "delta_mu": {"units": "1", "long_name": "friction above static (Eqs. 10, 11)"},
-    "decay_rate": {"units": "1", "long_name": "friction decay with loading rate (Eq. 6 at the peak)"},
+    "newmark_displacement": _described(
+        "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
+    ),
+    "yield_acceleration": _described("m s-2", "yield acceleration"),
+    "limiting_acceleration": _described("m s-2", "limiting acceleration (Eq. 7)"),
+    "acceleration_ratio": _described("1", "peak ground over limiting acceleration"),
+    "minimum_friction": _described("1", "minimum friction coefficient (Eq. 9)"),
+    "delta_mu": _described("1", "friction above static (Eqs. 10, 11)"),
+    "decay_rate": _described("1", "friction decay with loading rate (Eq. 6 at the peak)"),
     # where the displacement amplitude and the frequency span a grid; elsewhere it is a coordinate
     "amplitude": PARAMETERS["amplitude"],
 }
@@ -273,40 +254,18 @@ TOLERABLE_DISPLACEMENT: dict[str, Any] = {"units": "m", "long_name": "tolerable 
 
 #: Results of `limit_amplitude`; sliding mode and validity go with them.
 LIMIT_RESULTS: dict[str, dict[str, Any]] = {
-    "limit_amplitude": {
-        "units": "m s-2",
-        "long_name": "smallest peak ground acceleration that reaches the tolerable displacement",
-        "ancillary_variables": "limit_status",
-    },
-    "limit_status": {
-        "long_name": "how the limit amplitude was found",
-        "flag_values": [int(status) for status in LimitStatus],
-        "flag_meanings": " ".join(status.name.lower() for status in LimitStatus),
-    },
-    "permanent_displacement": {
-        "units": "m",
-        "long_name": "permanent displacement, downslope, at the limit amplitude",
-        "ancillary_variables": "validity",
-    },
+    "limit_amplitude": _described(
+        "m s-2", "smallest peak ground acceleration that reaches the tolerable displacement", "limit_status"
+    ),
+    "limit_status": _coded("how the limit amplitude was found", LimitStatus),
+    "permanent_displacement": _described("m", "permanent displacement, downslope, at the limit amplitude", "validity"),
 }
 
-#: Results of a record, beside the displacement, the velocity and the validity: -1 where there is no value.
+#: Results of a record, further to the displacement, the velocity and the validity: -1 where there is no value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
-    "number_of_slips": {
-        "units": "1",
-        "long_name": "number of slips that begin at rest",
-        "ancillary_variables": "validity",
-    },
-    "stick_slip_pulses": {
-        "units": "1",
-        "long_name": "number of pulses in stick-slip mode",
-        "ancillary_variables": "validity",
-    },
-    "continuous_pulses": {
-        "units": "1",
-        "long_name": "number of pulses in continuous mode",
-        "ancillary_variables": "validity",
-    },
+    "number_of_slips": _described("1", "number of slips that begin at rest", "validity"),
+    "stick_slip_pulses": _described("1", "number of pulses in stick-slip mode", "validity"),
+    "continuous_pulses": _described("1", "number of pulses in continuous mode", "validity"),
 }
 
 #: Results of a sweep under a record.
@@ -316,26 +275,26 @@ RECORD_RESULTS: dict[str, dict[str, Any]] = {
     **RECORD_COUNTS,
     "validity": RESULTS["validity"],
     "newmark_displacement": RESULTS["newmark_displacement"],
-    "motion_factor": {"units": "1", "long_name": "factor on the recorded acceleration"},
+    "motion_factor": _described("1", "factor on the recorded acceleration"),
 }
 
 #: Intensity measures of a motion as it was recorded (`slipsweep.motion.intensity`).
 INTENSITY_MEASURES: dict[str, dict[str, Any]] = {
-    "pga": {"units": "m s-2", "long_name": "peak ground acceleration as recorded"},
-    "pgv": {"units": "m s-1", "long_name": "peak ground velocity as recorded"},
-    "pgd": {"units": "m", "long_name": "peak ground displacement as recorded"},
-    "arias_intensity": {"units": "m s-1", "long_name": "Arias intensity as recorded"},
-    "cav": {"units": "m s-1", "long_name": "cumulative absolute velocity as recorded"},
-    "significant_duration": {"units": "s", "long_name": "significant duration, 5 to 95 % of the Arias intensity"},
-    "mean_period": {"units": "s", "long_name": "mean period, 0.25 to 20 Hz"},
+    "pga": _described("m s-2", "peak ground acceleration as recorded"),
+    "pgv": _described("m s-1", "peak ground velocity as recorded"),
+    "pgd": _described("m", "peak ground displacement as recorded"),
+    "arias_intensity": _described("m s-1", "Arias intensity as recorded"),
+    "cav": _described("m s-1", "cumulative absolute velocity as recorded"),
+    "significant_duration": _described("s", "significant duration, 5 to 95 % of the Arias intensity"),
+    "mean_period": _described("s", "mean period, 0.25 to 20 Hz"),
 }
 
-#: Coordinates of a suite along `motion`, beside it.
+#: Further coordinates of a suite along `motion`.
 MOTION_COORDINATES: dict[str, dict[str, Any]] = {
     "motion_file": {"long_name": "file of the motion"},
     "motion_sha256": {"long_name": "SHA-256 of the file of the motion"},
-    "motion_samples": {"units": "1", "long_name": "samples of the motion"},
-    "motion_interval": {"units": "s", "long_name": "mean sampling interval of the motion"},
+    "motion_samples": _described("1", "samples of the motion"),
+    "motion_interval": _described("s", "mean sampling interval of the motion"),
     **{f"motion_{name}": about for name, about in INTENSITY_MEASURES.items()},
 }
 
@@ -347,22 +306,17 @@ MOTION: dict[str, Any] = {"long_name": "recorded motion"}
 
 #: The record itself, in the files of results: what is read back to repeat a run.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {
-    "record_time": {"units": "s", "long_name": "time of a sample of the record"},
-    "record_acceleration": {
-        "units": "m s-2",
-        "long_name": "recorded acceleration of the plane, at scale and polarity 1",
-        "coordinates": "record_time",
-    },
+    "record_time": _described("s", "time of a sample of the record"),
+    "record_acceleration": _described(
+        "m s-2", "recorded acceleration of the base, at scale and polarity 1", coordinates="record_time"
+    ),
 }
 
-#: Coordinates of the statistics of `sample`, beside the parameters.
+#: Coordinates of the statistics of `sample`, further to the parameters.
 STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
-    "quantile": {"units": "1", "long_name": "share of the samples with a value that lies below"},
-    "threshold": {"units": "m", "long_name": "displacement to exceed"},
-    "mode": {
-        "units": "1",
-        **{name: RESULTS["sliding_mode"][name] for name in ("long_name", "flag_values", "flag_meanings")},
-    },
+    "quantile": _described("1", "share of the samples with a value that lies below"),
+    "threshold": _described("m", "displacement to exceed"),
+    "mode": {"units": "1", **_coded("sliding mode", SlidingMode)},
     "flag": {
         "units": "1",
         "long_name": "flag of the validity",
@@ -370,92 +324,55 @@ STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
         "flag_meanings": RESULTS["validity"]["flag_meanings"],
     },
     "input": {"long_name": "uncertain input; inputs that are correlated are one, with + between them"},
-    "bound": {"units": "1", "long_name": "probability below an end of an interval"},
+    "bound": _described("1", "probability below an end of an interval"),
 }
 
 #: Statistics of `sample`.  Quantiles and mean are of the samples that have a value; probabilities also count the
 #: statically unstable samples, as exceeding every threshold.
 STATISTICS: dict[str, dict[str, Any]] = {
-    "displacement_quantile": {
-        "units": "m",
-        "long_name": "quantile of the permanent displacement",
-        "ancillary_variables": "valueless_share",
-    },
-    "mean_displacement": {
-        "units": "m",
-        "long_name": "mean permanent displacement",
-        "ancillary_variables": "valueless_share",
-    },
-    "exceedance_probability": {
-        "units": "1",
-        "long_name": "probability that the permanent displacement exceeds a threshold",
-        "ancillary_variables": "valueless_share",
-    },
-    "mode_share": {"units": "1", "long_name": "share of the samples in a sliding mode"},
-    "flag_share": {"units": "1", "long_name": "share of the samples with a flag"},
-    "valueless_share": {"units": "1", "long_name": "share of the samples without a value"},
-    "first_order_index": {
-        "units": "1",
-        "long_name": "first-order Sobol index of the permanent displacement",
-        "ancillary_variables": "sensitivity_status",
-    },
-    "first_order_interval": {
-        "units": "1",
-        "long_name": "95 % interval of the first-order Sobol index",
-        "ancillary_variables": "sensitivity_status",
-    },
-    "total_index": {
-        "units": "1",
-        "long_name": "total Sobol index of the permanent displacement",
-        "ancillary_variables": "sensitivity_status",
-    },
-    "total_interval": {
-        "units": "1",
-        "long_name": "95 % interval of the total Sobol index",
-        "ancillary_variables": "sensitivity_status",
-    },
-    "sensitivity_status": {
-        "long_name": "whether there are Sobol indices, or why there are none",
-        "flag_values": [int(status) for status in SensitivityStatus],
-        "flag_meanings": " ".join(status.name.lower() for status in SensitivityStatus),
-    },
+    "displacement_quantile": _described("m", "quantile of the permanent displacement", "valueless_share"),
+    "mean_displacement": _described("m", "mean permanent displacement", "valueless_share"),
+    "exceedance_probability": _described(
+        "1", "probability that the permanent displacement exceeds a threshold", "valueless_share"
+    ),
+    "mode_share": _described("1", "share of the samples in a sliding mode"),
+    "flag_share": _described("1", "share of the samples with a flag"),
+    "valueless_share": _described("1", "share of the samples without a value"),
+    "first_order_index": _described("1", "first-order Sobol index of the permanent displacement", "sensitivity_status"),
+    "first_order_interval": _described("1", "95 % interval of the first-order Sobol index", "sensitivity_status"),
+    "total_index": _described("1", "total Sobol index of the permanent displacement", "sensitivity_status"),
+    "total_interval": _described("1", "95 % interval of the total Sobol index", "sensitivity_status"),
+    "sensitivity_status": _coded("whether there are Sobol indices, or why there are none", SensitivityStatus),
 }
 
 #: Statistics over the motions of a suite; all but counts and shares are of the motions that have a value.
 SUITE_STATISTICS: dict[str, dict[str, Any]] = {
-    "value_count": {"units": "1", "long_name": "number of motions with a value"},
-    "valueless_count": {"units": "1", "long_name": "number of motions without a value"},
-    "valueless_flag_count": {"units": "1", "long_name": "number of motions without a value that have a flag"},
-    "valueless_share": {"units": "1", "long_name": "share of the motions without a value"},
-    **{
-        name: {"units": units, "long_name": text, "ancillary_variables": "valueless_share"}
-        for name, units, text in (
-            ("zero_probability", "1", "probability of zero permanent displacement"),
-            ("nonzero_median", "m", "median of the non-zero permanent displacements"),
-            ("nonzero_geometric_mean", "m", "geometric mean of the non-zero permanent displacements"),
-            ("log_standard_deviation", "1", "standard deviation of ln u of the non-zero permanent displacements u"),
-            ("displacement_quantile", "m", "quantile of the permanent displacement"),
-        )
-    },
+    "value_count": _described("1", "number of motions with a value"),
+    "valueless_count": _described("1", "number of motions without a value"),
+    "valueless_flag_count": _described("1", "number of motions without a value that have a flag"),
+    "valueless_share": _described("1", "share of the motions without a value"),
+    "zero_probability": _described("1", "probability of zero permanent displacement", "valueless_share"),
+    "nonzero_median": _described("m", "median of the non-zero permanent displacements", "valueless_share"),
+    "nonzero_geometric_mean": _described(
+        "m", "geometric mean of the non-zero permanent displacements", "valueless_share"
+    ),
+    "log_standard_deviation": _described(
+        "1", "standard deviation of ln u of the non-zero permanent displacements u", "valueless_share"
+    ),
+    "displacement_quantile": STATISTICS["displacement_quantile"],
     "exceedance_probability": STATISTICS["exceedance_probability"],
 }
 
 #: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the grid's amplitudes.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
-    "annual_rate": {
-        "units": "year-1",
-        "long_name": "mean annual rate of exceeding a permanent displacement",
-        "ancillary_variables": "held_rate omitted_rate valueless_share",
-    },
-    "held_rate": {
-        "units": "year-1",
-        "long_name": "part of it above the largest amplitude, where the probability is held constant",
-    },
-    "omitted_rate": {
-        "units": "year-1",
-        "long_name": "upper bound of the part below the smallest amplitude, where the probability is taken as 0",
-    },
-    "valueless_share": {"units": "1", "long_name": "largest share of the motions without a value at any amplitude"},
+    "annual_rate": _described(
+        "year-1", "mean annual rate of exceeding a permanent displacement", "held_rate omitted_rate valueless_share"
+    ),
+    "held_rate": _described("year-1", "part of it above the largest amplitude, where the probability is held constant"),
+    "omitted_rate": _described(
+        "year-1", "upper bound of the part below the smallest amplitude, where the probability is taken as 0"
+    ),
+    "valueless_share": _described("1", "largest share of the motions without a value at any amplitude"),
 }
 
 #: dtype of each result; everything else is float64.
@@ -468,73 +385,63 @@ RESULT_DTYPES: dict[str, str] = {
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }
 
-#: What `sweep` returns when nothing is asked for by name.
+#: What `sweep` returns where no variables are named.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 DEFAULT_RECORD_RESULTS = ("permanent_displacement", "peak_relative_velocity", *RECORD_COUNTS, "validity")
 DEFAULT_SUITE_RESULTS = (*DEFAULT_RECORD_RESULTS, "motion_factor")
 
 #: The parameters of Eqs. 7-11.
 FRICTION_PARAMETERS = (
-    "yield_acceleration",
-    "limiting_acceleration",
-    "acceleration_ratio",
-    "minimum_friction",
-    "delta_mu",
-    "decay_rate",
-)
+    "yield_acceleration", "limiting_acceleration", "acceleration_ratio", "minimum_friction", "delta_mu", "decay_rate",
+)  # fmt: skip
 
 #: Variables of a time history.
 HISTORY: dict[str, dict[str, Any]] = {
-    "ground_acceleration": {"units": "m s-2", "long_name": "acceleration of the plane"},
-    "block_acceleration": {"units": "m s-2", "long_name": "acceleration of the block"},
-    "friction_coefficient": {"units": "1", "long_name": "instantaneous friction coefficient"},
-    "relative_velocity": {"units": "m s-1", "long_name": "relative velocity of the block"},
-    "relative_displacement": {"units": "m", "long_name": "relative displacement of the block"},
+    "ground_acceleration": _described("m s-2", "acceleration of the base"),
+    "block_acceleration": _described("m s-2", "acceleration of the block"),
+    "friction_coefficient": _described("1", "instantaneous friction coefficient"),
+    "relative_velocity": _described("m s-1", "relative velocity of the block"),
+    "relative_displacement": _described("m", "relative displacement of the block", comment=_DIRECTION),
 }
 
 #: The positive half waves of the record that a time history is of, along `half_wave`.
 HALF_WAVES: dict[str, dict[str, Any]] = {
-    "half_wave_start": {"units": "s", "long_name": "time at which the acceleration of the plane rises through zero"},
-    "half_wave_end": {"units": "s", "long_name": "time at which it falls through zero"},
-    "half_wave_peak": {"units": "m s-2", "long_name": "largest acceleration of the plane between"},
-    "half_wave_mode": {
-        "long_name": "sliding mode that the peak decides; stuck where it does not exceed the yield acceleration",
-        **{name: RESULTS["sliding_mode"][name] for name in ("flag_values", "flag_meanings")},
-    },
+    "half_wave_start": _described("s", "time at which the acceleration of the base rises through zero"),
+    "half_wave_end": _described("s", "time at which it falls through zero"),
+    "half_wave_peak": _described("m s-2", "largest acceleration of the base between"),
+    "half_wave_mode": _coded(
+        "sliding mode that the peak decides; stuck where it does not exceed the yield acceleration", SlidingMode
+    ),
 }
 
 #: What Eq. 1 makes of a test on a shaking table, along time.
 MEASURED_FRICTION: dict[str, dict[str, Any]] = {
-    "friction_coefficient": {"units": "1", "long_name": "friction coefficient by Eq. 1"},
-    "friction_ratio": {"units": "1", "long_name": "friction coefficient by Eq. 1 over the static one"},
+    "friction_coefficient": _described("1", "friction coefficient by Eq. 1"),
+    "friction_ratio": _described("1", "friction coefficient by Eq. 1 over the static one"),
 }
 
 #: The slides that a test shows.
 SLIDES: dict[str, dict[str, Any]] = {
-    "slide_onset": {"units": "s", "long_name": "time at which a slide begins"},
-    "slide_peak": {"units": "s", "long_name": "time of the largest table acceleration within a slide"},
-    "slide_stop": {"units": "s", "long_name": "time at which a slide stops; missing where the record ends before"},
-    "onset_acceleration": {"units": "m s-2", "long_name": "acceleration of the table where a slide begins"},
-    "peak_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the table within a slide"},
-    "peak_block_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the block within a slide"},
-    "least_friction": {"units": "1", "long_name": "least friction coefficient by Eq. 1 within a slide"},
+    "slide_onset": _described("s", "time at which a slide begins"),
+    "slide_peak": _described("s", "time of the largest table acceleration within a slide"),
+    "slide_stop": _described("s", "time at which a slide stops; missing where the record ends before"),
+    "onset_acceleration": _described("m s-2", "acceleration of the table where a slide begins"),
+    "peak_acceleration": _described("m s-2", "largest acceleration of the table within a slide"),
+    "peak_block_acceleration": _described("m s-2", "largest acceleration of the block within a slide"),
+    "least_friction": _described("1", "least friction coefficient by Eq. 1 within a slide"),
 }
 
 #: Results of `calibrate` that have no other name here.
 CALIBRATION: dict[str, dict[str, Any]] = {
-    "correlation": {"units": "1", "long_name": "correlation of two parameters as estimated"},
-    "cycle_start": {"units": "s", "long_name": "time at which a cycle begins"},
-    "cycle_peak_acceleration": {"units": "m s-2", "long_name": "largest acceleration of the table in a cycle"},
-    "cycle_sliding_mode": {
-        "long_name": "sliding mode of a cycle",
-        **{name: RESULTS["sliding_mode"][name] for name in ("flag_values", "flag_meanings")},
-    },
-    "cycle_attenuation_coefficient": {"units": "1", "long_name": "attenuation coefficient Kd of a cycle (Eq. 12)"},
+    "correlation": _described("1", "correlation of two parameters as estimated"),
+    "cycle_start": _described("s", "time at which a cycle begins"),
+    "cycle_peak_acceleration": _described("m s-2", "largest acceleration of the table in a cycle"),
+    "cycle_sliding_mode": _coded("sliding mode of a cycle", SlidingMode),
+    "cycle_attenuation_coefficient": _described("1", "attenuation coefficient Kd of a cycle (Eq. 12)"),
     **{
-        f"cycle_{name}{suffix}": {
-            "units": PARAMETERS[name]["units"],
-            "long_name": f"{what}{PARAMETERS[name]['long_name']} from a cycle alone",
-        }
+        f"cycle_{name}{suffix}": _described(
+            PARAMETERS[name]["units"], f"{what}{PARAMETERS[name]['long_name']} from a cycle alone"
+        )
         for name in ("yield_acceleration", "decay_rate", "delta_mu")
         for suffix, what in (("", ""), ("_error", "standard error of the "))
     },

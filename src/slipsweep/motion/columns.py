@@ -41,9 +41,9 @@ class Columns:
             yield number, cells
 
     def value(self, number: int, cell: str, what: str) -> float:
-        """A cell of a line as a number (InputError: it is none)."""
+        """A cell of a line as a number, with a decimal point or comma (InputError: it is none)."""
         try:
-            return float(cell)
+            return float(cell if self.separator == "," else cell.replace(",", "."))
         except ValueError:
             raise InputError(f"{self.path}: line {number}: {what} = {shown(cell)}: must be a number") from None
 

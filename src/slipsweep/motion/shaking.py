@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_finite, check_list, check_numbers, shown
+from slipsweep.model.parameters import check_choice, check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.columns import columns_of, words_and_unit
-from slipsweep.motion.records import STANDARD_GRAVITY, UNITS, read_lines
+from slipsweep.motion.formats import read_lines
+from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
+from slipsweep.motion.records import check_finite_samples, check_increasing
 
 Floats = NDArray[np.float64]
 
@@ -72,16 +74,12 @@ class ShakingTest:
 
     def __post_init__(self) -> None:
         for channel in self.channels:
-            if channel not in CHANNELS:
-                raise InputError(f"{self.name}: {channel}: must be one of {', '.join(CHANNELS)}")
+            check_choice(f"{self.name}: channel", channel, CHANNELS)
         if TABLE not in self.channels:
             raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
         times = check_numbers(f"{self.name}: time", self.times)
-        kept = {
-            name: check_numbers(f"{self.name}: {name}", self.channels[name])
-            for name in CHANNELS
-            if name in self.channels
-        }
+        measured = [name for name in CHANNELS if name in self.channels]
+        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in measured}
         for name, values in kept.items():
             if times.ndim != 1 or values.shape != times.shape:
                 raise InputError(f"{self.name}: {name}: {values.shape} samples, where time has {times.shape}")
@@ -89,14 +87,8 @@ class ShakingTest:
                 raise InputError(f"{self.name}: {name}: must be finite numbers, or blank where there is no sample")
         if times.size < FEWEST_SAMPLES:
             raise InputError(f"{self.name}: {times.size} samples: must be at least {FEWEST_SAMPLES}")
-        for what, values in (("time", times), (TABLE, kept[TABLE])):
-            for at in np.flatnonzero(~np.isfinite(values))[:1]:
-                raise InputError(f"{self.name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
-        for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
-            raise InputError(
-                f"{self.name}: time of sample {at + 2} = {times[at + 1]:.15g}: must be greater than "
-                f"{times[at]:.15g}, the time before it"
-            )
+        check_increasing(self.name, times)
+        check_finite_samples(self.name, TABLE, kept[TABLE])
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "channels", kept)
 
@@ -125,26 +117,23 @@ class ShakingTest:
         dict of str to (float, float)
             Of each channel corrected the constant at the first sample, and the slope in a second.
         """
-        lines = check_channels("offset", offset, self.channels), check_channels("drift", drift, self.channels)
+        offset, drift = (check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift)))
         chosen = np.ones(self.times.size, dtype=bool)
         if rest is not None:
-            bounds = check_list("rest", rest, "two times")
+            bounds = [check_finite("rest", one) for one in check_list("rest", rest, "two times")]
             if len(bounds) != 2:
                 raise InputError(f"rest = {shown(rest)}: must be two times, s")
-            first, last = (check_finite("rest", one) for one in bounds)
-            chosen = (self.times >= first) & (self.times <= last)
-            if chosen.sum() < 3:
-                raise InputError(f"rest = {shown(rest)}: {chosen.sum()} samples lie between: must be at least 3")
+            chosen = (self.times >= bounds[0]) & (self.times <= bounds[1])
         channels, removed = dict(self.channels), {}
         since = self.times - self.times[0]
-        for name in (one for one in CHANNELS if one in lines[0] or one in lines[1]):
+        for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
-                raise InputError(f"{name}: {use.sum()} samples to fit its offset to: must be at least 3")
-            terms = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in lines[1] else 0)
-            constant, slope = (*terms.convert().coef, 0.0)[:2]
-            channels[name] = channels[name] - (constant + slope * since)
-            removed[name] = float(constant), float(slope)
+                within = "" if rest is None else f"rest = {shown(rest)}: {use.sum()} samples lie between: "
+                raise InputError(f"{within}{name}: {use.sum()} samples to fit its offset to: must be at least 3")
+            line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
+            channels[name] = channels[name] - line(since)
+            removed[name] = float(line(0.0)), float(line.deriv()(0.0))
         return replace(self, channels=channels), removed
 
 
@@ -194,45 +183,41 @@ def read_test(path: str | Path) -> ShakingTest:
         raise InputError(f"test = {shown(path)}: must be the path of a file, a Dataset or a ShakingTest") from None
     content, lines = read_lines(path, "test")
     file = columns_of(path, lines, "has no line of names and no samples")
-    columns = [_column(path, cell) for cell in file.names]
-    found = [channel for channel, _ in columns if channel is not None]
-    for channel in ("time", *CHANNELS):
-        if found.count(channel) > 1:
-            raise InputError(f"{path}: line {file.number}: {found.count(channel)} columns are {channel}: must be one")
-    for channel in ("time", TABLE):
-        if channel not in found:
+    line = f"{path}: line {file.number}"
+    columns = {}
+    for at, cell in enumerate(file.names):
+        words, unit = words_and_unit(cell)
+        channel = "time" if words & {"time", "t"} else next((one for one in CHANNELS if _names(words, one)), None)
+        if channel is None:
+            continue
+        if channel in columns:
+            raise InputError(f"{line}: 2 columns are {channel}: must be one")
+        if not unit:
+            raise InputError(f"{path}: column {shown(cell)}: must give its unit in brackets, such as (m/s2)")
+        columns[channel] = at, unit_factor(f"{path}: column {cell.strip()}: unit", channel, unit)
+    for channel, what in (("time", "time"), (TABLE, "table acceleration")):
+        if channel not in columns:
             raise InputError(
-                f"{path}: line {file.number}: no column {'time' if channel == 'time' else 'table acceleration'}: must "
-                "name its columns, such as time (s), table acceleration (m/s2), block acceleration (m/s2)"
+                f"{line}: no column {what}: must name its columns, such as time (s), table acceleration (m/s2), "
+                "block acceleration (m/s2)"
             )
-    values = np.full((len(file.body), len(columns)), np.nan)
-    for row, (number, cells) in zip(values, file.rows(), strict=True):
-        for i, (cell, (named, _)) in enumerate(zip(cells, columns, strict=True)):
-            if named is not None and (cell != "" or named in ("time", TABLE)):
-                row[i] = file.value(number, cell, named)
-    read = {channel: factor * values[:, i] for i, (channel, factor) in enumerate(columns) if channel is not None}
-    return ShakingTest(
-        read.pop("time"),
-        read,
-        str(path),
-        {
-            "test": path.name.encode(errors="backslashreplace").decode(),
-            "test_sha256": hashlib.sha256(content).hexdigest(),
-        },
-    )
+    read: dict[str, list[float]] = {channel: [] for channel in columns}
+    for number, cells in file.rows():
+        for channel, (at, factor) in columns.items():
+            is_blank = cells[at] == "" and channel not in ("time", TABLE)
+            read[channel].append(np.nan if is_blank else factor * file.value(number, cells[at], channel))
+    values = {channel: np.array(column) for channel, column in read.items()}
+    attrs = {
+        "test": path.name.encode(errors="backslashreplace").decode(),
+        "test_sha256": hashlib.sha256(content).hexdigest(),
+    }
+    return ShakingTest(values.pop("time"), values, str(path), attrs)
 
 
-def _column(path: Path, cell: str) -> tuple[str | None, float]:
-    """The channel of a column, None of one that is left out, and the factor to its unit."""
-    words, unit = words_and_unit(cell)
-    channel = next((one for one, (first, second) in _NAMES.items() if words & first and words & second), None)
-    if words & {"time", "t"}:
-        channel = "time"
-    if channel is None:
-        return None, 1.0
-    if not unit:
-        raise InputError(f"{path}: column {shown(cell)}: must give its unit in brackets, such as (m/s2)")
-    return channel, unit_factor(f"{path}: column {cell.strip()}: unit", channel, unit)
+def _names(words: set[str], channel: str) -> bool:
+    """Whether the words of a column's name are those of a channel."""
+    first, second = _NAMES[channel]
+    return bool(words & first and words & second)
 
 
 def unit_factor(key: str, channel: str, unit: str) -> float:

@@ -2,10 +2,11 @@
 
 import glob
 import math
-from collections import Counter, deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,16 +18,10 @@ from slipsweep.model.parameters import check_list, check_single, shown
 from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import INTENSITY_MEASURES, MOTION_COORDINATES
 from slipsweep.motion.intensity import intensity_measures
-from slipsweep.motion.reading import Reading
-from slipsweep.motion.records import Record, read_record
+from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
+from slipsweep.motion.records import Record, record_of
 
 Floats = NDArray[np.float64]
-
-#: Files whose damage is told with its reason; of all others there is the name.
-_MOST_REASONS = 20
-
-#: Letters of what a suite may be called after the entries that name its files.
-_LONGEST_NAME = 120
 
 #: Samples of the two components of a pair are at one time if they are nearer than this part of an interval.
 _SAME_TIME = 1e-6
@@ -164,14 +159,14 @@ class Suite:
             raise InputError("motions = []: must hold one motion at least")
         if len({type(motion) for motion in motions}) > 1:
             raise InputError("motions: must be all Records, or all Pairs")
-        labels = tuple(check_list("labels", self.labels, "texts")) or _labels([_path_of(one) for one in motions])
+        labels = tuple(check_list("labels", self.labels, "texts")) or _labels(
+            [Path(_parts(one)[0].name) for one in motions]
+        )
         for label in labels:
             if not isinstance(label, str) or not label.strip() or not label.isprintable():
                 raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
-        twice = [label for label, count in Counter(labels).items() if count > 1]
-        if twice or len(labels) != len(motions):
-            wrong = f"{shown(twice[0])} is there twice" if twice else f"{len(labels)} for {len(motions)} motions"
-            raise InputError(f"labels: {wrong}: must be one for each motion, and all different")
+        if len(labels) != len(motions) or len({*labels}) < len(labels):
+            raise InputError(f"labels = {shown(labels)}: must be one for each of {len(motions)}, and all different")
         if not isinstance(self.name, str):
             raise InputError(f"name = {shown(self.name)}: must be a text")
         object.__setattr__(self, "motions", motions)
@@ -183,7 +178,7 @@ class Suite:
         return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(shown_labels)})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _received, (self.motions, self.labels, self.name)
+        return _same_suite, (self.motions, self.labels, self.name)
 
     def __len__(self) -> int:
         return len(self.motions)
@@ -200,18 +195,13 @@ class Suite:
 
     def index(self, label: str) -> int:
         """The place of a motion (InputError: there is none of that label)."""
-        try:
-            return self._places[label]
-        except KeyError:
-            raise InputError(f"motion = {shown(label)}: not in the suite; {did_you_mean(label, self.labels)}") from None
+        if label not in self.labels:
+            raise InputError(f"motion = {shown(label)}: not in the suite; {did_you_mean(label, self.labels)}")
+        return self.labels.index(label)
 
     def only(self, labels: Sequence[str]) -> "Suite":
         """The suite of some of the motions."""
         return Suite(tuple(self.motions[self.index(label)] for label in labels), tuple(labels), self.name)
-
-    @cached_property
-    def _places(self) -> dict[str, int]:
-        return {label: at for at, label in enumerate(self.labels)}
 
     @property
     def has_pairs(self) -> bool:
@@ -221,17 +211,14 @@ class Suite:
     @property
     def components(self) -> tuple[Record, ...]:
         """All records: the motions, or the components of one after the other."""
-        return tuple(
-            one for motion in self for one in ((motion.first, motion.second) if isinstance(motion, Pair) else (motion,))
-        )
+        return tuple(part for motion in self for part in _parts(motion))
 
     @cached_property
     def duplicates(self) -> tuple[tuple[str, ...], ...]:
         """Labels of motions that have the same samples, such as one file under two names."""
         alike: dict[bytes, list[str]] = {}
         for label, motion in zip(self.labels, self, strict=True):
-            own = (motion.first, motion.second) if isinstance(motion, Pair) else (motion,)
-            samples = b"".join(part.acceleration.tobytes() + part.times.tobytes() for part in own)
+            samples = b"".join(part.acceleration.tobytes() + part.times.tobytes() for part in _parts(motion))
             alike.setdefault(samples, []).append(label)
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
@@ -247,15 +234,15 @@ class Suite:
             ),
         }
         if not self.has_pairs:
-            found |= self.intensities(np.zeros(len(self)))
+            found |= self.intensities(np.arange(len(self)), np.zeros(len(self)))
         return {name: found[name] for name in MOTION_COORDINATES if name in found}
 
-    def intensities(self, azimuth: Floats) -> dict[str, Floats]:
-        """Intensity measures of every motion (along the last dimension) at its azimuths."""
-        found = {f"motion_{name}": np.empty(azimuth.shape) for name in INTENSITY_MEASURES}
-        for place in np.ndindex(azimuth.shape):
-            for name, value in intensity_measures(self.record(place[-1], float(azimuth[place]))).items():
-                found[f"motion_{name}"][place] = value
+    def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
+        """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
+        found = {f"motion_{name}": np.empty(azimuths.shape) for name in INTENSITY_MEASURES}
+        for cell in np.ndindex(azimuths.shape):
+            for name, value in intensity_measures(self.record(int(places[cell]), float(azimuths[cell]))).items():
+                found[f"motion_{name}"][cell] = value
         return found
 
     def record(self, at: int, azimuth: float) -> Record:
@@ -275,29 +262,27 @@ class Suite:
             about["duplicate_motions"] = "; ".join(", ".join(labels) for labels in self.duplicates)
         return about
 
+    def summary(self) -> str:
+        """One line a motion, as `Record.summary`."""
+        return "\n".join(one.summary() for one in self.components)
 
-#: The last suites that other processes have sent: with every chunk comes the same again, and the tables of pieces that
-#: are made of a record are found by which object it is.
-_RECEIVED: deque[Suite] = deque(maxlen=4)
 
-
-def _received(motions: tuple[Motion, ...], labels: tuple[str, ...], name: str) -> Suite:
-    """A suite that was pickled: the one that came before, if it is the same."""
-    suite = Suite(motions, labels, name)
-    for known in tuple(_RECEIVED):
-        if known == suite:
-            return known
-    _RECEIVED.append(suite)
-    return suite
+@lru_cache(maxsize=4)
+def _same_suite(motions: tuple[Motion, ...], labels: tuple[str, ...], name: str) -> Suite:
+    """A suite that was pickled: with every chunk the same comes again, and tables are made once of a record."""
+    return Suite(motions, labels, name)
 
 
 def read_suite(
     paths: Any,
     *,
     pairs: Sequence[str] | None = None,
-    units: str | None = None,
-    baseline: str = "none",
-    format: str = "auto",
+    units: Unit | None = None,
+    interval: float | None = None,
+    baseline: Baseline = "none",
+    gaps: Gaps = "refuse",
+    implausible: Implausible = "refuse",
+    format: Format = "auto",
     channel: int | None = None,
 ) -> Suite:
     """Read a suite of recorded motions.
@@ -312,7 +297,7 @@ def read_suite(
     pairs : (str, str), optional
         Two endings of the files' stems, such as ``("_NS", "_EW")``: files that differ in these alone are the two
         components of one motion, the first ending's at azimuth 0 and the second's at 90 degrees.
-    units, baseline, format, channel
+    units, interval, baseline, gaps, implausible, format, channel
         As `read_record`, for every file.
 
     Returns
@@ -338,157 +323,130 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    return suite_in(Path(), paths, pairs, Reading(units, baseline, format, channel))  # type: ignore[arg-type]
+    reading = Reading(
+        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
+        channel=channel,
+    )  # fmt: skip
+    return suite_in(Path(), paths, pairs, reading)
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
     """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
-    options = reading.options
     sources = _sources(paths, folder)
     if pairs is not None:
         sources = _paired(sources, pairs)
-    files = [one for source in sources for one in (source if isinstance(source, tuple) else (source,))]
+    files = dict.fromkeys(part for source in sources for part in _parts(source) if isinstance(part, Path))
     records, reasons = {}, {}
     for file in files:
-        if isinstance(file, Path) and file not in records:
-            try:
-                records[file] = read_record(file, **options)
-            except InputError as error:
-                reasons[file] = str(error).removeprefix(f"{file}: ")
+        try:
+            records[file] = record_of(file, reading)
+        except InputError as error:
+            reasons[file] = str(error).removeprefix(f"{file}: ")
     if reasons:
-        raise _unreadable(reasons, len({*files}))
+        names = ", ".join(file.name for file in reasons)
+        refused = InputError(f"{len(reasons)} of {len(files)} files cannot be read: {names}")
+        for file, reason in reasons.items():
+            refused.add_note(f"{file}: {reason}")
+        raise refused
+    motions, stems = [], []
+    for source in sources:
+        first, *second = _parts(source)
+        stem = first if isinstance(first, Path) else Path(first.name)
+        if pairs is not None:
+            stem = stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem)
+        stems.append(stem)
+        record = records.get(first, first)
+        motions.append(Pair(record, records.get(second[0], second[0])) if second else record)
+    entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
+    return Suite(tuple(motions), _labels(stems), str(entry) if isinstance(entry, (str, Path)) else "suite")
 
-    def read(file: "Path | Record") -> Record:
-        return file if isinstance(file, Record) else records[file]
 
-    motions = tuple(
-        source if isinstance(source, Pair) else Pair(*map(read, source)) if isinstance(source, tuple) else read(source)
-        for source in sources
-    )
-    named = [source[0] if isinstance(source, tuple) else source for source in sources]
-    stems = [one if isinstance(one, Path) else _path_of(one) for one in named]
-    if pairs is not None:
-        stems = [stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem) for stem in stems]
-    entries = [paths] if isinstance(paths, (str, Path)) else paths
-    is_named = isinstance(entries, Sequence) and all(isinstance(one, (str, Path)) for one in entries)
-    text = ", ".join(map(str, entries)) if is_named else ""
-    return Suite(motions, _labels(stems), _printable(text) if 0 < len(text) <= _LONGEST_NAME else "suite")
+_Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, Path | Record]
 
 
-_Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, ...]
+def _parts(source: _Source) -> tuple[Any, ...]:
+    """The two components of a pair, or what is none."""
+    if isinstance(source, Pair):
+        return source.first, source.second
+    return source if isinstance(source, tuple) else (source,)
 
 
 def _sources(given: Any, folder: Path) -> list[_Source]:
     """What entries name, each file once: files, records, pairs of either."""
-    key = "paths"
-    if isinstance(given, (str, Path, Record, Pair)):
-        given = [given]
     if isinstance(given, Suite):
         return list(given.motions)
-    if not isinstance(given, (Sequence, Iterator)) or isinstance(given, (bytes, Mapping)):
-        raise InputError(f"{key} = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
+    if isinstance(given, (str, Path, Record, Pair)):
+        given = [given]
+    if not isinstance(given, (Sequence, Iterator)) or isinstance(given, bytes):
+        raise InputError(f"paths = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
     found: list[_Source] = []
     for entry in given:
         if isinstance(entry, (Record, Pair)):
             found.append(entry)
         elif isinstance(entry, (list, tuple)):
             if len(entry) != 2 or not all(isinstance(part, (str, Path, Record)) for part in entry):
-                raise InputError(f"{key}: {shown(entry)}: must be two files, the components of one motion")
-            found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
+                raise InputError(f"paths: {shown(entry)}: must be two files, the components of one motion")
+            first, second = (part if isinstance(part, Record) else folder / part for part in entry)
+            found.append((first, second))
         elif isinstance(entry, (str, Path)):
-            found += [file for file in _matching(folder, entry, key) if file not in found]
+            found += [file for file in _matching(folder, entry) if file not in found]
         else:
-            raise InputError(f"{key}: {shown(entry)}: must be a file, a folder, a pattern or a Record")
+            raise InputError(f"paths: {shown(entry)}: must be a file, a folder, a pattern or a Record")
     if not found:
-        raise InputError(f"{key} = []: must name one motion at least")
+        raise InputError("paths = []: must name one motion at least")
     return found
 
 
-def _matching(folder: Path, entry: str | Path, key: str) -> list[Path]:
+def _matching(folder: Path, entry: str | Path) -> list[Path]:
     """The files that an entry names."""
-    if not str(entry).strip():
-        raise InputError(f"{key}: {shown(entry)}: must be a file, a folder or a pattern")
+    text = str(entry)
+    if not text.strip():
+        raise InputError(f"paths: {shown(entry)}: must be a file, a folder or a pattern")
     path = folder / entry
     try:
-        if path.is_dir():
-            files = sorted(one for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
-            if not files:
-                raise InputError(f"{key}: {_printable(str(entry))}: a folder without files")
-            return files
-        if path.exists() or not glob.has_magic(str(entry)):
+        if not path.is_dir() and (path.exists() or not glob.has_magic(str(entry))):
             return [path]
-        found = (folder / one for one in glob.iglob(str(entry), root_dir=folder, recursive=True))
+        pattern = f"{glob.escape(str(entry))}/*" if path.is_dir() else str(entry)
+        found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
         files = sorted(one for one in found if one.is_file())
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{key}: {_printable(str(entry))}: cannot be read: {reason}") from None
+        raise InputError(f"paths: {text}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not files:
-        raise InputError(f"{key}: {_printable(str(entry))}: no file fits this pattern")
+        raise InputError(f"paths: {text}: {'a folder without files' if path.is_dir() else 'no file fits this pattern'}")
     return files
 
 
 def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]:
     """Files put together two by two."""
     endings = check_list("pairs", endings, "two endings of names, such as ('_NS', '_EW')")
-    if len(endings) != 2 or not all(isinstance(one, str) and one for one in endings):
-        raise InputError(f"pairs = {shown(endings)}: must be two endings of names, such as ('_NS', '_EW')")
-    if endings[0] == endings[1]:
-        raise InputError(f"pairs = {shown(endings)}: must be two different endings")
-    components: dict[Path, dict[str, Path]] = {}
-    alone = []
-    for one in sources:
-        ending = next((end for end in endings if isinstance(one, Path) and one.stem.endswith(end)), None)
-        if not isinstance(one, Path) or ending is None:
-            alone.append(one)
-            continue
-        components.setdefault(one.with_name(one.stem.removesuffix(ending) + one.suffix), {})[ending] = one
-    alone += [one for both in components.values() if len(both) < 2 for one in both.values()]
-    if alone:
-        names = ", ".join(_printable(one.name if isinstance(one, (Path, Record)) else shown(one)) for one in alone)
+    if len(set(map(str, endings))) != 2 or not all(isinstance(one, str) and one for one in endings):
+        raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
+    first, second = endings
+    pairs = {
+        one: one.with_name(one.stem.removesuffix(first) + second + one.suffix)
+        for one in sources
+        if isinstance(one, Path) and one.stem.endswith(first)
+    }
+    incomplete = [one for one in sources if one not in pairs and one not in pairs.values()]
+    incomplete += [one for one, other in pairs.items() if other not in sources]
+    if incomplete:
+        names = ", ".join(one.name if isinstance(one, (Path, Record)) else shown(one) for one in incomplete)
         raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
-    return [(both[endings[0]], both[endings[1]]) for both in components.values()]
-
-
-def _unreadable(reasons: Mapping[Path, str], count: int) -> InputError:
-    """One error for all files that cannot be read: their names, and what is wrong with each as its notes."""
-    names = ", ".join(_printable(path.name) for path in reasons)
-    error = InputError(f"{len(reasons)} of {count} files cannot be read: {names}")
-    for path, reason in list(reasons.items())[:_MOST_REASONS]:
-        error.add_note(f"{_printable(str(path))}: {reason}")
-    if len(reasons) > _MOST_REASONS:
-        error.add_note(f"... and {len(reasons) - _MOST_REASONS} more")
-    return error
+    return list(pairs.items())
 
 
 def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
     """The stems of files; more of the path of those whose stems are alike, and a number where that does not help."""
-    stems = Counter(path.stem for path in paths)
-    ways = Counter(path.as_posix() for path in paths)
-    parents = [path.parent.parts for path in paths]
-    shared = 0
-    while parents and all(len(one) > shared and one[shared] == parents[0][shared] for one in parents):
-        shared += 1
+    stems, ways = Counter(path.stem for path in paths), Counter(paths)
+    levels = zip(*(path.parent.parts for path in paths), strict=False)
+    shared = len(list(takewhile(lambda parts: len({*parts}) == 1, levels)))
     labels: list[str] = []
-    taken = {path.stem for path in paths if stems[path.stem] == 1}
     for path in paths:
-        label = path.stem
-        if stems[label] > 1:
-            label = "/".join(path.parts[shared:]) if ways[path.as_posix()] == 1 else path.stem
-        label, number = _printable(label).strip() or "motion", 1
-        unique = label
-        while (stems[path.stem] > 1 and unique in taken) or unique in labels:
+        needs_path = stems[path.stem] > 1 and ways[path] == 1
+        label = unique = "/".join(path.parts[shared:]) if needs_path else path.stem.strip() or "motion"
+        number = 1
+        while unique in labels:
             number += 1
             unique = f"{label} ({number})"
         labels.append(unique)
     return tuple(labels)
-
-
-def _path_of(motion: Motion) -> Path:
-    """The file that a motion may have been read from, a pair's first component: its name."""
-    return Path((motion.first if isinstance(motion, Pair) else motion).name)
-
-
-def _printable(text: str) -> str:
-    """A name as it can be printed, and written as UTF-8."""
-    text = text.encode(errors="backslashreplace").decode()
-    return text if text.isprintable() else repr(text)[1:-1]

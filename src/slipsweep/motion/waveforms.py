@@ -1,11 +1,11 @@
-"""Waveforms: what the plane does, as a user chooses it (`cutting` cuts it into the pieces that the solvers follow).
+"""Waveforms: what the base does, as a user chooses it (`cutting` cuts it into the pieces that the solvers follow).
 
 A waveform w(φ) has the period 2π and the peak max|w| = 1, so that the amplitude A stays the peak
 ground acceleration; φ = ωt counts from the beginning of the shaking.
 
 ===========  ================================================================================
 sine         sin φ
-cosine       cos φ: it starts at its peak, to which the plane's acceleration jumps at t = 0
+cosine       cos φ: it starts at its peak, to which the base's acceleration jumps at t = 0
 triangle     straight lines through 0, 1 at π/2, −1 at 3π/2, 0
 square       1 on (0, π), −1 on (π, 2π)
 harmonics    Σ aₖ sin(mₖφ + pₖ) over its own largest magnitude
@@ -83,11 +83,6 @@ class Sine(Waveform):
     ramp_in, ramp_out : float
         Cycles at the beginning and at the end over which the shaking grows and fades linearly.
 
-    Raises
-    ------
-    InputError
-        A value that is not allowed.
-
     See Also
     --------
     Cosine, Triangle, Square, Harmonics : the other waveforms
@@ -105,17 +100,9 @@ class Sine(Waveform):
 
 @dataclass(frozen=True)
 class Cosine(Waveform):
-    """cos φ: it starts at its peak, to which the plane's acceleration jumps at t = 0.
+    """cos φ: it starts at its peak, to which the base's acceleration jumps at t = 0.
 
-    Parameters
-    ----------
-    cycles, ramp_in, ramp_out
-        As those of `Sine`.
-
-    Raises
-    ------
-    InputError
-        A value that is not allowed.
+    Its parameters are those of `Sine`.
 
     See Also
     --------
@@ -135,15 +122,7 @@ class Cosine(Waveform):
 class Triangle(Waveform):
     """Straight lines through 0, 1 at π/2, −1 at 3π/2, 0.
 
-    Parameters
-    ----------
-    cycles, ramp_in, ramp_out
-        As those of `Sine`.
-
-    Raises
-    ------
-    InputError
-        A value that is not allowed.
+    Its parameters are those of `Sine`.
 
     See Also
     --------
@@ -163,15 +142,7 @@ class Triangle(Waveform):
 class Square(Waveform):
     """1 on (0, π), −1 on (π, 2π).
 
-    Parameters
-    ----------
-    cycles, ramp_in, ramp_out
-        As those of `Sine`.
-
-    Raises
-    ------
-    InputError
-        A value that is not allowed.
+    Its parameters are those of `Sine`.
 
     See Also
     --------

@@ -6,11 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import plan_sweep
-from slipsweep.grid.tables import Table
 from slipsweep.model.options import MODELS, Mendez
 from slipsweep.model.parameters import check_finite, check_single, shown
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
@@ -52,7 +53,7 @@ def calibration_table(
     drift: Any = (),
     noise: Mapping[str, float] | None = None,
     cycles: bool = True,
-) -> Table:
+) -> xr.Dataset:
     """Calibration of a test; arguments, results and errors of `slipsweep.calibrate`."""
     theta, mu_s = check_single("theta", theta), check_single("mu_s", mu_s)
     chosen = MODELS.of(model)
@@ -406,20 +407,19 @@ def _limit(fit: Fit, parameters: Floats) -> float:
     """Üg,lim by Eq. 7."""
     from slipsweep.grid.plans import plan_friction_parameters
 
-    plan = plan_friction_parameters(
+    inputs = Inputs(
         theta=fit.forward.theta, mu_s=fit.forward.mu_s, amplitude=1.0, yield_acceleration=float(parameters[0]),
-        decay_rate=float(parameters[1]), delta_mu=float(parameters[2]), model=fit.forward.model,
+        decay_rate=float(parameters[1]), delta_mu=float(parameters[2]),
     )  # fmt: skip
+    plan = plan_friction_parameters(inputs, model=fit.forward.model)
     return float(plan.solve()["limiting_acceleration"].item())
 
 
-def _summary(fit: Fit, solution: Solution) -> Table:
+def _summary(fit: Fit, solution: Solution) -> xr.Dataset:
     """The results of a sweep for what was found."""
     given = dict(zip(SOUGHT, map(float, solution.parameters), strict=True))
     plan = plan_sweep(
-        theta=fit.forward.theta,
-        mu_s=fit.forward.mu_s,
-        **given,
+        Inputs(theta=fit.forward.theta, mu_s=fit.forward.mu_s, **given),
         excitation=fit.motion.record(solution.wrong),
         model=fit.forward.model,
     )

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import CALIBRATION, CALIBRATION_SERIES, HISTORY, PARAMETERS
 from slipsweep.motion.shaking import TABLE
@@ -50,14 +50,14 @@ def intervals_of(solution: Solution, profile: Profile) -> Floats:
 
 
 def table_of(
-    fit: Fit, solution: Solution, intervals: Floats, summary: Table, cycles: Sequence[Cycle], notes: Sequence[str]
-) -> Table:
+    fit: Fit, solution: Solution, intervals: Floats, summary: xr.Dataset, cycles: Sequence[Cycle], notes: Sequence[str]
+) -> xr.Dataset:
     """All that was found; `summary` has the results of a sweep for it, `notes` are findings in words."""
     history, added = fit.computed(solution.parameters, solution.wrong), _added(fit, solution)
     data = _estimates(solution, intervals) | _of_cycles(cycles)
     data |= _series(fit, history, added) | _misfits(fit, history, added)
     for name in ("permanent_displacement", "stick_slip_pulses", "continuous_pulses", "validity"):
-        data[name] = summary[name]
+        data[name] = summary[name].variable
     attrs = {
         "title": "Calibration of a sliding block from a test on a shaking table",
         **fit.test.attrs,
@@ -70,46 +70,46 @@ def table_of(
         "model_table": model_table(fit.forward, solution, intervals),
         "uncertainty_table": uncertainty_table(fit.forward, solution, correlation_of(solution.covariance)),
     }
-    return Table(_coordinates(fit, len(cycles)), data, attrs)
+    return xr.Dataset(data, _coordinates(fit, len(cycles)), attrs)
 
 
-def _coordinates(fit: Fit, cycles: int) -> dict[str, Variable]:
+def _coordinates(fit: Fit, cycles: int) -> dict[str, xr.Variable]:
     place = np.arange(3, dtype=np.int8)
     names = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
     ends = np.array([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE])
     coords = {
-        "time": Variable(("time",), fit.test.times, {"units": "s", "long_name": "time"}),
-        "parameter": Variable(("parameter",), place, {"long_name": "parameter", **names}),
-        "other_parameter": Variable(("other_parameter",), place, {"long_name": "other parameter", **names}),
-        "bound": Variable(("bound",), ends, {"units": "1", "long_name": "probability below an end of an interval"}),
-        "theta": Variable((), np.array(fit.forward.theta), PARAMETERS["theta"]),
-        "mu_s": Variable((), np.array(fit.forward.mu_s), PARAMETERS["mu_s"]),
+        "time": xr.Variable(("time",), fit.test.times, {"units": "s", "long_name": "time"}),
+        "parameter": xr.Variable(("parameter",), place, {"long_name": "parameter", **names}),
+        "other_parameter": xr.Variable(("other_parameter",), place, {"long_name": "other parameter", **names}),
+        "bound": xr.Variable(("bound",), ends, {"units": "1", "long_name": "probability below an end of an interval"}),
+        "theta": xr.Variable((), np.array(fit.forward.theta), PARAMETERS["theta"]),
+        "mu_s": xr.Variable((), np.array(fit.forward.mu_s), PARAMETERS["mu_s"]),
     }
     if cycles:
         about = {"units": "1", "long_name": "number of the cycle"}
-        coords["cycle"] = Variable(("cycle",), np.arange(1, cycles + 1), about)
+        coords["cycle"] = xr.Variable(("cycle",), np.arange(1, cycles + 1), about)
     return coords
 
 
-def _estimates(solution: Solution, intervals: Floats) -> dict[str, Variable]:
+def _estimates(solution: Solution, intervals: Floats) -> dict[str, xr.Variable]:
     """Üy, λ and Δμ, their standard errors, intervals and correlation."""
     data = {}
     for at, name in enumerate(SOUGHT):
         about = PARAMETERS[name]
         error = solution.errors[at] if np.isfinite(solution.errors[at]) else np.nan
-        data[name] = Variable((), np.array(solution.parameters[at]), about)
-        data[f"{name}_error"] = Variable(
+        data[name] = xr.Variable((), np.array(solution.parameters[at]), about)
+        data[f"{name}_error"] = xr.Variable(
             (), np.array(error), {**about, "long_name": f"standard error of the {about['long_name']}"}
         )
-        data[f"{name}_interval"] = Variable(
+        data[f"{name}_interval"] = xr.Variable(
             ("bound",), intervals[at], {**about, "long_name": f"95 % interval of the {about['long_name']}"}
         )
     correlation = correlation_of(solution.covariance)
-    data["correlation"] = Variable(("parameter", "other_parameter"), correlation, CALIBRATION["correlation"])
+    data["correlation"] = xr.Variable(("parameter", "other_parameter"), correlation, CALIBRATION["correlation"])
     return data
 
 
-def _of_cycles(cycles: Sequence[Cycle]) -> dict[str, Variable]:
+def _of_cycles(cycles: Sequence[Cycle]) -> dict[str, xr.Variable]:
     """What each cycle gave; nothing where none was asked for."""
     table: dict[str, Any] = {
         "cycle_start": [one.start for one in cycles],
@@ -121,30 +121,30 @@ def _of_cycles(cycles: Sequence[Cycle]) -> dict[str, Variable]:
         table[f"cycle_{name}"] = [one.estimate[at] for one in cycles]
         table[f"cycle_{name}_error"] = [one.errors[at] for one in cycles]
     return {
-        name: Variable(("cycle",), np.asarray(values), CALIBRATION[name]) for name, values in table.items() if cycles
+        name: xr.Variable(("cycle",), np.asarray(values), CALIBRATION[name]) for name, values in table.items() if cycles
     }
 
 
-def _series(fit: Fit, history: Floats, added: dict[str, Floats]) -> dict[str, Variable]:
+def _series(fit: Fit, history: Floats, added: dict[str, Floats]) -> dict[str, xr.Variable]:
     """Measured channels, without what was removed of them, and computed ones."""
     series = {f"measured_{name}": values - added.get(name, 0.0) for name, values in fit.test.channels.items()}
     series |= {f"computed_{name}": history[:, COLUMN[name]] for name in HISTORY}
-    return {name: Variable(("time",), values, CALIBRATION_SERIES[name]) for name, values in series.items()}
+    return {name: xr.Variable(("time",), values, CALIBRATION_SERIES[name]) for name, values in series.items()}
 
 
-def _misfits(fit: Fit, history: Floats, added: dict[str, Floats]) -> dict[str, Variable]:
+def _misfits(fit: Fit, history: Floats, added: dict[str, Floats]) -> dict[str, xr.Variable]:
     """Root mean squares of measured less computed, and their parts of the largest computed value."""
     data = {}
     for name in fit.test.responses:
         rest = (fit.test.channels[name] - added[name] - history[:, COLUMN[name]])[fit.use[name]]
         about, misfit = HISTORY[name], np.sqrt(np.mean(rest**2))
-        data[f"misfit_{name}"] = Variable(
+        data[f"misfit_{name}"] = xr.Variable(
             (),
             np.array(misfit),
             {**about, "long_name": f"root mean square of measured less computed {about['long_name']}"},
         )
         span = float(np.nanmax(np.abs(history[:, COLUMN[name]]), initial=1e-300))
-        data[f"relative_misfit_{name}"] = Variable(
+        data[f"relative_misfit_{name}"] = xr.Variable(
             (),
             np.array(misfit / span),
             {"units": "1", "long_name": f"misfit of the {about['long_name']} over its largest computed value"},

@@ -4,38 +4,63 @@ A thin translation over `slipsweep.grid.plans` and `slipsweep.studies.history`: 
 with DataArrays are kept, and `chunks` makes a dask graph of a plan's tasks.
 """
 
-import itertools
-import operator
+import functools
+import inspect
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
-from slipsweep.grid.plans import Plan, Task, plan_friction_parameters, plan_sweep
-from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.options import MODELS, Model, Solver
-from slipsweep.model.parameters import computed, shown
-from slipsweep.model.variables import PARAMETERS, RESULT_DTYPES, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.plans import Plan, plan_friction_parameters, plan_sweep
+from slipsweep.model.choices import declared
+from slipsweep.model.options import MODELS, SOLVERS, Model, Solver
+from slipsweep.model.parameters import shown
+from slipsweep.model.variables import STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies.history import history_table
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform
+from slipsweep.studies.history import time_history
 from slipsweep.studies.limits import AMPLITUDE_STEPS, plan_limits
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def _named(function: Function) -> Function:
+    """Say of an option of the shaking, the model or the solver that was given to the function itself where it goes."""
+    known = inspect.signature(function).parameters
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **options: Any) -> Any:
+        for name, value in options.items():
+            for family in (WAVEFORMS, MODELS, SOLVERS):
+                if name not in known and name in family.options:
+                    owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
+                    raise TypeError(
+                        f"{function.__name__}() has no argument {name!r}: give "
+                        f"{family.keyword}={owner.__name__}({name}={shown(value)})"
+                    )
+        return function(*arguments, **options)
+
+    return cast(Function, call)
+
 
 #: What a caller may give for a parameter.
 Values = float | Sequence[float] | np.ndarray | xr.DataArray
 
 
+@_named
 def sweep(
     theta: Values | None = None,
     mu_s: Values | None = None,
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
+    phi: Values | None = None,
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     solver: Solver | str = "auto",
@@ -74,6 +99,8 @@ def sweep(
         Peak ground acceleration A, m/s², ≥ 0; a record, or every motion of a suite, is scaled to it.
     frequency : float, array or DataArray
         Excitation frequency, Hz, > 0; not with a record.
+    phi : float, array or DataArray, optional
+        Friction angle, degrees, instead of `mu_s` = tan φ.
     excitation : Sine, Cosine, Triangle, Square, Harmonics, Record, Suite or str
         Motion of the base; "sine", "cosine", "triangle" and "square" are ten cycles without ramps.  All that is written
         about a record below holds for each motion of a suite.
@@ -156,10 +183,29 @@ def sweep(
     array([[0.   , 0.   , 0.222],
            [0.   , 0.081, 0.445]])
     """
-    given = _inputs(locals())
-    plan = plan_sweep(**_plain(given), excitation=excitation, model=model, solver=solver, variables=variables)
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(progress) if chunks is None else _lazy(plan, chunks), brought)
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )
+    plan = plan_sweep(inputs, excitation=excitation, model=model, solver=solver, variables=variables)
+    brought = _brought(inputs, plan.coords, plan.names)
+    return (plan.solve(progress) if chunks is None else _lazy(plan, chunks)).assign_coords(brought)
 
 
 def friction_parameters(
@@ -220,18 +266,28 @@ def friction_parameters(
     >>> slipsweep.SlidingMode(found.sliding_mode.item()).name
     'STICK_SLIP'
     """
-    given = _inputs(locals())
-    plan = plan_friction_parameters(**_plain(given), model=model)
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(), brought)
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        amplitude=amplitude,
+        yield_acceleration=yield_acceleration,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+    )
+    plan = plan_friction_parameters(inputs, model=model)
+    brought = _brought(inputs, plan.coords, plan.names)
+    return plan.solve().assign_coords(brought)
 
 
+@_named
 def simulate(
     theta: float | None = None,
     mu_s: float | None = None,
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
+    phi: float | None = None,
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     times: Sequence[float] | np.ndarray | None = None,
@@ -299,23 +355,36 @@ def simulate(
     >>> print(f"{history.permanent_displacement.item() * 1000:.0f} mm after {history.time.values[-1]:.2f} s")
     331 mm after 2.78 s
     """
-    given = _inputs(locals())
-    table = history_table(
-        **_plain(given),
-        excitation=excitation,
-        model=model,
-        times=times,
-        points_per_cycle=points_per_cycle,
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
     )
-    return _dataset(table, {})
+    return time_history(inputs, excitation=excitation, model=model, times=times, points_per_cycle=points_per_cycle)
 
 
+@_named
 def limit_amplitude(
     displacement: Values,
     theta: Values | None = None,
     mu_s: Values | None = None,
     frequency: Values | None = None,
     *,
+    phi: Values | None = None,
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
     time_scale: Values | None = None,
@@ -390,25 +459,41 @@ def limit_amplitude(
     >>> limits.limit_amplitude.round(3).values
     array([3.34 , 3.756])
     """
-    given = _inputs(locals())
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        frequency=frequency,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )
     plan = plan_limits(
-        **_plain(given),
-        displacement=_plain({"displacement": displacement})["displacement"],
+        displacement,
+        inputs,
         excitation=excitation,
         model=model,
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,
     )
-    brought = _brought(given, plan.coords, plan.names)
-    return _dataset(plan.solve(progress), brought)
+    brought = _brought(inputs, plan.coords, plan.names)
+    return plan.solve(progress).assign_coords(brought)
 
 
+@_named
 def sample(
     theta: Values | None = None,
     mu_s: Values | None = None,
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
+    phi: Values | None = None,
     uncertain: Mapping[str, Any],
     excitation: Waveform | Record | Suite | str = "sine",
     model: Model | str = "mendez",
@@ -532,7 +617,25 @@ def sample(
     from slipsweep.studies.sampling import check_sampling
     from slipsweep.studies.uncertainty import plan_samples
 
-    given = _inputs(locals())
+    inputs = Inputs(
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+    )
     sampling = check_sampling(
         uncertain,
         samples=samples,
@@ -545,35 +648,14 @@ def sample(
         over=over,
         g=MODELS.of(model).g,
     )
-    plan = plan_samples(
-        sampling,
-        **_plain(given),
-        excitation=excitation,
-        model=model,
-        solver=solver,
-    )
-    brought = _brought(given, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
+    plan = plan_samples(sampling, inputs, excitation=excitation, model=model, solver=solver)
+    brought = _brought(inputs, plan.coords, {*STATISTICS, *STATISTIC_COORDINATES})
     kept = {name: one for name, one in brought.items() if not {*sampling.over} & {*one.dims}}
-    return _dataset(plan.solve(progress), kept)
-
-
-def _inputs(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters among a function's arguments."""
-    return {name: arguments[name] for name in PARAMETERS if name in arguments}
-
-
-def _plain(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters without xarray: its arrays (computed, where they are lazy) as `Variable`."""
-    return {
-        name: Variable(tuple(map(str, values.dims)), computed(values), {str(key): x for key, x in values.attrs.items()})
-        if isinstance(values, (xr.DataArray, xr.Variable))
-        else values
-        for name, values in given.items()
-    }
+    return plan.solve(progress).assign_coords(kept)
 
 
 def _brought(
-    given: Mapping[str, Any], coords: Mapping[str, Variable], results: Collection[str]
+    inputs: Inputs, coords: Mapping[str, xr.Variable], results: Collection[str]
 ) -> dict[Hashable, xr.Variable]:
     """Coordinates that the DataArrays among the parameters brought along; they must agree.
 
@@ -582,7 +664,7 @@ def _brought(
     """
     brought: dict[Hashable, xr.Variable] = {}
     dims = {dim for variable in coords.values() for dim in variable.dims}
-    for parameter, array in given.items():
+    for parameter, array in inputs.given.items():
         if not isinstance(array, xr.DataArray):
             continue
         stacked = [name for name, index in array.xindexes.items() if isinstance(index, PandasMultiIndex)]
@@ -604,48 +686,19 @@ def _brought(
     return {name: variable for name, variable in brought.items() if name not in coords}
 
 
-def _dataset(table: Table, brought: Mapping[Hashable, xr.Variable]) -> xr.Dataset:
-    """A table as a Dataset; no array is copied."""
-
-    def labelled(variables: Mapping[str, Variable]) -> dict[Hashable, xr.Variable]:
-        return {name: xr.Variable(part.dims, part.values, part.attrs) for name, part in variables.items()}
-
-    return xr.Dataset(labelled(table.data_vars), {**brought, **labelled(table.coords)}, table.attrs)
-
-
-def _lazy(plan: Plan, chunks: Any) -> Table:
+def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
     """The results as dask arrays."""
-    lengths = _chunk_lengths(chunks, plan.sizes)
-    return plan.table(lambda task: _lazy_arrays(task, {dim: lengths[dim] for dim in task.sizes}))
+    from slipsweep.grid.graph import lazy_dataset
 
-
-def _lazy_arrays(task: Task, chunks: Mapping[str, tuple[int, ...]]) -> dict[str, Any]:
-    """One task as dask arrays: a node a chunk solves all results, another picks each out."""
-    from dask.array import Array
-    from dask.base import tokenize
-    from dask.highlevelgraph import HighLevelGraph
-
-    starts = [list(itertools.accumulate(lengths, initial=0)) for lengths in chunks.values()]
-    token = tokenize(task.solver.__name__, task.problem, task.names, chunks, task.inputs)
-    solved = f"slipsweep-{token}"
-    layers: dict[str, dict[Any, Any]] = {solved: {}} | {f"{name}-{token}": {} for name in task.names}
-    for index in itertools.product(*(range(len(lengths)) for lengths in chunks.values())):
-        slices = tuple(slice(begin[at], begin[at + 1]) for begin, at in zip(starts, index, strict=True))
-        layers[solved][solved, *index] = (task.part(slices).solve,)
-        for name in task.names:
-            layers[f"{name}-{token}"][f"{name}-{token}", *index] = (operator.getitem, (solved, *index), name)
-    arrays = {}
-    for name in task.names:
-        layer = f"{name}-{token}"
-        graph = HighLevelGraph({solved: layers[solved], layer: layers[layer]}, {solved: set(), layer: {solved}})
-        arrays[name] = Array(graph, layer, tuple(chunks.values()), dtype=RESULT_DTYPES.get(name, "float64"))
-    return arrays
+    return lazy_dataset(plan, _chunk_lengths(chunks, plan.sizes))
 
 
 def _chunk_lengths(chunks: Any, sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
     """Chunk lengths along every dimension; "auto" leaves frequency, which costs next to nothing, whole."""
     from dask.array.core import normalize_chunks
 
+    if isinstance(chunks, Integral) and chunks <= 0 and chunks != -1:
+        raise InputError(f"chunks = {shown(chunks)}: must be whole numbers > 0")
     asked = dict.fromkeys(sizes, "auto") | {"frequency": -1} if isinstance(chunks, str) and chunks == "auto" else chunks
     if isinstance(asked, Mapping):
         unknown = [dim for dim in asked if dim not in sizes and dim != "frequency"]

@@ -61,19 +61,18 @@ class Distribution:
 
 
 def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribution:
-    """One entry of `uncertain`."""
+    """One entry of `uncertain`, called `key` in errors."""
     entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
     if "distribution" not in entries:
         raise InputError(f"{key}.distribution: missing: the name of a continuous distribution of scipy.stats")
     chosen = entries.pop("distribution")
     kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
     units = entries.pop("units", None)
+    own = PARAMETERS[parameter]["units"]
     if units is not None and kind == "factor":
         raise InputError(f"{key}.units = {shown(units)}: not allowed with kind = 'factor', which has no unit")
     if units is not None and not isinstance(units, str):
-        raise InputError(
-            f"{key}.units = {shown(units)}: must be a unit that converts to {PARAMETERS[parameter]['units']}"
-        )
+        raise InputError(f"{key}.units = {shown(units)}: must be a unit that converts to {own}")
     if isinstance(chosen, str):
         frozen = _named(key, chosen, entries)
     elif not callable(getattr(chosen, "ppf", None)):
@@ -81,20 +80,15 @@ def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribut
             f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, or a frozen one"
         )
     elif entries:
-        raise InputError(f"{key}.{next(iter(entries))}: not allowed beside a frozen distribution, which has its own")
+        raise InputError(f"{key}.{next(iter(entries))}: not allowed with a frozen distribution, which has its own")
     else:
         frozen = chosen
-    try:
-        with np.errstate(all="ignore"):
-            middle = check_numbers(f"{key}: its median", frozen.ppf(0.5))
-    except InputError:
-        raise
-    except Exception as error:  # of a class that is not ours
-        raise InputError(f"{key}.distribution = {shown(chosen)}: its median cannot be had: {shown(error)}") from None
-    if middle.ndim:
-        raise InputError(f"{key}: is {middle.size} distributions; must be one")
+    with np.errstate(all="ignore"):
+        median = check_numbers(f"{key}: its median", frozen.ppf(0.5))
+    if median.ndim:
+        raise InputError(f"{key}: is {median.size} distributions; must be one")
     about = _described(frozen)
-    if not np.isfinite(middle):
+    if not np.isfinite(median):
         raise InputError(f"{key}: parameters that scipy.stats does not allow: {about}")
     if units is not None:
         about["units"] = units
@@ -102,26 +96,23 @@ def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribut
     return Distribution(parameter, kind, frozen, factor, {**about, "kind": kind})
 
 
-def _numbers(key: str, given: Mapping[str, Any]) -> dict[str, float]:
-    """Parameters of a distribution as floats."""
-    numbers = {}
-    for name, value in given.items():
-        numbers[str(name)] = check_finite(f"{key}.{name}", value)
-    return numbers
+def _shapes(family: Any) -> list[str]:
+    """Names of a distribution's shape parameters."""
+    return [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
 
 
 def _named(key: str, name: str, given: Mapping[str, Any]) -> Any:
     """A distribution of scipy.stats with its parameters, frozen."""
     from scipy import stats
 
-    known = [one for one in dir(stats) if isinstance(getattr(stats, one), stats.rv_continuous)]
-    if name not in known:
+    family = getattr(stats, name, None)
+    if not isinstance(family, stats.rv_continuous):
+        known = [one for one in dir(stats) if isinstance(getattr(stats, one), stats.rv_continuous)]
         hint = did_you_mean(name, known)
         if hint.startswith("known here"):
             hint = f"it must be a continuous one of scipy.stats, such as {', '.join(_USUAL)}"
         raise InputError(f'{key}.distribution = "{name}": no such distribution; {hint}')
-    family = getattr(stats, name)
-    shapes = [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
+    shapes = _shapes(family)
     for parameter in given:
         if parameter not in (*shapes, "loc", "scale"):
             allowed = ("distribution", "kind", "units", *shapes, "loc", "scale")
@@ -129,7 +120,7 @@ def _named(key: str, name: str, given: Mapping[str, Any]) -> Any:
     for shape in shapes:
         if shape not in given:
             raise InputError(f"{key}.{shape}: missing: {name} needs {', '.join(shapes)}")
-    return family(**_numbers(key, given))
+    return family(**{parameter: check_finite(f"{key}.{parameter}", value) for parameter, value in given.items()})
 
 
 def _described(frozen: Any) -> dict[str, Any]:
@@ -137,6 +128,5 @@ def _described(frozen: Any) -> dict[str, Any]:
     family = getattr(frozen, "dist", None)
     if family is None:
         return {"distribution": repr(frozen)}
-    shapes = [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
-    numbers = dict(zip((*shapes, "loc", "scale"), frozen.args, strict=False)) | frozen.kwds
+    numbers = dict(zip((*_shapes(family), "loc", "scale"), frozen.args, strict=False)) | frozen.kwds
     return {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.grid.tables import Table
 from slipsweep.model.variables import HISTORY, PARAMETERS, Validity
 from slipsweep.motion.shaking import RESPONSES, TABLE
 from slipsweep.studies.fitting import SOUGHT, Fit, Solution
@@ -47,7 +47,7 @@ _TELLS = 0.05
 def findings(
     fit: Fit,
     solution: Solution,
-    summary: Table,
+    summary: xr.Dataset,
     intervals: Floats,
     episodes: Sequence[tuple[float, float]],
     drifting: Sequence[str] = (),

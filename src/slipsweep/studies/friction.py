@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.friction import mobilised_friction
 from slipsweep.model.parameters import check_finite, check_single, shown
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, SLIDES
@@ -130,7 +130,7 @@ def friction_table(
     drift: Any,
     rest: Sequence[float] | None,
     threshold: Any,
-) -> Table:
+) -> xr.Dataset:
     """Measured friction; arguments, results and errors of `slipsweep.measured_friction`."""
     if "block_acceleration" not in test.channels:
         raise InputError(
@@ -168,14 +168,14 @@ def friction_table(
         "friction_ratio": friction / mu_s,
     }
     about = HISTORY | MEASURED_FRICTION
-    return Table(
+    return xr.Dataset(
+        {name: xr.Variable(("time",), values, about[name]) for name, values in series.items()}
+        | {name: xr.Variable(("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()},
         {
-            "time": Variable(("time",), test.times, {"units": "s", "long_name": "time"}),
-            "theta": Variable((), np.array(theta), PARAMETERS["theta"]),
-            "mu_s": Variable((), np.array(mu_s), PARAMETERS["mu_s"]),
+            "time": xr.Variable(("time",), test.times, {"units": "s", "long_name": "time"}),
+            "theta": xr.Variable((), np.array(theta), PARAMETERS["theta"]),
+            "mu_s": xr.Variable((), np.array(mu_s), PARAMETERS["mu_s"]),
         },
-        {name: Variable(("time",), values, about[name]) for name, values in series.items()}
-        | {name: Variable(("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()},
         {
             "title": "Friction measured on a shaking table (Eq. 1)",
             **test.attrs,

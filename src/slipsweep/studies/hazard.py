@@ -1,123 +1,65 @@
-"""Mean annual rate of exceeding a displacement: the hazard of peak ground acceleration times a suite's fragility.
+"""Mean annual rate of exceeding a displacement: the hazard of peak ground acceleration times a fragility.
 
 λ(d) = ∫ P(u > d | a) |dν(a)|, where ν(a) is the mean annual rate of peak ground accelerations above a (Cornell 1968).
 ln ν is straight in ln a between the points of the hazard curve, P in ln a between the amplitudes of the grid; the
 integral over these lines is exact.
 """
 
-import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.grid.tables import Table, Variable
-from slipsweep.model.parameters import check_numbers, number_text, shown
-from slipsweep.model.units import unit_factor
+from slipsweep.model.parameters import check_numbers, shown
 from slipsweep.model.variables import HAZARD_RESULTS
-from slipsweep.motion.columns import columns_of, words_and_unit
-from slipsweep.motion.records import read_lines
-from slipsweep.studies.suite_statistics import suite_table
+from slipsweep.studies.fragility import fragility
+from slipsweep.studies.hazard_curves import HazardCurve, read_hazard_curve
 
 Floats = NDArray[np.float64]
 
 TITLE = "Mean annual rate of exceeding a permanent displacement"
 
-#: Words of a column's name that say what it holds.
-_PGA = {"pga", "acceleration", "amplitude"}
-_RATE = {"rate", "frequency", "exceedance", "afe"}
+#: What is known of a rate if P is only known to lie between its values at neighbouring amplitudes.
+_BOUNDS = {
+    "lower_rate": {"units": "year-1", "long_name": "annual rate with the lower probability of each two amplitudes"},
+    "upper_rate": {"units": "year-1", "long_name": "annual rate with the higher probability of each two amplitudes"},
+}
 
-#: Spellings of the unit of an annual rate.
-_ANNUAL = {"", "1/yr", "1/year", "1/a", "/yr", "/year", "yr-1", "year-1", "a-1", "per year"}
-
-
-@dataclass(frozen=True, eq=False)
-class HazardCurve:
-    """Mean annual rates at which peak ground accelerations are exceeded at a site.
-
-    Attributes
-    ----------
-    amplitude : ndarray
-        Peak ground accelerations, m/s², > 0, strictly increasing; two at least.
-    rate : ndarray
-        Mean annual rate of exceeding each, 1/year, > 0, strictly decreasing.
-    name : str
-        What the curve is called in messages and results.
-    attrs : dict
-        How it was read, for the attributes of results.
-
-    Raises
-    ------
-    InputError
-        The numbers are not such.
-
-    See Also
-    --------
-    displacement_hazard : annual rates of displacements, from such a curve
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> curve = slipsweep.HazardCurve(amplitude=[0.5, 1.0, 2.0, 4.0], rate=[2e-2, 7e-3, 2e-3, 4e-4])
-    >>> curve.rate_at([1.5]).round(4)
-    array([0.0034])
-    """
-
-    amplitude: Floats
-    rate: Floats
-    name: str = "hazard curve"
-    attrs: Mapping[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        kept = {name: check_numbers(f"{self.name}: {name}", getattr(self, name)) for name in ("amplitude", "rate")}
-        amplitude, rate = kept.values()
-        if amplitude.ndim != 1 or amplitude.shape != rate.shape or amplitude.size < 2:
-            raise InputError(
-                f"{self.name}: {amplitude.size} amplitudes and {rate.size} rates: must be as many of each, 2 at least"
-            )
-        for name, values in kept.items():
-            for at in np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))[:1]:
-                raise InputError(f"{self.name}: {name} of point {at + 1} = {_text(values[at])}: must be a number > 0")
-        for name, values, word, sign in (("amplitude", amplitude, "greater", 1), ("rate", rate, "less", -1)):
-            for at in np.flatnonzero(sign * np.diff(values) <= 0.0)[:1]:
-                raise InputError(
-                    f"{self.name}: {name} of point {at + 2} = {_text(values[at + 1])}: must be {word} than "
-                    f"{_text(values[at])}, the one before it"
-                )
-        for name, values in kept.items():
-            object.__setattr__(self, name, values)
-
-    def rate_at(self, amplitude: Floats) -> Floats:
-        """The rate within the curve, linear between its points in logarithms of both."""
-        return np.asarray(np.exp(np.interp(np.log(amplitude), np.log(self.amplitude), np.log(self.rate))))
+#: Results, and the fields of `Rates` that they are.
+_RESULTS = {
+    "annual_rate": "rate",
+    "held_rate": "held",
+    "omitted_rate": "omitted",
+    "lower_rate": "lower",
+    "upper_rate": "upper",
+}
 
 
 class Rates(NamedTuple):
-    """A mean annual rate of exceedance, and what lies outside of the amplitudes that the fragility is known at.
+    """A mean annual rate of exceedance, and what is not known of it, 1/year.
 
     Attributes
     ----------
     rate : ndarray
-        1/year.
     held : ndarray
         Part of the rate above the largest amplitude (or the end of the curve), where the probability is held.
     omitted : ndarray
         What is not in the rate: at most this much below the smallest amplitude, down to the start of the curve, if the
         probability there is not above that at the smallest amplitude.  NaN where the curve starts above the smallest
         amplitude, at a probability above 0: the rate of what lies below the curve is not known.
+    lower, upper : ndarray
+        The rate if the probability between two amplitudes is the lower, or the higher, of the two.
     """
 
     rate: Floats
     held: Floats
     omitted: Floats
-
-
-def _text(value: Any) -> str:
-    return number_text(float(value))
+    lower: Floats
+    upper: Floats
 
 
 def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> Rates:
@@ -128,9 +70,9 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> Ra
     curve : HazardCurve
     amplitude : array
         Peak ground accelerations, m/s², > 0, strictly increasing, two at least.
-    probability : array or callable
-        Probability of exceedance at each, along the first dimension, or what gives it of an array of amplitudes.  It is
-        interpolated linearly in the logarithm of the amplitude between them.
+    probability : array
+        Probability of exceedance at each, along the first dimension.  It is interpolated linearly in the logarithm of
+        the amplitude between them.
 
     Returns
     -------
@@ -142,10 +84,12 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> Ra
     InputError
         The amplitudes are not such, or none of them lies within the curve.
     """
+    from scipy.interpolate import make_interp_spline
+
     given = check_numbers("amplitude", amplitude)
     if given.ndim != 1 or given.size < 2 or not (given[0] > 0.0 and (np.diff(given) > 0.0).all()):
         raise InputError(f"amplitude = {shown(amplitude)}: must be two numbers or more, > 0 and increasing")
-    shares = check_numbers("probability", probability(given) if callable(probability) else probability)
+    shares = check_numbers("probability", probability)
     if shares.shape[:1] != given.shape or not ((shares >= 0.0) & (shares <= 1.0)).all():
         raise InputError("probability: must be numbers between 0 and 1, one or more for each amplitude")
     low, high = max(given[0], curve.amplitude[0]), min(given[-1], curve.amplitude[-1])
@@ -157,7 +101,7 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> Ra
     points = np.union1d(given, curve.amplitude)
     points = points[(points >= low) & (points <= high)]
     rates = curve.rate_at(points)
-    chances = _straight(np.log(points), np.log(given), shares)
+    chances = make_interp_spline(np.log(given), shares, k=1)(np.log(points))
     # P is straight in ln a, ν is exp(-k ln a): ∫ P |dν| = P₁ (ν₁ - ν₂) + (P₂ - P₁) ((ν₁ - ν₂) / (k h) - ν₂)
     falls = -np.diff(np.log(rates))
     drops = rates[1:] * np.expm1(falls)
@@ -165,132 +109,124 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> Ra
         weights = np.where(falls > 1e-6, drops / falls - rates[1:], 0.5 * drops)
     inside = np.tensordot(drops, chances[:-1], 1) + np.tensordot(weights, np.diff(chances, axis=0), 1)
     held = chances[-1] * rates[-1]
+    below = np.clip(np.searchsorted(given, points[:-1], side="right") - 1, 0, given.size - 2)
+    ends = np.stack([shares[below], shares[below + 1]])
+    lower, upper = (np.tensordot(drops, extreme(axis=0), 1) + held for extreme in (ends.min, ends.max))
     omitted = chances[0] * (curve.rate[0] - rates[0])
     if curve.amplitude[0] > given[0]:  # how often what lies below the curve occurs is not known
         omitted = np.where(chances[0] > 0.0, np.nan, omitted)
-    return Rates(np.asarray(inside + held), np.asarray(held), np.asarray(omitted))
+    return Rates(*map(np.asarray, (inside + held, held, omitted, lower, upper)))
 
 
 def _span(values: Floats) -> str:
     return f"{values[0]:.6g} to {values[-1]:.6g} m/s2"
 
 
-def _straight(x: Floats, known: Floats, values: Floats) -> Floats:
-    """Values along the first dimension, straight between those at `known`."""
-    at = np.clip(np.searchsorted(known, x, side="right") - 1, 0, known.size - 2)
-    share = ((x - known[at]) / (known[at + 1] - known[at])).reshape(-1, *(1,) * (values.ndim - 1))
-    return np.asarray(values[at] + np.clip(share, 0.0, 1.0) * (values[at + 1] - values[at]))
+def displacement_hazard(
+    result: xr.Dataset,
+    curve: HazardCurve | str | Path,
+    thresholds: float | str | Sequence[float | str] | np.ndarray | None = None,
+    *,
+    over: str | Sequence[str] | None = None,
+) -> xr.Dataset:
+    """Mean annual rates of exceeding displacements, from a hazard curve and a fragility along `amplitude`.
 
+    P(u > d | A) is the share of the motions, or of the samples of uncertain inputs, that exceed d; it is straight in
+    ln A between the amplitudes of the result.  The hazard curve is straight in logarithms of both between its points.
+    The rate is that of Cornell [1]_.
 
-def hazard_table(table: Table, curve: HazardCurve, *, thresholds: Any, over: Any = None) -> Table:
-    """What `slipsweep.displacement_hazard` returns, of a table that holds `permanent_displacement` and `validity`.
+    Parameters
+    ----------
+    result : Dataset
+        A result of `sweep` with the dimensions `motion` and `amplitude`, or of `sample` with `amplitude`: motions of a
+        suite that were not pooled are equally likely.
+    curve : HazardCurve, str or Path
+        Or a CSV file with the columns "PGA (g)" and "annual rate", or of OpenQuake (hazard_curve-mean-PGA) with one
+        site.
+    thresholds : float, str or list of these, optional
+        Increasing displacements, m or with a unit ("50mm"), ≥ 0; by default 0.01, 0.1 and 1 m.  Of a result of
+        `sample` they must be among those that it has, which are the default.
+    over : str or list of str, optional
+        As in `suite_statistics`.
+
+    Returns
+    -------
+    Dataset
+        Over all other dimensions and `threshold` (m), per year:
+
+        - `annual_rate`: NaN where fewer than two amplitudes have a value.
+        - `held_rate`: the part of it from above the largest amplitude, or the end of the curve: P is held there.
+        - `omitted_rate`: what it leaves out below the smallest amplitude, where P is taken as 0: this much at most.
+          NaN where the curve starts above the smallest amplitude, and P is not 0 there.
+        - `lower_rate`, `upper_rate`: the rate if P between two amplitudes is the lower, or the higher, of the two.  Far
+          from each other, more amplitudes are needed.
+
+        `valueless_share` is the largest share of motions or samples without a value at any amplitude.
 
     Raises
     ------
+    InputError
+        As `suite_statistics`; the curve does not overlap with the amplitudes; or only two amplitudes have a value, and
+        different probabilities: what lies between them is then not known.
     RunError
-        No motion has a value at two amplitudes, at any grid point.
+        There is no rate at any grid point.
+
+    See Also
+    --------
+    HazardCurve : the hazard of a site
+    suite_statistics : without it
+
+    References
+    ----------
+    .. [1] C. A. Cornell (1968), "Engineering seismic risk analysis", Bulletin of the Seismological Society of America
+       58, 1583-1606.
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
+    >>> result = slipsweep.sweep(5, 0.3, amplitude=[2.0, 4.0, 6.0, 8.0], excitation=suite)
+    >>> curve = slipsweep.HazardCurve(amplitude=[0.5, 2.0, 8.0], rate=[2e-2, 2e-3, 6e-5])
+    >>> rates = slipsweep.displacement_hazard(result, curve, "50mm")
+    >>> print(f"{rates.annual_rate.item():.1e} a year")
+    3.7e-04 a year
     """
-    displacement = table.data_vars.get("permanent_displacement")
-    if displacement is not None and displacement.sizes.get("amplitude", 1) < 2:
-        raise InputError(
-            "result: amplitude: must be a dimension of two peak ground accelerations or more: the probability of "
-            "exceedance is needed at each"
-        )
-    statistics = suite_table(table, thresholds=thresholds, quantiles=0.5, zero=0.0, over=over)
-    probability, valueless = statistics["exceedance_probability"], statistics["valueless_share"]
-    order = np.argsort(table["amplitude"].values, kind="stable")
-    order = order[table["amplitude"].values[order] > 0.0]  # none exceeds anything at 0, which has no logarithm
-    amplitude = np.asarray(table["amplitude"].values[order], np.float64)
-    at = probability.dims.index("amplitude")
-    chances = np.moveaxis(probability.values, at, -2)[..., order, :]
-    shares = np.moveaxis(valueless.values, at, -1)[..., order]
-    grid = tuple(dim for dim in valueless.dims if dim != "amplitude")
-    found = {name: np.full((*chances.shape[:-2], chances.shape[-1]), np.nan) for name in Rates._fields}
+    if not isinstance(result, xr.Dataset):
+        raise InputError(f"result = {shown(result)}: must be a Dataset")
+    if not isinstance(curve, HazardCurve):
+        curve = read_hazard_curve(curve, float(result.attrs.get("g", np.nan)))
+    found = fragility(result, thresholds, over)
+    amplitude = found["amplitude"].values.astype(np.float64)
+    probability = found["exceedance_probability"]
+    chances = probability.values
+    shape = (*chances.shape[:-2], chances.shape[-1])
+    rates = {name: np.full(shape, np.nan) for name in Rates._fields}
     for index in np.ndindex(chances.shape[:-2]):
         there = np.isfinite(chances[index][:, 0])
         if np.count_nonzero(there) < 2:
             continue
-        rates = exceedance_rates(curve, amplitude[there], chances[index][there])
-        for name, values in rates._asdict().items():
-            found[name][index] = values
-    if np.isnan(found["rate"]).all():
+        own = chances[index][there]
+        if len(own) == 2 and (own[0] != own[1]).any():
+            raise InputError(
+                "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
+                "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
+            )
+        for name, values in exceedance_rates(curve, amplitude[there], own)._asdict().items():
+            rates[name][index] = values
+    if np.isnan(rates["rate"]).all():
         raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
-    names = {"annual_rate": "rate", "held_rate": "held", "omitted_rate": "omitted"}
-    results = {
-        name: Variable((*grid, "threshold"), found[own], HAZARD_RESULTS[name]) for name, own in names.items()
-    } | {"valueless_share": Variable(grid, shares.max(axis=-1), HAZARD_RESULTS["valueless_share"])}
-    coords = {
-        name: one
-        for name, one in statistics.coords.items()
-        if name not in ("quantile", "flag") and "amplitude" not in (*one.dims, name)
-    }
+    dims = [dim for dim in probability.dims if dim != "amplitude"]
+    about = HAZARD_RESULTS | _BOUNDS
+    results = {name: xr.Variable(dims, rates[own], about[name]) for name, own in _RESULTS.items()}
+    valueless = found["valueless_share"].max("amplitude").variable
+    valueless.attrs = about["valueless_share"]
+    coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}
     attrs = {
-        **{name: value for name, value in statistics.attrs.items() if name != "zero_displacement"},
+        **{name: value for name, value in found.attrs.items() if name != "zero_displacement"},
         "title": TITLE,
         "hazard_curve": curve.name,
         **curve.attrs,
         "hazard_curve_range": curve.amplitude[[0, -1]],
         "amplitude_range": amplitude[[0, -1]],
     }
-    return Table(coords, results, attrs)
-
-
-def read_hazard_curve(path: str | Path, g: float) -> HazardCurve:
-    """Read a hazard curve of peak ground acceleration from a CSV file.
-
-    The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g), annual rate``.
-    Separators are commas, semicolons or tabs.  Columns of other names are left out.
-
-    Parameters
-    ----------
-    path : str or Path
-    g : float
-        What "g" as a unit stands for, m/s²: that of the result.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
-    """
-    try:
-        path = Path(path)
-    except TypeError:
-        raise InputError(f"curve = {shown(path)}: must be the path of a CSV file, or a HazardCurve") from None
-    content, lines = read_lines(path, "hazard curve")
-    file = columns_of(path, lines, "has no line of names, such as PGA (g), annual rate")
-    columns: dict[str, tuple[int, float]] = {}
-    for i, cell in enumerate(file.names):
-        what, factor = _column(f"{path}: line {file.number}", cell, g)
-        if what in columns:
-            raise InputError(f"{path}: line {file.number}: two columns are {what}: must be one")
-        if what:
-            columns[what] = i, factor
-    for what in ("PGA", "annual rate"):
-        if what not in columns:
-            raise InputError(
-                f"{path}: line {file.number}: no column {what}: must name them, such as PGA (g), annual rate"
-            )
-    values = {what: np.empty(len(file.body)) for what in columns}
-    for row, (number, cells) in enumerate(file.rows()):
-        for what, (i, factor) in columns.items():
-            values[what][row] = factor * file.value(number, cells[i], what)
-    about = {"hazard_curve_sha256": hashlib.sha256(content).hexdigest()}
-    return HazardCurve(values["PGA"], values["annual rate"], str(path), about)
-
-
-def _column(where: str, cell: str, g: float) -> tuple[str, float]:
-    """What a column holds, nothing if it is left out, and the factor to its unit."""
-    words, unit = words_and_unit(cell)
-    if "probability" in words:
-        raise InputError(
-            f"{where}: column {shown(cell)}: must be an annual rate, -ln(1 - p) of an annual probability p"
-        )
-    if words & _RATE:
-        if unit.lower() not in _ANNUAL:
-            raise InputError(f"{where}: column {shown(cell)}: must be a rate per year, such as annual rate (1/yr)")
-        return "annual rate", 1.0
-    if not words & _PGA:
-        return "", 1.0
-    if not unit:
-        raise InputError(f"{where}: column {shown(cell)}: must give its unit in brackets, such as PGA (g)")
-    return "PGA", unit_factor(f"{where}: column {shown(cell)}: unit", "amplitude", unit, g)
+    return xr.Dataset({**results, "valueless_share": valueless}, coords, attrs)

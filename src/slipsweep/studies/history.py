@@ -1,21 +1,23 @@
-"""One time history, exact: the cycle solver's legs sampled on any time grid."""
+"""One time history, exact: the phases of motion that the cycle solver finds, sampled at any times."""
 
 import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.engine import Problem, Request
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, check_problem, plan_sweep
 from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
-from slipsweep.grid.tables import Table, Variable
 from slipsweep.kernels.block import TILE
 from slipsweep.kernels.history import history, record_history
 from slipsweep.model.options import Newmark
@@ -30,7 +32,7 @@ from slipsweep.motion.waveforms import Waveform
 
 Floats = NDArray[np.float64]
 
-#: Points a cycle where none are asked for.
+#: Points a cycle where none are given.
 POINTS_PER_CYCLE = 512
 
 #: Cycles after the shaking that have as many points each as one of the shaking; longer slides have no more points.
@@ -39,16 +41,19 @@ _CYCLES_BEYOND = 100
 #: Points after a record at its mean interval; longer slides have no more.
 _POINTS_BEYOND = 20_000
 
+#: Cycles from which on a history takes so long that Ctrl-C must be heard before its end.
+_MANY_CYCLES = 100_000
 
-def history_table(
+
+def time_history(
+    inputs: Inputs,
     *,
-    times: Any = None,
-    points_per_cycle: int | None = None,
     excitation: Any = "sine",
     model: Any = "mendez",
-    **given: Any,
-) -> Table:
-    """Time history of one block; keyword arguments, results and errors of `slipsweep.simulate`."""
+    times: Any = None,
+    points_per_cycle: int | None = None,
+) -> xr.Dataset:
+    """Time history of one block; parameters, results and errors of `slipsweep.simulate`."""
     problem = check_problem(excitation, model, "cycle")
     if isinstance(problem.excitation, Suite):
         label = problem.excitation.labels[0]
@@ -56,16 +61,14 @@ def history_table(
         raise InputError(f"excitation: simulate takes one motion of a Suite, such as suite[{label!r}]{of}")
     if points_per_cycle is not None and isinstance(problem.excitation, Record):
         raise InputError("points_per_cycle: not allowed with a Record, whose samples are the points; give times")
-    plan = plan_sweep(**given, excitation=problem.excitation, model=problem.model)
+    plan = plan_sweep(inputs, excitation=problem.excitation, model=problem.model)
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
     one = _History(problem, plan)
-    summary = one.summary
     if times is None:
         points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
-        points = check_whole("points_per_cycle", points, 4, MOST_POINTS)
-        phases = one.points(points)
+        phases = one.points(check_whole("points_per_cycle", points, 4, MOST_POINTS))
         grid = phases * one.unit
     else:
         grid = _checked(times, least=-math.inf if isinstance(problem.excitation, Record) else 0.0)
@@ -73,12 +76,9 @@ def history_table(
             phases = grid / one.unit
         if not np.isfinite(phases[[0, -1]]).all():
             raise InputError(f"times = ..., {number_text(float(grid[-1]))}: too many cycles for double precision")
-    columns = one.columns(phases) | one.half_waves()
-    return Table(
-        {**summary.coords, "time": Variable(("time",), grid, {"units": "s", "long_name": "time"})},
-        columns | summary.data_vars,
-        summary.attrs | {"title": "Time history of a rigid block"},
-    )
+    attrs = one.summary.attrs | {"title": "Time history of a rigid block"}
+    time = xr.Variable(("time",), grid, {"units": "s", "long_name": "time"})
+    return one.summary.assign(one.columns(phases) | one.half_waves()).assign_coords(time=time).assign_attrs(attrs)
 
 
 def _checked(times: Any, least: float) -> Floats:
@@ -95,7 +95,7 @@ def _checked(times: Any, least: float) -> Floats:
 class _History:
     """One case, its results as a sweep gives them, and its history.
 
-    Phases are ωt; under a record the times at time scale 1 stand in their place.
+    Phases are ωt; under a record the times at time scale 1 take their place.
     """
 
     problem: Problem
@@ -107,66 +107,52 @@ class _History:
         return {name: variable.values for name, variable in self.plan.coords.items()}
 
     @cached_property
-    def summary(self) -> Table:
-        """Its results as a sweep gives them.
+    def summary(self) -> xr.Dataset:
+        """Its results as a sweep gives them."""
+        return self.plan.solve()
 
-        The first history of all waits for two kernels: where there are two processors, not for one after the other.
-        """
-        with self._kernel.compiled_elsewhere(self._arguments(np.empty(0))):
-            return self.plan.solve()
-
-    @property
+    @cached_property
     def unit(self) -> float:
         """Seconds that a phase takes: 1/ω, or the factor on the time of a record."""
-        return float(engine.kernel_inputs(self._asked)[1])
+        return float(engine.kernel_inputs(Request(self.problem, (), self.inputs, ()))[1])
 
     @property
-    def _asked(self) -> Request:
-        return Request(self.problem, (), self.inputs, ())
-
-    @property
-    def _valueless(self) -> int:
-        return int(self.summary["validity"].item()) & VALUELESS
-
-    @property
-    def _kernel(self) -> Any:
-        """What samples the case."""
-        return record_history if isinstance(self.problem.excitation, Record) else history
-
-    def _arguments(self, phases: Floats) -> tuple[Any, ...]:
-        """Of that kernel; it fills the last, (phase, column of `HISTORY`)."""
-        motion = self.problem.excitation
-        wave = wave_of_record(motion, float(self.inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
-        cells = np.repeat([float(values) for values in engine.kernel_inputs(self._asked)[0]], TILE)
-        return cells, self.problem.options(True), wave, phases, np.empty((phases.size, len(HISTORY)))
+    def _valueless(self) -> bool:
+        return bool(int(self.summary["validity"]) & VALUELESS)
 
     def sampled(self, phases: Floats) -> Floats:
         """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
-        arguments = self._arguments(phases)
-        self._kernel(*arguments)
-        table: Floats = arguments[-1]
+        motion, table = self.problem.excitation, np.empty((phases.size, len(HISTORY)))
+        wave = wave_of_record(motion, float(self.inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
+        cell = engine.kernel_inputs(Request(self.problem, (), self.inputs, ()))[0]
+        cells = np.repeat([float(values) for values in cell], TILE)
+        kernel = record_history if isinstance(motion, Record) else history
+        arguments = cells, self.problem.options(True), wave, phases, table
+        if isinstance(motion, Waveform) and motion.cycles > _MANY_CYCLES:
+            # the main thread hears Ctrl-C while it waits; a thread that is a daemon does not hold up the exit
+            thread = threading.Thread(target=kernel, args=arguments, daemon=True)
+            thread.start()
+            thread.join()
+        else:
+            kernel(*arguments)
         if self._valueless:  # from the beginning on, also where the flag is raised later
             table[:, 1:] = math.nan
         return table
 
-    def columns(self, phases: Floats) -> dict[str, Variable]:
+    def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """The variables of a history."""
-        table, unit = self.sampled(phases), self.unit
+        table = self.sampled(phases)
         # Eq. 1 needs θ and μs
-        known = {name: at for at, name in enumerate(HISTORY)}
-        if "mu_s" not in self.inputs:
-            del known["friction_coefficient"]
+        known = {name: at for at, name in enumerate(HISTORY) if name != "friction_coefficient" or "mu_s" in self.inputs}
         with np.errstate(over="ignore"):
-            table[:, 3] *= unit
-            table[:, 4] *= unit * unit
+            table[:, 3] *= self.unit
+            table[:, 4] *= self.unit * self.unit
         if not self._valueless:
             moved = {name: table[:, at] for name, at in known.items()}
             check_served(self.problem.model.g, self.inputs, moved, np.zeros(len(table), np.int16))
-        return {
-            name: Variable(("time",), np.ascontiguousarray(table[:, at]), HISTORY[name]) for name, at in known.items()
-        }
+        return {name: xr.Variable(("time",), table[:, at].copy(), HISTORY[name]) for name, at in known.items()}
 
-    def half_waves(self) -> dict[str, Variable]:
+    def half_waves(self) -> dict[str, xr.Variable]:
         """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
         record = self.problem.excitation
         if not isinstance(record, Record):
@@ -189,32 +175,32 @@ class _History:
             "half_wave_peak": peak,
             "half_wave_mode": mode.astype(np.int8),
         }
-        return {name: Variable(("half_wave",), values, HALF_WAVES[name]) for name, values in found.items()}
+        return {name: xr.Variable(("half_wave",), values, HALF_WAVES[name]) for name, values in found.items()}
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
         motion = self.problem.excitation
         if isinstance(motion, Record):
-            step = float(motion.times[-1] - motion.times[0]) / (motion.times.size - 1)
-            _check_memory(motion.times.size + _POINTS_BEYOND)
-            return _to_the_end(motion.times, step, max(_POINTS_BEYOND, motion.times.size), self._runs_on())
-        assert isinstance(motion, Waveform)
-        step, shaken = 2.0 * math.pi / points_per_cycle, points_per_cycle * motion.cycles
-        _check_memory(shaken + _CYCLES_BEYOND * points_per_cycle)
-        return _to_the_end(
-            step * np.arange(shaken + 1, dtype=np.float64), step, _CYCLES_BEYOND * points_per_cycle, self._runs_on()
-        )
+            shaken = motion.times
+            step, most = float(np.ptp(shaken)) / (shaken.size - 1), max(_POINTS_BEYOND, shaken.size)
+            _check_memory(shaken.size + _POINTS_BEYOND)
+        else:
+            assert isinstance(motion, Waveform)
+            step, most = 2.0 * math.pi / points_per_cycle, _CYCLES_BEYOND * points_per_cycle
+            _check_memory(points_per_cycle * motion.cycles + most)
+            shaken = step * np.arange(points_per_cycle * motion.cycles + 1, dtype=np.float64)
+        return _to_the_end(shaken, step, most, self._runs_on())
 
     def _runs_on(self) -> float:
         """How long the block slides on after the shaking."""
         motion = self.problem.excitation
-        assert not isinstance(motion, Suite)
-        slides = isinstance(motion, Record) or self.summary["sliding_mode"].item() == SlidingMode.STICK_SLIP
+        slides = isinstance(motion, Record) or self.summary["sliding_mode"] == SlidingMode.STICK_SLIP
         if not slides or self._valueless:
             return 0.0
+        assert not isinstance(motion, Suite)
         end = 2.0 * math.pi * motion.cycles if isinstance(motion, Waveform) else motion.times[-1]
         ground, block, _, velocity, _ = self.sampled(np.array([end]))[0]
-        # beyond the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
+        # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
         with np.errstate(divide="ignore", over="ignore"):
             return float(velocity / (block - ground)) if velocity != 0.0 else 0.0
 
@@ -222,8 +208,8 @@ class _History:
 def _to_the_end(shaken: Floats, step: float, most: int, after: float) -> Floats:
     """Phases of the shaking, and others a `step` apart, `most` of them, to the end of the slide `after` it.
 
-    A slide that brakes by 1e-7 m/s² lasts for months.  Under a constant deceleration few points tell
-    all: they are spaced further apart then.
+    A slide that brakes by 1e-7 m/s² lasts for months.  Under a constant deceleration few points are enough: they are
+    spaced further apart then.
     """
     if not math.isfinite(after):
         raise InputError(

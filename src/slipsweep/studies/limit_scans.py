@@ -1,46 +1,44 @@
-"""Where a scan of amplitudes first reaches a target, and what may lie hidden between its points.
+"""Where a scan of amplitudes first reaches a target displacement, and what it may hide between its points.
 
-The displacement u(A) is known at the points of a scan.  Steps that may hide a peak are cut into parts; where something
-changes with which u jumps or grows beyond all bounds, the place of the change is found.  docs/limit.md says what is
-missed all the same.
+The displacement u(A) is known at the points of a scan.  Steps of the scan that may hide a peak are cut into parts;
+where a result changes with which u jumps or grows beyond all bounds, the place of the change is located.  docs/limit.md
+says what is missed all the same.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import count
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
+from slipsweep.grid.engine import Arrays, Problem, Request
 from slipsweep.model.variables import Validity
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 #: Displacements scanned together: 16 MB, and as much again to compare them.
 SCANNED = 2_000_000
 
-#: A maximum of the scan from this part of the target on may be that of a peak that is higher beside it.
+#: A maximum of the scan from this part of the target on may lie next to a higher peak.
 _MAXIMUM = 0.9
-
-#: By this part of an interval, times its length over that at first, a secant's guess is moved towards the middle: past
-#: the root, so that both ends come to it.
-_INWARD = 0.2
 
 
 class Change(NamedTuple):
-    """What changes with which u jumps, or grows beyond all bounds.
+    """A change of a result with which u jumps, or grows beyond all bounds.
 
     Attributes
     ----------
     result : str
-        In which result it is seen, ...
+        The result, of whole numbers.
     bits : int
-        ... and in which of its bits.
+        Its bits that count.
     least : float
-        From this part of the target on, on either side of a step, its place is looked for, ...
+        Its place is located where u on either side of a step is at least this part of the target, ...
     part : float
         ... to this part of the step; 0: to neighbouring numbers.
     """
@@ -57,12 +55,11 @@ class Hides(NamedTuple):
     Attributes
     ----------
     saw : float
-        From this part of the target on the steps of blocks that do not recouple are cut into parts: there u jumps up
-        each time that one pulse less stops a block, and then falls.
+        Steps of blocks that do not recouple are cut into parts where u is at least this part of the target: there u
+        jumps up each time that the block comes to rest one pulse earlier, and then falls.
     parts : int
         Parts of such a step.
     changes : tuple of Change
-        What has its places looked for.
     """
 
     saw: float
@@ -70,192 +67,204 @@ class Hides(NamedTuple):
     changes: tuple[Change, ...]
 
 
-#: The gap of the literal rise, in which Kd would be negative: beside it Kd vanishes, and u grows beyond all bounds.
+#: The gap of the literal rise, in which Kd would be negative: at its edges Kd vanishes, and u grows beyond all bounds.
 _GAP = Change("validity", int(Validity.KD_NOT_POSITIVE), 0.0, 0.0)
 
-#: Under a record u jumps where there are more slips or fewer, as two become one; under a waveform, of which no slips
-#: are counted, jumps are found by finer parts.
+#: Under a record u jumps where the number of slips changes; under a waveform, whose slips are not counted, jumps are
+#: found by finer parts.
 UNDER_WAVEFORM = Hides(0.5, 512, (_GAP,))
 UNDER_RECORD = Hides(0.7, 128, (_GAP, Change("number_of_slips", -1, 0.25, 1e-5)))
 
 
 class Steps(NamedTuple):
-    """Steps of a scan in which a target is reached: of which block (row), for which target (column), from where."""
+    """Intervals of amplitude in which cells reach their targets: not at `low`, but at `high`."""
 
-    row: NDArray[np.intp]
-    column: NDArray[np.intp]
+    cell: Indices
     low: Floats
     high: Floats
 
 
 @dataclass(frozen=True)
-class Scan:
-    """Blocks at increasing amplitudes, for targets.
+class Cells:
+    """Cells that can be solved at any amplitude.
 
     Attributes
     ----------
-    hides : Hides
-    amplitudes : array, (block, amplitude)
-    moved : array, (block, amplitude, target)
-        Displacements.
-    wanted : array, (block, 1, target)
-        Displacements to be reached.
-    carried : array of bool, (block, amplitude)
-        Whether the block does not recouple.
+    problem : Problem
+    arrays : mapping of str to array
+        Inputs but for the amplitude: one value for each cell, or one for all.
+    targets : array
+        Displacement to be reached by each cell, m.
     """
 
+    problem: Problem
+    arrays: Mapping[str, Floats]
+    targets: Floats
+
+    def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> Arrays:
+        """Results of some cells, each at its own amplitudes (rows of the array)."""
+        more = (1,) * (amplitude.ndim - 1)
+        arrays = {
+            name: (values if values.size == 1 else values[cell]).reshape(-1, *more)
+            for name, values in self.arrays.items()
+        }
+        return engine.solve(Request(self.problem, amplitude.shape, {**arrays, "amplitude": amplitude}, wanted))
+
+    def excess(self, amplitude: Floats, cell: Indices) -> Floats:
+        """Displacements less the targets."""
+        found = self.solve(amplitude, cell, ("permanent_displacement",))["permanent_displacement"]
+        return np.asarray(found - self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
+
+    def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
+        """Whether cells reach their targets."""
+        return np.asarray(self.excess(amplitude, cell) >= 0.0)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Cells at increasing amplitudes.
+
+    Attributes
+    ----------
+    cells : Cells
+    hides : Hides
+    amplitudes : array, (cell, amplitude)
+    found : mapping of str to array, (cell, amplitude)
+        Displacement, validity and the results of the changes.
+    """
+
+    cells: Cells
     hides: Hides
     amplitudes: Floats
-    moved: Floats
-    wanted: Floats
-    carried: NDArray[np.bool_]
+    found: Mapping[str, NDArray[Any]]
+
+    @property
+    def displacement(self) -> Floats:
+        """Displacements of the scan, (cell, amplitude)."""
+        return self.found["permanent_displacement"]
 
     @cached_property
-    def first(self) -> NDArray[np.intp]:
-        """The first amplitude that reaches a target, (block, target); their number where none does."""
-        reaches = self.moved >= self.wanted
-        first = reaches.argmax(axis=1)
-        reached = np.take_along_axis(reaches, first[:, np.newaxis], axis=1)[:, 0]
-        return np.asarray(np.where(reached, first, self.moved.shape[1]))
+    def first(self) -> Indices:
+        """Index of the first amplitude at which each cell reaches its target; their number where it does not."""
+        reaches = self.displacement >= self.cells.targets[:, np.newaxis]
+        return np.where(reaches.any(axis=1), reaches.argmax(axis=1), reaches.shape[1])
 
     @cached_property
     def before(self) -> NDArray[np.bool_]:
-        """Whether a target is reached nowhere in the scan up to the start of a step, (block, step, target)."""
-        steps = np.arange(self.moved.shape[1] - 1)
-        return np.asarray(steps[:, np.newaxis] < self.first[:, np.newaxis])
-
-    def ratios(self) -> Floats:
-        """Displacements for each target over those for the first, (block, target); NaN where a block does not move."""
-        most = np.nan_to_num(self.moved[:, :, :1], nan=-1.0).argmax(axis=1, keepdims=True)
-        found = np.take_along_axis(self.moved, most, axis=1)[:, 0]
-        with np.errstate(invalid="ignore"):
-            return np.asarray(found / found[:, :1])
-
-
-#: Whether targets (columns) are reached by blocks (rows) at amplitudes.
-Displaced: TypeAlias = Callable[[Floats, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]]
+        """Whether a target is not reached in the scan up to the start of a step, (cell, step)."""
+        steps = np.arange(self.amplitudes.shape[1] - 1)
+        return np.asarray(steps < self.first[:, np.newaxis])
 
 
 def first_step(scan: Scan) -> Steps:
     """The first step of the scan that reaches each target, of those that are reached."""
-    row, column = np.nonzero(scan.first < scan.moved.shape[1])
+    (cell,) = np.nonzero(scan.first < scan.amplitudes.shape[1])
     # the scan begins at yield, where no block has moved: there is always a step before
-    at = scan.first[row, column]
-    return Steps(row, column, scan.amplitudes[row, at - 1], scan.amplitudes[row, at])
+    at = scan.first[cell]
+    return Steps(cell, scan.amplitudes[cell, at - 1], scan.amplitudes[cell, at])
 
 
-def _places(holds: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
-    """As `np.nonzero`, where few places hold: in a tenth of the time."""
-    return np.unravel_index(np.flatnonzero(holds), holds.shape)
+def hidden_peaks(scan: Scan) -> Steps:
+    """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it."""
+    moved, parts = scan.displacement, scan.hides.parts
+    slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
+    # the part of a target from which on a point may lie next to a peak
+    least = np.where(slides_on, scan.hides.saw, np.inf)
+    peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
+    least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = _MAXIMUM
+    near = moved >= least * scan.cells.targets[:, np.newaxis]
+    cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & scan.before)
+    found = [Steps(cell[:0], np.empty(0), np.empty(0))]
+    for (some,) in slabs(cell.shape, SCANNED // parts):
+        own, begin = cell[some], step[some]
+        amplitudes = np.linspace(scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1)
+        reaches = scan.cells.reach(amplitudes, own)
+        (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
+        first = reaches[which].argmax(axis=1)
+        found.append(Steps(own[which], amplitudes[which, first - 1], amplitudes[which, first]))
+    return _together(found)
 
 
-def hidden_peaks(scan: Scan, moved: Callable[[Floats, NDArray[np.intp]], Floats], displaced: Displaced) -> Steps:
-    """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it.
+def steps_at_changes(scan: Scan, change: Change) -> Steps:
+    """Steps up to the last amplitude before a change, or to the first after it, at which a target is reached."""
+    cells, states = scan.cells, scan.found[change.result] & change.bits
+    cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
+    higher = np.maximum(scan.displacement[cell, step + 1], scan.displacement[cell, step])
+    # no comparison holds for the NaN of a gap: its edges are located
+    may = scan.before[cell, step] & ~(higher < change.least * cells.targets[cell])
+    cell, step = cell[may], step[may]
+    start, end, known = scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1], states[cell, step]
 
-    `moved` gives the displacement of blocks (rows) for the first target, each at other amplitudes of its own.  Those
-    for the others are in the same ratio to it at all amplitudes, so that each part is solved once.
-    """
-    moves, parts, points = scan.moved[:, :, 0], scan.hides.parts, scan.amplitudes.shape[1]
-    # from which part of a target on a point is beside what may be a peak
-    least_part = np.where(scan.carried, scan.hides.saw, np.inf)
-    peaks = (moves[:, 1:-1] > moves[:, :-2]) & (moves[:, 1:-1] > moves[:, 2:])
-    least_part[:, 1:-1][peaks & ~scan.carried[:, 1:-1]] = _MAXIMUM
-    row, point = np.nonzero(least_part < np.inf)
-    may = np.zeros(scan.moved.shape, np.bool_)
-    may[row, point] = scan.moved[row, point] >= least_part[row, point, np.newaxis] * scan.wanted[row, 0]
-    row, step, column = _places((may[:, 1:] | may[:, :-1]) & scan.before)
-    places, which = np.unique(row * points + step, return_inverse=True)
-    least = scan.wanted[row, 0, column] / scan.ratios()[row, column]
-    found = [Steps(row[:0], column[:0], np.empty(0), np.empty(0))]
-    for (some,) in slabs(places.shape, SCANNED // parts):
-        rows, steps = np.divmod(places[some], points)
-        # place, part
-        at = np.linspace(scan.amplitudes[rows, steps], scan.amplitudes[rows, steps + 1], parts + 1, axis=1)
-        there = moved(at, rows)
-        (asked,) = np.nonzero((which >= some.start) & (which < some.stop))
-        asked = asked[np.fmax.reduce(there, axis=1)[which[asked] - some.start] >= least[asked]]
-        place = which[asked] - some.start
-        first = np.maximum((there[place] >= least[asked, np.newaxis]).argmax(axis=1), 1)
-        found.append(Steps(row[asked], column[asked], at[place, first - 1], at[place, first]))
-    rows, columns, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
-    reaches = displaced(high, rows, columns) & ~displaced(low, rows, columns)  # the ratio is known to rounding
-    return Steps(rows[reaches], columns[reaches], low[reaches], high[reaches])
+    def changed(amplitude: Floats, which: Indices) -> NDArray[np.bool_]:
+        there = cells.solve(amplitude, cell[which], (change.result,))[change.result] & change.bits
+        return np.asarray(there != known[which])
+
+    low, high = bisected(start, end, changed, change.part * (end - start))
+    at_low = cells.reach(low, cell)
+    found = at_low | cells.reach(high, cell)
+    return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
 
 
-def beside_changes(
-    scan: Scan,
-    change: Change,
-    states: NDArray[np.integer[Any]],
-    state: Callable[[Floats, NDArray[np.intp]], NDArray[np.integer[Any]]],
-    displaced: Displaced,
-) -> Steps:
-    """Steps up to the last amplitude before a change, or to the first behind it, at which a target is reached.
-
-    `states` are those of the scan, (block, amplitude), `state` gives those of blocks (rows) at other amplitudes.
-    """
-    row, step = np.nonzero(states[:, 1:] != states[:, :-1])
-    higher = np.maximum(scan.moved[row, step + 1], scan.moved[row, step])
-    may = scan.before[row, step] & ~(higher < change.least * scan.wanted[row, 0])  # NaN beside a gap
-    asked = may.any(axis=1)
-    row, step = row[asked], step[asked]
-    start, end, known = scan.amplitudes[row, step], scan.amplitudes[row, step + 1], states[row, step]
-    low, high = narrow(
-        start,
-        end,
-        lambda at, which: np.where(state(at, row[which]) != known[which], 1.0, -1.0),
-        change.part * (end - start),
-    )
-    every = np.arange(scan.moved.shape[2])
-    row, column = np.repeat(row, every.size), np.tile(every, row.size)
-    start, low, high = (np.repeat(values, every.size) for values in (start, low, high))
-    at_low = displaced(low, row, column)
-    reaches = at_low | displaced(high, row, column)
-    below, beside = np.where(at_low, start, low), np.where(at_low, low, high)
-    return Steps(row[reaches], column[reaches], below[reaches], beside[reaches])
-
-
-def first_of(shape: tuple[int, ...], *found: Steps) -> Steps:
-    """The lowest of the steps found for each block and target."""
-    row, column, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
-    order = np.argsort(high, kind="stable")
-    _, first = np.unique((row * shape[1] + column)[order], return_index=True)
+def lowest_of(*found: Steps) -> Steps:
+    """The lowest of the steps found for each cell."""
+    steps = _together(found)
+    order = np.argsort(steps.high, kind="stable")
+    _, first = np.unique(steps.cell[order], return_index=True)
     chosen = order[first]
-    return Steps(row[chosen], column[chosen], low[chosen], high[chosen])
+    return Steps(steps.cell[chosen], steps.low[chosen], steps.high[chosen])
 
 
-def narrow(
+def _together(found: Sequence[Steps]) -> Steps:
+    return Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+
+def crossings(low: Floats, high: Floats, excess: Callable[[Floats, Indices], Floats]) -> tuple[Floats, Floats]:
+    """Narrow intervals to neighbouring numbers of double precision about the change of sign of `excess`.
+
+    Parameters
+    ----------
+    low, high : array
+        Ends of intervals.
+    excess : callable
+        ``excess(amplitudes, which)`` for intervals by their indices: negative or NaN at `low`, not negative at `high`.
+
+    Returns
+    -------
+    low, high : array
+        Neighbours: excess is negative or NaN at `low`, not negative at `high`.
+    """
+    from scipy.optimize import elementwise
+
+    if not low.size:
+        return low, high
+
+    def finite(at: Floats, which: Indices) -> Floats:
+        found = np.nan_to_num(excess(at, which), nan=-1.0, posinf=1e300)
+        return np.where(found == 0.0, 1e-300, found)  # a root that is met exactly is not the end of the search
+
+    tolerances = {"xatol": 0.0, "xrtol": 4.0 * np.finfo(np.float64).eps, "fatol": 0.0, "frtol": 0.0}
+    found = elementwise.find_root(finite, (low, high), args=(np.arange(low.size),), tolerances=tolerances)
+    below, above = found.bracket
+    return bisected(below, above, lambda at, which: np.asarray(excess(at, which) >= 0.0))
+
+
+def bisected(
     low: Floats,
     high: Floats,
-    excess: Callable[[Floats, NDArray[np.intp]], Floats],
+    changed: Callable[[Floats, Indices], NDArray[np.bool_]],
     width: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Narrow every interval until its ends are neighbours in double precision, or it is no wider than `width`.
+    """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
 
-    `excess` is negative or NaN at `low`, not negative at `high`, and changes its sign once; it is asked at amplitudes
-    together with the numbers of the intervals that they belong to.  By ITP (Oliveira and Takahashi 2020): the guess of
-    a secant is moved towards the middle, and is never so far from it that more than one step is lost to bisection.
-    Where excess has no finite value it is bisection.
+    ``changed(amplitudes, which)``, for intervals by their indices, holds at `high` and not at `low`.
     """
     low, high = low.copy(), high.copy()
-    active, enough = np.arange(low.size), np.broadcast_to(width, low.shape)
-    below, above = excess(low, active), excess(high, active)
-    widest = high - low
-    for step in count():
-        start, end = low[active], high[active]
-        middle = start + 0.5 * (end - start)
-        wide = (start < middle) & (middle < end) & (end - start > enough[active])
-        active, start, end, middle = active[wide], start[wide], end[wide], middle[wide]
+    active, width = np.arange(low.size), np.broadcast_to(width, low.shape)
+    while True:
+        middle = low[active] + 0.5 * (high[active] - low[active])
+        inside = (low[active] < middle) & (middle < high[active]) & (high[active] - low[active] > width[active])
+        active, middle = active[inside], middle[inside]
         if not active.size:
-            break
-        length, first, last = end - start, below[active], above[active]
-        with np.errstate(invalid="ignore", over="ignore"):
-            aside = -np.nan_to_num(0.5 + first / (last - first)) * length
-        inward = _INWARD * length * (length / widest[active])
-        furthest = np.maximum(np.ldexp(widest[active], -step) - 0.5 * length, 0.0)
-        at = middle + np.copysign(np.clip(np.abs(aside) - inward, 0.0, furthest), aside)
-        at = np.clip(at, np.nextafter(start, end), np.nextafter(end, start))
-        found = excess(at, active)
-        reaches = found >= 0.0
-        high[active[reaches]], above[active[reaches]] = at[reaches], found[reaches]
-        low[active[~reaches]], below[active[~reaches]] = at[~reaches], found[~reaches]
-    return low, high
+            return low, high
+        above = changed(middle, active)
+        high[active[above]], low[active[~above]] = middle[above], middle[~above]

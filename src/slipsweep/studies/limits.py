@@ -1,11 +1,10 @@
 """The inverse of a sweep: the smallest amplitude at which a tolerable displacement is reached.
 
-The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall
-behind a jump, and has gaps where the model gives no value.  So every block is first scanned
-from its yield acceleration upwards, with both sides of the amplitudes at which its mode changes.
-What may lie hidden in its steps is looked for (`limit_scans`).  The first step that reaches the
-target is narrowed until two neighbouring double-precision numbers are left.  Both ask the cycle
-solver, for all cells at once.
+The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall after a jump, and has
+gaps where the model gives no value.  So every block is first scanned from its yield acceleration upwards, including
+both sides of the amplitudes at which its mode changes, and what the steps of the scan may hide is looked for
+(`limit_scans`).  The first step that reaches the target is narrowed until two neighbouring double-precision numbers
+are left.  All cells are solved together, by the cycle solver.
 """
 
 import math
@@ -15,14 +14,15 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Problem, Request
-from slipsweep.grid.plans import Plan, ordinary, plan_sweep
-from slipsweep.grid.tables import Variable
+from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (
@@ -34,31 +34,19 @@ from slipsweep.model.variables import (
     TOLERABLE_DISPLACEMENT,
     LimitStatus,
     SlidingMode,
-    Validity,
 )
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.studies.limit_scans import (
-    SCANNED,
-    UNDER_RECORD,
-    UNDER_WAVEFORM,
-    Change,
-    Scan,
-    Steps,
-    beside_changes,
-    first_of,
-    first_step,
-    hidden_peaks,
-    narrow,
-)
+from slipsweep.studies import limit_scans
+from slipsweep.studies.limit_scans import SCANNED, Cells, Scan
 
 Floats = NDArray[np.float64]
 
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 256
 
-#: What a limit takes beside its block's scan, in cells of the cycle solver: the search in a step, a scan's scaling.
+#: Cost of a limit beside the scan of its block, in cells of the cycle solver.
 _COST = 100.0
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
@@ -66,13 +54,13 @@ TITLE = "Amplitudes at which a tolerable displacement is reached"
 #: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
 JUMP = 1e-6
 
-#: How far from its place, in parts of it, a change of mode that is known by a formula may be: rounding.
-_BESIDE = 1e-15
+#: Rounding of the amplitude at which a mode changes by a formula, relative.
+_ROUNDING = 1e-15
 
-#: Pulses of a record whose changes of mode a scan looks at on both sides: noise has thousands.
+#: Pulses of a record whose changes of mode a scan includes: noise has thousands.
 _MOST_PULSES = 128
 
-#: Results that tell in which mode a block slides.
+#: Results that say in which mode a block slides.
 _MODES = ("sliding_mode", "stick_slip_pulses", "continuous_pulses")
 
 #: Inputs that only scale the result, or only flag it.
@@ -80,22 +68,33 @@ _SCALES = ("frequency", "time_scale", "structure_frequency")
 
 
 def plan_limits(
-    *,
     displacement: Any,
+    inputs: Inputs,
+    *,
+    excitation: Any = "sine",
+    model: Any = "mendez",
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
-    **given: Any,
 ) -> Plan:
-    """Plan of limit amplitudes; keyword arguments, results and errors of `slipsweep.limit_amplitude`.
+    """Plan of limit amplitudes.
 
-    Arrays with dimensions of their own are `Variable`.
+    Parameters
+    ----------
+    displacement, excitation, model, maximum_amplitude, amplitude_steps
+        As `slipsweep.limit_amplitude`.
+    inputs : Inputs
+        All but the strength of the shaking.
+
+    Raises
+    ------
+    InputError
+        As `slipsweep.limit_amplitude`.
     """
-    values = displacement.values if isinstance(displacement, Variable) else displacement
-    checked = check_values("displacement", values)
-    if isinstance(displacement, Variable):
-        target = Variable(displacement.dims, checked)
+    checked = check_values("displacement", displacement)
+    if isinstance(displacement, (xr.DataArray, xr.Variable)):
+        target = xr.Variable(displacement.dims, checked)
     elif checked.ndim <= 1:
-        target = Variable(("displacement",) * checked.ndim, checked)
+        target = xr.Variable(("displacement",) * checked.ndim, checked)
     else:
         raise InputError(f"displacement: an array of {checked.ndim} dimensions; must be a scalar or a 1-D array")
     if checked.size == 0:
@@ -103,47 +102,41 @@ def plan_limits(
     steps = check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
 
     # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
-    plan = plan_sweep(**given, amplitude=target, variables=["permanent_displacement"])
+    plan = plan_sweep(
+        inputs.but({"amplitude": target}), excitation=excitation, model=model, variables=["permanent_displacement"]
+    )
     task = plan.tasks[0]
     if maximum_amplitude is None:
         maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.model.g
     highest = check_single("maximum_amplitude", maximum_amplitude)
-    inputs = dict(task.inputs)
-    inputs["displacement"] = inputs.pop("amplitude")
-    _, scaling = _groups(inputs, len(plan.sizes))
-    dims = tuple(plan.sizes)
+    arrays = dict(task.inputs)
+    arrays["displacement"] = arrays.pop("amplitude")
+    blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in (*_SCALES, "displacement")))
+    scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
     coords = {name: variable for name, variable in plan.coords.items() if name != "amplitude"}
     names = (*LIMIT_RESULTS, *_codes(task.problem), "validity")
     return Plan(
         plan.sizes,
-        coords | {"displacement": Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
-        (replace(task, solver=partial(solve, highest, steps), names=names, inputs=inputs),),
+        coords | {"displacement": xr.Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
+        (replace(task, solver=partial(solve, highest, steps), names=names, inputs=arrays),),
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
-        # a scan serves a block for all that is asked of it
-        cost=plan.cost * (max(1.0, steps / math.prod(plan.sizes[dims[axis]] for axis in scaling)) + _COST),
-        together=tuple(dims[axis] for axis in scaling),
+        # one scan of a block serves all its targets
+        cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + _COST),
+        together=tuple(scaled),
         memory=plan.memory,
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
-        is_ordinary=ordinary(task.problem, {**coords, "amplitude": Variable((), np.array(highest))}),
         described=RESULTS | RECORD_COUNTS | LIMIT_RESULTS,
     )
 
 
-def _groups(inputs: Mapping[str, Floats], dimensions: int) -> tuple[list[int], list[int]]:
-    """Dimensions along which blocks differ, and those along which only what is asked of them does."""
-    blocks = [values.shape for name, values in inputs.items() if name not in (*_SCALES, "displacement")]
-    moving = [axis for axis in range(dimensions) if any(own[axis] > 1 for own in blocks)]
-    return moving, [axis for axis in range(dimensions) if axis not in moving]
-
-
 def _codes(problem: Problem) -> tuple[str, ...]:
-    """Results that tell in which mode a block slides, or how many pulses of a record it slides in."""
+    """Results that say in which mode a block slides, or in how many pulses of a record."""
     return tuple(RECORD_COUNTS) if isinstance(problem.excitation, (Record, Suite)) else ("sliding_mode",)
 
 
-def solve(maximum_amplitude: float, steps: int, asked: Request) -> Arrays:
+def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
     """Find the limit amplitudes of a grid.
 
     Parameters
@@ -152,127 +145,81 @@ def solve(maximum_amplitude: float, steps: int, asked: Request) -> Arrays:
         Where the scan ends, m/s².
     steps : int
         Steps of the scan.
-    asked : Request
+    request : Request
         Variables of `slipsweep.limit_amplitude`; its inputs are those of `engine.solve` but for the amplitude,
         and the `displacement` that is to be reached, m.
     """
-    results = asked.results()
-    for where, part in engine.motions(asked):
-        found = _solve_motion(maximum_amplitude, steps, part)
-        for name, values in results.items():
-            values[where] = found[name]
+    results = request.results()
+    for where, motion in engine.motions(request):
+        for slab in slabs(motion.shape, max(1, SCANNED // (steps + _most_changes(motion)))):
+            part = motion.part(slab)
+            solved = _solve_part(part, maximum_amplitude, steps)
+            for name, values in results.items():
+                values[(*where, ...)][(*slab, ...)] = solved[name]
+            request.tell(math.prod(part.shape))
     return results
 
 
-def _solve_motion(maximum_amplitude: float, steps: int, asked: Request) -> Arrays:
-    """Find the limit amplitudes of a grid that one motion shakes."""
-    shape, arrays = asked.shape, asked.arrays
-    moving, scaling = _groups(arrays, len(shape))
-    # two dimensions are enough: the blocks, and what is asked of each
-    table = tuple(math.prod(shape[axis] for axis in group) for group in (moving, scaling))
-    rows = {name: _two_dimensional(values, shape, (moving, scaling)) for name, values in arrays.items()}
-    whole = replace(asked, shape=table, arrays=rows, empty=np.empty)
-    found = whole.results()
-    for slab in slabs(table, max(1, SCANNED // (steps + _most_changes(asked)))):
-        part = whole.part(slab)
-        solved = _solve_slab(part, maximum_amplitude, steps)
-        for name, values in found.items():
-            values[slab] = solved[name]
-        asked.tell(math.prod(part.shape))
-    order = [[*moving, *scaling].index(axis) for axis in range(len(shape))]
-    sizes = [shape[axis] for axis in (*moving, *scaling)]
-    return {name: values.reshape(sizes).transpose(order) for name, values in found.items()}
+def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Arrays:
+    """Find the limit amplitudes of a part of a grid that one motion shakes."""
+    problem, shape, arrays = request.problem, request.shape, dict(request.arrays)
+    displacement = arrays.pop("displacement")
+    amplitudes = _scanned_amplitudes(problem, arrays, maximum_amplitude, steps)
+    hides = limit_scans.UNDER_RECORD if isinstance(problem.excitation, Record) else limit_scans.UNDER_WAVEFORM
+    # the dimensions of the grid are kept here, as blocks that differ in their frequency alone are solved once
+    every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
+    lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
+    names = tuple({"permanent_displacement", "validity", *(change.result for change in hides.changes)})
+    found = engine.solve(Request(problem, lengths, every, names))
 
+    def in_rows(values: NDArray[Any]) -> NDArray[Any]:
+        return np.broadcast_to(values, (*shape, amplitudes.shape[-1])).reshape(-1, amplitudes.shape[-1])
 
-def _two_dimensional(values: Floats, shape: tuple[int, ...], groups: tuple[list[int], list[int]]) -> Floats:
-    """An input with each group of dimensions made one, of length 1 where it does not vary along the group."""
-    sizes, lengths = list(values.shape), []
-    for group in groups:
-        if any(values.shape[axis] > 1 for axis in group):
-            for axis in group:
-                sizes[axis] = shape[axis]
-        lengths.append(math.prod(sizes[axis] for axis in group))
-    return np.broadcast_to(values, sizes).transpose([*groups[0], *groups[1]]).reshape(lengths)
-
-
-def _solve_slab(asked: Request, maximum_amplitude: float, steps: int) -> Arrays:
-    """Solve blocks (rows) for what is asked of each (columns)."""
-    problem, shape, arrays = asked.problem, asked.shape, dict(asked.arrays)
-    displacement = np.broadcast_to(arrays.pop("displacement"), shape)
-    blocks = {name: values for name, values in arrays.items() if name not in _SCALES}
-    amplitudes = _scan(problem, shape[0], blocks, maximum_amplitude, steps)
-
-    # every amplitude of the scan, at every frequency
-    every = {name: values[:, np.newaxis, :] for name, values in arrays.items()}
-    size = (shape[0], amplitudes.shape[1], shape[1])
-    hides = UNDER_RECORD if isinstance(problem.excitation, Record) else UNDER_WAVEFORM
-    codes = {"validity", *(change.result for change in hides.changes)}
-    found = _at(problem, every, amplitudes[:, :, None], ("permanent_displacement", *codes), size)
-    scanned, carried = found["permanent_displacement"], found["validity"][:, :, 0] & Validity.NOT_RECOUPLED != 0
-    scan = Scan(hides, amplitudes, scanned, displacement[:, np.newaxis, :], carried)
-
-    def of_blocks(row: NDArray[np.intp]) -> dict[str, Floats]:
-        # but for a factor the same at all that is asked of a block
-        return _zipped(arrays, row, np.zeros_like(row))
-
-    def moved(amplitude: Floats, row: NDArray[np.intp]) -> Floats:
-        cells = {name: values[:, np.newaxis] for name, values in of_blocks(row).items()}
-        return _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
-
-    def excess(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> Floats:
-        cells = _zipped(arrays, row, column)
-        moved = _at(problem, cells, amplitude, ("permanent_displacement",))["permanent_displacement"]
-        return np.asarray(moved - displacement[row, column])
-
-    def displaced(amplitude: Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
-        return np.asarray(excess(amplitude, row, column) >= 0.0)
-
-    def beside(change: Change) -> Steps:
-        def state(amplitude: Floats, row: NDArray[np.intp]) -> NDArray[np.integer[Any]]:
-            return np.asarray(_at(problem, of_blocks(row), amplitude, (change.result,))[change.result] & change.bits)
-
-        return beside_changes(scan, change, found[change.result][:, :, 0] & change.bits, state, displaced)
-
-    places = (first_step(scan), hidden_peaks(scan, moved, displaced), *map(beside, hides.changes))
-    row, column, low, high = first_of(shape, *places)
-    cells = _zipped(arrays, row, column)
-    low, high = narrow(low, high, lambda amplitude, which: excess(amplitude, row[which], column[which]))
+    own = {name: values.ravel() if values.size == 1 else _cells(values, shape) for name, values in arrays.items()}
+    cells = Cells(problem, own, _cells(displacement, shape))
+    scan = Scan(cells, hides, in_rows(amplitudes), {name: in_rows(values) for name, values in found.items()})
+    at_changes = [limit_scans.steps_at_changes(scan, change) for change in hides.changes]
+    steps_found = limit_scans.first_step(scan), limit_scans.hidden_peaks(scan), *at_changes
+    cell, low, high = limit_scans.lowest_of(*steps_found)
+    low, high = limit_scans.crossings(low, high, lambda at, which: cells.excess(at, cell[which]))
     wanted = ("permanent_displacement", *_codes(problem), "validity")
-    before, after = _at(problem, cells, low, wanted), _at(problem, cells, high, wanted)
+    before, after = cells.solve(low, cell, wanted), cells.solve(high, cell, wanted)
 
-    # what is missing says why in its validity: that of the greatest amplitude
-    results = _at(problem, arrays, np.full((1, 1), maximum_amplitude), ("validity",), shape)
+    # without a limit the validity at the maximum amplitude says why
+    every_cell = np.arange(cells.targets.size)
+    results = cells.solve(np.full(every_cell.shape, maximum_amplitude), every_cell, ("validity",))
     results |= {
-        "limit_amplitude": np.full(shape, math.nan),
-        "limit_status": np.full(shape, LimitStatus.NOT_REACHED, np.int8),
-        "permanent_displacement": np.full(shape, math.nan),
-        **{name: np.full(shape, SlidingMode.MISSING, RESULT_DTYPES[name]) for name in _codes(problem)},
+        "limit_amplitude": np.full(every_cell.shape, math.nan),
+        "limit_status": np.full(every_cell.shape, LimitStatus.NOT_REACHED, np.int8),
+        "permanent_displacement": np.full(every_cell.shape, math.nan),
+        **{name: np.full(every_cell.shape, SlidingMode.MISSING, RESULT_DTYPES[name]) for name in _codes(problem)},
     }
-    results["limit_status"][np.isnan(scanned[:, :, 0]).all(axis=1)] = LimitStatus.INVALID
+    results["limit_status"][np.isnan(scan.displacement).all(axis=1)] = LimitStatus.INVALID
     for name in wanted:
-        results[name][row, column] = after[name]
-    results["limit_amplitude"][row, column] = high
-    results["limit_status"][row, column] = _status(before, after)
-    return results
+        results[name][cell] = after[name]
+    results["limit_amplitude"][cell] = high
+    results["limit_status"][cell] = _status(before, after)
+    return {name: values.reshape(shape) for name, values in results.items()}
 
 
-def _at(
-    problem: Problem,
-    arrays: Mapping[str, Floats],
-    amplitude: Floats,
-    wanted: tuple[str, ...],
-    shape: tuple[int, ...] | None = None,
-) -> Arrays:
-    """Solve blocks at amplitudes; `shape` if it is not that of the amplitudes."""
-    return engine.solve(Request(problem, shape or amplitude.shape, {**arrays, "amplitude": amplitude}, wanted))
+def _cells(values: Floats, shape: tuple[int, ...]) -> Floats:
+    """The value of each cell of a grid, in order."""
+    return np.broadcast_to(values, shape).ravel()
 
 
-def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_amplitude: float, steps: int) -> Floats:
-    """Amplitudes to try for `count` blocks, increasing along each row; both sides of every change of mode are there."""
-    # Newmark's block has no limit, and may have no θ and μs that one would follow from
+def _scanned_amplitudes(problem: Problem, arrays: Mapping[str, Floats], maximum_amplitude: float, steps: int) -> Floats:
+    """Amplitudes to try, increasing along the last dimension, with both sides of every change of mode.
+
+    The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
+    """
+    blocks = {name: values for name, values in arrays.items() if name not in _SCALES}
+    shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
+    # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, Newmark) else ()
     wanted = ("yield_acceleration", *limited)
-    known = engine.friction_parameters(Request(problem, (count, 1), {**blocks, "amplitude": np.zeros((1, 1))}, wanted))
+    rest = np.zeros((1,) * len(shape))
+    parameters = engine.friction_parameters(Request(problem, shape, {**blocks, "amplitude": rest}, wanted))
+    known = {name: values.reshape(-1, 1) for name, values in parameters.items()}
     yields = known["yield_acceleration"]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
@@ -288,16 +235,17 @@ def _scan(problem: Problem, count: int, blocks: Mapping[str, Floats], maximum_am
         heights, thresholds = np.ones(1), np.hstack([known[name] for name in limited] or [start])
     changes = _mode_changes(thresholds, heights)
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
-    return np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
+    scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
+    return scanned.reshape(*shape, -1)
 
 
-def _most_changes(asked: Request) -> int:
-    """How many amplitudes beside the steps a scan may have."""
-    motion = asked.problem.excitation
+def _most_changes(request: Request) -> int:
+    """How many amplitudes a scan may have in addition to its steps."""
+    motion = request.problem.excitation
     if not isinstance(motion, Record):
         return 4
     # two thresholds of a pulse, and two sides of each
-    return 4 * int(_highest(motion, float(asked.arrays["polarity"].item())).size)
+    return 4 * int(_highest(motion, float(request.arrays["polarity"].item())).size)
 
 
 def _highest(record: Record, polarity: float) -> Floats:
@@ -313,20 +261,7 @@ def _mode_changes(thresholds: Floats, heights: Floats) -> Floats:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         places = (thresholds[:, :, None] / heights).reshape(len(thresholds), -1)
-        return np.hstack([places * (1.0 - _BESIDE), places * (1.0 + _BESIDE)])
-
-
-def _zipped(arrays: Mapping[str, Floats], row: NDArray[np.intp], column: NDArray[np.intp]) -> dict[str, Floats]:
-    """Cells picked from two-dimensional inputs, one after the other."""
-    picked = {}
-    for name, values in arrays.items():
-        if values.size == 1:
-            picked[name] = values.reshape(1)
-            continue
-        down = row if values.shape[0] > 1 else np.zeros_like(row)
-        across = column if values.shape[1] > 1 else np.zeros_like(row)
-        picked[name] = values[down, across]
-    return picked
+        return np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])
 
 
 def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:

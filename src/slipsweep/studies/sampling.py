@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Variable
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choice,
@@ -110,30 +110,27 @@ class Sampling:
         uniform = self._uniform(2 * number)
         return self._draws(uniform[:number]), self._draws(uniform[number:])
 
-    def _uniform(self, columns: int) -> Floats:
-        """Numbers from 0 to 1 that fill a cube of so many dimensions: `columns` rows of `samples`."""
+    def _uniform(self, dimensions: int) -> Floats:
+        """Numbers from 0 to 1 that fill a cube of so many dimensions: (dimension, sample)."""
         from scipy.stats import qmc
 
         # a generator of its own: the numbers depend on the seed alone
         generator = np.random.default_rng(self.seed)
         if self.method == "random":
-            uniform = generator.random((self.samples, columns))
+            uniform = generator.random((self.samples, dimensions))
         else:
             engines = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}
-            uniform = engines[self.method](columns, rng=generator).random(self.samples)
-        # in rows without gaps, which scipy turns into draws in 0.8 of the time
-        return np.maximum(uniform.T, _LEAST, order="C")
+            uniform = engines[self.method](dimensions, rng=generator).random(self.samples)
+        return np.maximum(uniform.T, _LEAST)
 
-    def _draws(self, columns: Floats) -> dict[str, Floats]:
+    def _draws(self, uniform: Floats) -> dict[str, Floats]:
         """Turn a row of numbers from 0 to 1 for each parameter into draws."""
         from scipy.stats import norm
 
         if self.correlation:
-            columns = norm.cdf(np.linalg.cholesky(self._matrix()) @ norm.ppf(columns))
-            columns = np.clip(columns, _LEAST, 1.0 - 2.0**-53)
-        return {
-            name: one.draws(column) for (name, one), column in zip(self.distributions.items(), columns, strict=True)
-        }
+            uniform = norm.cdf(np.linalg.cholesky(self._matrix()) @ norm.ppf(uniform))
+            uniform = np.clip(uniform, _LEAST, 1.0 - 2.0**-53)
+        return {name: one.draws(row) for (name, one), row in zip(self.distributions.items(), uniform, strict=True)}
 
     def _matrix(self) -> Floats:
         names = list(self.distributions)
@@ -312,7 +309,7 @@ def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tup
 
 
 def check_draws(
-    sampling: Sampling, draws: Mapping[str, Floats], names: Sequence[str], coords: Mapping[str, Variable]
+    sampling: Sampling, draws: Mapping[str, Floats], names: Sequence[str], coords: Mapping[str, xr.Variable]
 ) -> None:
     """Refuse draws of some parameters that no physics allows, anywhere on the grid."""
     for name in names:

@@ -11,7 +11,6 @@ from slipsweep.model.options import Model
 from slipsweep.model.parameters import check_numbers, shown
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
 from slipsweep.studies.calibration import calibration_table
-from slipsweep.studies.datasets import _dataset
 from slipsweep.studies.friction import friction_table
 
 #: What a caller may give as a test.
@@ -86,8 +85,7 @@ def measured_friction(
     >>> test.least_friction.round(2).values
     array([0.07, 0.07, 0.06, 0.08, 0.06, 0.04, 0.06, 0.05])
     """
-    table = friction_table(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
-    return _dataset(table, {})
+    return friction_table(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
 
 
 def calibrate(
@@ -159,10 +157,9 @@ def calibrate(
     >>> print(f"{found.yield_acceleration.item():.2f} m/s2, {found.decay_rate.item():.2f}, {found.delta_mu.item():.2f}")
     1.80 m/s2, 2.00, 0.10
     """
-    table = calibration_table(
+    return calibration_table(
         test_of(test), theta, mu_s, model=model, offset=offset, drift=drift, noise=noise, cycles=cycles
     )
-    return _dataset(table, {})
 
 
 def test_of(given: Any) -> ShakingTest:

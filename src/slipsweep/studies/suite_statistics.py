@@ -1,136 +1,170 @@
 """Statistics of the displacement over the motions of a suite, at every other grid point."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
 from slipsweep.errors import InputError
-from slipsweep.grid.tables import Table, Variable
+from slipsweep.grid.resources import grid_text
 from slipsweep.model.parameters import check_list, shown
 from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
 from slipsweep.studies.sampling import check_quantiles, check_thresholds
 
-Floats = NDArray[np.float64]
-
 TITLE = "Statistics of the permanent displacement over a suite of motions"
 
-#: What makes up a suite, of the dimensions that a result has.
-_SUITE = ("motion", "polarity")
+#: Dimensions of a result that make up a suite.
+SUITE = ("motion", "polarity")
 
 #: Flags under which a motion has no value.
 REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
 
+#: The median, and one standard deviation of a normal distribution on either side of it.
+QUANTILES = (0.16, 0.5, 0.84)
 
-def suite_table(table: Table, *, thresholds: Any, quantiles: Any, zero: Any, over: Any) -> Table:
-    """What `slipsweep.suite_statistics` returns, of a table that holds `permanent_displacement` and `validity`."""
+#: Most grid points whose statistics are printed.
+_MOST_LINES = 60
+
+
+def suite_statistics(
+    result: xr.Dataset,
+    *,
+    thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
+    quantiles: float | Sequence[float] | np.ndarray = QUANTILES,
+    zero: float | str = 0.0,
+    over: str | Sequence[str] | None = None,
+) -> xr.Dataset:
+    """Statistics of the permanent displacement over the motions of a suite.
+
+    Parameters
+    ----------
+    result : Dataset
+        A result of `sweep` with the dimension `motion`, or a file of one opened with xarray.
+    thresholds : float, str or list of these
+        Increasing displacements, m or with a unit ("50mm"), ≥ 0.
+    quantiles : float or array
+        Increasing, between 0 and 1.
+    zero : float or str
+        Largest displacement, m or with a unit, that counts as zero.
+    over : str or list of str, optional
+        Dimensions that make up the suite: `motion`, and by default `polarity` where it is one.
+
+    Returns
+    -------
+    Dataset
+        Over all other dimensions:
+
+        - `value_count`, `valueless_count`: motions with a value, and without; `valueless_share` of all.
+        - `valueless_flag_count`, dimension `flag`: motions without a value, by reason.  One may have several.
+        - `zero_probability`: share of displacements of `zero` at most.
+        - `nonzero_median`, `nonzero_geometric_mean` (m) and `log_standard_deviation` (of natural logarithms, with
+          n - 1) of the others.
+        - `displacement_quantile` (m), dimension `quantile`, and `exceedance_probability`, dimension `threshold` (m):
+          of all displacements, those that are zero, too.
+
+        All but the counts and `valueless_share` are of the motions that have a value, NaN where none has.
+
+    Raises
+    ------
+    InputError
+        The result has no dimension `motion`, lacks `permanent_displacement` or `validity`, or a value is not allowed.
+
+    See Also
+    --------
+    displacement_hazard : with the seismic hazard of a site
+    sample : statistics under uncertain inputs
+
+    Notes
+    -----
+    A share of zero displacements beside the distribution of the others follows Bray and Travasarou [1]_.
+
+    References
+    ----------
+    .. [1] J. D. Bray and T. Travasarou (2007), "Simplified procedure for estimating earthquake-induced deviatoric slope
+       displacements", Journal of Geotechnical and Geoenvironmental Engineering 133, 381-392,
+       https://doi.org/10.1061/(ASCE)1090-0241(2007)133:4(381)
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
+    >>> result = slipsweep.sweep(5, 0.3, amplitude=[2.0, 4.0, 6.0], excitation=suite)
+    >>> found = slipsweep.suite_statistics(result, thresholds="50mm")
+    >>> found.exceedance_probability.sel(threshold=0.05).values
+    array([0.  , 0.25, 0.75])
+    """
+    if not isinstance(result, xr.Dataset):
+        raise InputError(f"result = {shown(result)}: must be a Dataset")
     for name in ("permanent_displacement", "validity"):
-        if name not in table.data_vars:
+        if name not in result.data_vars:
             raise InputError(f"result: {name}: missing: must be there, of all motions")
-    displacement = table["permanent_displacement"]
-    g = float(table.attrs.get("g", np.nan))
-    dims = _suite_dims(displacement, over)
-    grid = {dim: size for dim, size in displacement.sizes.items() if dim not in dims}
-    order = (*grid, *dims)
-    shape = (*grid.values(), -1)
-    values = displacement.values.transpose([displacement.dims.index(dim) for dim in order]).reshape(shape)
-    codes = np.broadcast_to(_spread(table["validity"], order), [displacement.sizes[dim] for dim in order]).reshape(
-        shape
-    )
+    dims = suite_dims(result["permanent_displacement"], over)
+    g = float(result.attrs.get("g", np.nan))
     limits, wanted = check_thresholds("thresholds", thresholds, g), check_quantiles("quantiles", quantiles)
     least = check_thresholds("zero", zero, g)
     if least.size > 1:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
-    found = _statistics(np.asarray(values, np.float64), codes, limits, wanted, float(least[0]))
-    own = {
-        "displacement_quantile": "quantile",
-        "exceedance_probability": "threshold",
-        "valueless_flag_count": "flag",
+
+    moved = result["permanent_displacement"].astype(np.float64).load()
+    # a reader may have made codes to numbers with NaN
+    codes = result["validity"].fillna(0).astype(np.int16).load()
+    there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
+    bits = np.array(REASONS, np.int16)
+    about = {"flag_values": bits.tolist(), "flag_meanings": " ".join((flag.name or "").lower() for flag in REASONS)}
+    flag = xr.DataArray(bits, dims="flag", attrs={**STATISTIC_COORDINATES["flag"], **about})
+    threshold = xr.DataArray(limits, dims="threshold", attrs=STATISTIC_COORDINATES["threshold"])
+    count = there.sum(dims)
+    slid = moved.where(moved > least[0])
+    logs: xr.DataArray = np.log(slid)  # type: ignore[assignment]
+    found = {
+        "value_count": count.astype(np.int32),
+        "valueless_count": (total - count).astype(np.int32),
+        "valueless_flag_count": (~there & (codes & flag != 0)).sum(dims).astype(np.int32),
+        "valueless_share": (total - count) / total,
+        "zero_probability": (moved <= least[0]).where(there).mean(dims),
+        "nonzero_median": slid.median(dims),
+        "nonzero_geometric_mean": np.exp(logs.mean(dims)),
+        "log_standard_deviation": logs.std(dims, ddof=1).where(slid.count(dims) > 1),
+        "displacement_quantile": _quantiles(moved, wanted, dims),
+        "exceedance_probability": (moved > threshold).where(there).mean(dims),
     }
-    names = " ".join((flag.name or "").lower() for flag in REASONS)
-    bits = np.array([int(flag) for flag in REASONS], np.int16)
-    flag = {**STATISTIC_COORDINATES["flag"], "flag_values": bits.tolist(), "flag_meanings": names}
-    coords = {
-        **{name: one for name, one in table.coords.items() if not {*dims, *own.values()} & {*one.dims, name}},
-        "quantile": Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"]),
-        "threshold": Variable(("threshold",), limits, STATISTIC_COORDINATES["threshold"]),
-        "flag": Variable(("flag",), bits, flag),
-    }
-    results = {
-        name: Variable((*grid, *([own[name]] if name in own else [])), found[name], about)
-        for name, about in SUITE_STATISTICS.items()
-    }
-    attrs = {**table.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
-    return Table(coords, results, attrs)
+    own = {"flag": flag.variable, "threshold": threshold.variable}
+    own["quantile"] = xr.Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"])
+    attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
+    grid = [dim for dim in moved.dims if dim not in dims]
+    variables = {name: values.transpose(*grid, ...).variable.copy(deep=False) for name, values in found.items()}
+    for name, variable in variables.items():
+        variable.attrs = SUITE_STATISTICS[name]
+    coords = {name: one.variable for name, one in result.coords.items() if not {*dims, *own} & {*one.dims, name}}
+    return xr.Dataset(variables, coords | own, attrs)
 
 
-def limit_quantiles(table: Table, quantiles: Any) -> Table:
-    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point.
+def _quantiles(values: xr.DataArray, quantiles: np.ndarray, dims: Sequence[str]) -> xr.DataArray:
+    """Quantiles of the values that are there, linear between them; dimension `quantile`, without a coordinate."""
+    there = values.notnull().any(dims)
+    full = values.where(there, 0.0)  # of nothing there is no quantile
+    # to leave out NaN takes ten times as long
+    found = full.quantile(quantiles, dims, skipna=bool(full.isnull().any()))
+    return found.where(there).drop_vars("quantile").transpose(..., "quantile")
 
-    A motion that does not reach the displacement up to the maximum amplitude has a limit above all others.  Motions
-    without a value are left out.
 
-    Parameters
-    ----------
-    table : Table
-        Limit amplitudes with the dimension `motion`, and their status.
-    quantiles : float or array
+def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
+    """The dimensions that make up the suite: those in `over`, or `SUITE`.
 
-    Returns
-    -------
-    Table
-        `limit_quantile` (m/s², dimension `quantile`; infinite where so many motions do not reach it, NaN where none has
-        a value), `value_count` and `not_reached_count`.
+    Raises
+    ------
+    InputError
+        The dimension `motion` is not among them.
     """
-    limits = table["limit_amplitude"]
-    dims = _suite_dims(limits, None)
-    grid = {dim: size for dim, size in limits.sizes.items() if dim not in dims}
-    order = [limits.dims.index(dim) for dim in (*grid, *dims)]
-    values, status = (
-        table[name].values.transpose(order).reshape((*grid.values(), -1))
-        for name in ("limit_amplitude", "limit_status")
-    )
-    beyond = status == LimitStatus.NOT_REACHED
-    ordered = np.sort(np.where(beyond, np.inf, values), axis=-1)
-    count = np.count_nonzero(~np.isnan(ordered), axis=-1)
-    wanted = check_quantiles("quantiles", quantiles)
-    found = _quantiles(ordered, np.zeros_like(count), count, wanted)
-    coords = {name: one for name, one in table.coords.items() if not {*dims} & {*one.dims, name}}
-    results = {
-        "limit_quantile": Variable((*grid, "quantile"), found, {"units": "m s-2"}),
-        "value_count": Variable(tuple(grid), count),
-        "not_reached_count": Variable(tuple(grid), np.count_nonzero(beyond, axis=-1)),
-    }
-    return Table({**coords, "quantile": Variable(("quantile",), wanted)}, results, table.attrs)
-
-
-def point_names(table: Table, sizes: Mapping[str, int]) -> list[str]:
-    """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
-
-    def names(dim: str) -> Iterator[str]:
-        for i in range(sizes[dim]):
-            label: Any = i + 1
-            if dim in table:
-                label = table[dim].values[i]
-            elif "label" in table and table["label"].dims == (dim,):
-                label = table["label"].values[i]
-            numeric = getattr(label, "dtype", np.dtype(object)).kind in "iuf"
-            yield f"{dim} = {label:.6g}" if numeric else f"{dim} = {label}"
-
-    return [", ".join(parts) for parts in itertools.product(*(names(dim) for dim in sizes))]
-
-
-def _suite_dims(displacement: Variable, over: Any) -> tuple[str, ...]:
-    """The dimensions that the statistics are taken over."""
-    there = displacement.dims
+    there = tuple(map(str, values.dims))
     if "motion" not in there:
         raise InputError(
             f"result: dimensions {', '.join(there) or 'none'}: must have motion, as a result of a suite has"
         )
     if over is None:
-        return tuple(dim for dim in _SUITE if dim in there)
+        return tuple(dim for dim in SUITE if dim in there)
     dims: Sequence[Any] = [over] if isinstance(over, str) else check_list("over", over, "dimensions")
     for dim in dims:
         if dim not in there:
@@ -140,58 +174,134 @@ def _suite_dims(displacement: Variable, over: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(dims))
 
 
-def _spread(variable: Variable, dims: Sequence[str]) -> NDArray[Any]:
-    """Values along `dims`, of length 1 where the variable does not have one."""
-    values = variable.values
-    if values.dtype.kind == "f":  # codes that a file's reader has made numbers with NaN of
-        values = np.nan_to_num(values)
-    there = [dim for dim in dims if dim in variable.dims]
-    ordered = values.transpose([variable.dims.index(dim) for dim in there])
-    return ordered.astype(np.int64).reshape([variable.sizes.get(dim, 1) for dim in dims])
+def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Dataset:
+    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point.
+
+    A motion that does not reach the displacement up to the maximum amplitude has a limit above all others.  Motions
+    without a value are left out.
+
+    Parameters
+    ----------
+    limits : Dataset
+        A result of `slipsweep.limit_amplitude` with the dimension `motion`.
+    quantiles : float or array
+
+    Returns
+    -------
+    Dataset
+        `limit_quantile` (m/s², dimension `quantile`; infinite where so many motions do not reach it, NaN where none has
+        a value), `value_count` and `not_reached_count`.
+    """
+    dims = suite_dims(limits["limit_amplitude"])
+    beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
+    # so large that whatever is interpolated towards it is above all limits
+    largest = np.finfo(np.float64).max / 4.0
+    values = limits["limit_amplitude"].where(~beyond, largest)
+    wanted = check_quantiles("quantiles", quantiles)
+    found = _quantiles(values, wanted, dims)
+    highest = values.where(~beyond).max()
+    return xr.Dataset(
+        {
+            "limit_quantile": found.where(~(found > highest), np.inf).assign_attrs(units="m s-2"),
+            "value_count": values.count(dims),
+            "not_reached_count": beyond.sum(dims),
+        },
+        {"quantile": wanted},
+        limits.attrs,
+    )
 
 
-def _statistics(
-    values: Floats, codes: NDArray[Any], thresholds: Floats, quantiles: Floats, zero: float
-) -> dict[str, Any]:
-    """Statistics along the last axis."""
-    total = values.shape[-1]
-    missing = np.isnan(values)
-    reasons = np.stack([np.count_nonzero(missing & (codes & int(flag) != 0), axis=-1) for flag in REASONS], axis=-1)
-    ordered = np.sort(values, axis=-1)  # NaN goes last
-    count = total - np.count_nonzero(missing, axis=-1)
-    zeros = np.count_nonzero(ordered <= zero, axis=-1)
-    slid = count - zeros
-    with np.errstate(invalid="ignore", divide="ignore"):
-        logs = np.log(np.where(ordered > zero, ordered, 1.0))
-        mean = logs.sum(axis=-1) / np.where(slid > 0, slid, np.nan)
-        squares = np.where(ordered > zero, logs - mean[..., None], 0.0) ** 2
-        scatter = np.sqrt(squares.sum(axis=-1) / np.where(slid > 1, slid - 1, np.nan))
-        valued = np.where(count > 0, count, np.nan)
-        exceeding = [np.count_nonzero(ordered > one, axis=-1) / valued for one in thresholds]
-    return {
-        "value_count": count.astype(np.int32),
-        "valueless_count": (total - count).astype(np.int32),
-        "valueless_flag_count": reasons.astype(np.int32),
-        "valueless_share": (total - count) / total,
-        "zero_probability": zeros / valued,
-        "nonzero_median": _quantiles(ordered, zeros, slid, np.array([0.5]))[..., 0],
-        "nonzero_geometric_mean": np.exp(mean),
-        "log_standard_deviation": scatter,
-        "displacement_quantile": _quantiles(ordered, np.zeros_like(count), count, quantiles),
-        "exceedance_probability": np.stack(exceeding, axis=-1),
-    }
+def suite_summary(result: xr.Dataset, displacement: Any = None) -> xr.Dataset:
+    """Statistics of a suite that a designer asks first: median, 16 and 84 %, share of zeros, P(u > d).
+
+    Parameters
+    ----------
+    result : Dataset
+        A result of `sweep` with the dimension `motion`.
+    displacement : float, str or list of these, optional
+        Displacements d, m or with a unit.
+
+    Returns
+    -------
+    Dataset
+        `displacement_quantile`, `zero_probability`, `valueless_share` and, with `displacement`,
+        `exceedance_probability`, as `slipsweep.suite_statistics`.
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
+    >>> result = slipsweep.sweep(5, 0.3, amplitude=[4.0, 6.0], excitation=suite)
+    >>> print(*summary_lines(result, "50mm"), sep="\\n")
+    permanent displacement (mm) over 4 motion:
+     PGA (g)  16 %  median  84 %  zero P(u > 50 mm)
+      0.4077  2.11    20.4  70.2  0.0%        25.0%
+      0.6116  37.1    77.8   235  0.0%        75.0%
+    """
+    found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    names = ["displacement_quantile", "zero_probability", "valueless_share"]
+    return found[[*names, *([] if displacement is None else ["exceedance_probability"])]]
 
 
-def _quantiles(ordered: Floats, first: NDArray[Any], count: NDArray[Any], wanted: Floats) -> Floats:
-    """Quantiles of `count` values that begin at `first`, linear between them (numpy's default); NaN of none."""
-    most = ordered.shape[-1] - 1
-    # infinite values, those above all others, have no straight line to them
-    place = wanted * np.maximum(count - 1, 0)[..., None]
-    below = np.floor(place).astype(np.intp)
-    last = np.maximum(first + count - 1, 0)[..., None]
-    at = np.minimum(first[..., None] + below, most)
-    low = np.take_along_axis(ordered, at, axis=-1)
-    high = np.take_along_axis(ordered, np.minimum(at + 1, np.maximum(last, 0)), axis=-1)
-    with np.errstate(invalid="ignore"):
-        between = np.where((high == low) | (place == below), low, low + (place - below) * (high - low))
-    return np.asarray(np.where(count[..., None] > 0, between, np.nan))
+def summary_lines(result: xr.Dataset, displacement: Any = None) -> list[str]:
+    """Lines of text of `suite_summary`, a line for each grid point; parameters as `suite_summary`.
+
+    Of a large grid, only how many points it has: it is to be cut first.
+    """
+    import pandas as pd
+
+    moved = result["permanent_displacement"]
+    dims = suite_dims(moved)
+    grid = {str(dim): size for dim, size in moved.sizes.items() if dim not in dims}
+    points = int(np.prod([*grid.values()]))
+    suite = grid_text({dim: moved.sizes[dim] for dim in dims})
+    if points > _MOST_LINES:
+        return [f"suite of {suite}, {points} grid points: choose values with --at NAME=VALUE for their statistics"]
+    found = suite_summary(result, displacement)
+    g = float(result.attrs.get("g", np.nan))
+    columns: dict[str, Any] = {}
+    for dim, labels in zip(grid, zip(*_labels_of_points(found, grid, g), strict=True), strict=False):
+        if grid[dim] > 1:
+            columns[_column_title(found, dim)] = labels
+    rows = {name: values.values.reshape(points, -1) for name, values in found.data_vars.items()}
+    for title, column in zip(("16 %", "median", "84 %"), rows["displacement_quantile"].T, strict=True):
+        columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
+    columns["zero"] = [_share(one) for one in rows["zero_probability"][:, 0]]
+    if "exceedance_probability" in rows:
+        for d, column in zip(found["threshold"].values, rows["exceedance_probability"].T, strict=True):
+            columns[f"P(u > {d * 1000.0:.6g} mm)"] = [_share(one) for one in column]
+    if (rows["valueless_share"] > 0.0).any():
+        columns["no value"] = [_share(one) for one in rows["valueless_share"][:, 0]]
+    table = pd.DataFrame(columns).to_string(index=False).splitlines()
+    return [f"permanent displacement (mm) over {suite}:", *table]
+
+
+def _share(value: float) -> str:
+    return "none" if np.isnan(value) else f"{value:.1%}"
+
+
+def _column_title(data: xr.Dataset, dim: str) -> str:
+    """A dimension as the title of a column."""
+    if dim in ("amplitude", "yield_coefficient"):
+        return {"amplitude": "PGA (g)", "yield_coefficient": "ky"}[dim]
+    units = str(data[dim].attrs.get("units", "1")) if dim in data.variables else "1"
+    return dim if units == "1" else f"{dim} ({units})"
+
+
+def _labels_of_points(data: xr.Dataset, sizes: Mapping[str, int], g: float) -> Iterator[tuple[str, ...]]:
+    """Labels of each point of a grid along all its dimensions; peak ground accelerations in g."""
+    factors = {"amplitude": 1.0 / g}
+    yield from itertools.product(*(labels_along(data, dim, factors.get(dim, 1.0)) for dim in sizes))
+
+
+def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:
+    """What the places along a dimension are called: its labels, its numbers times a factor, or 1, 2, ..."""
+    name = next((one for one in (dim, "label") if one in data.variables and data[one].dims == (dim,)), None)
+    values = np.arange(1, data.sizes[dim] + 1) if name is None else data[name].values
+    return [str(one) if values.dtype.kind not in "iuf" else f"{one * factor:.4g}" for one in values]
+
+
+def point_names(data: xr.Dataset, sizes: Mapping[Hashable, int]) -> list[str]:
+    """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
+    along = ([f"{dim} = {label}" for label in labels_along(data, dim)] for dim in sizes)
+    return [", ".join(parts) for parts in itertools.product(*along)]

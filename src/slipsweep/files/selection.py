@@ -1,0 +1,179 @@
+"""Values of the axes of a result, as users name them: ``--at theta=5 --at amplitude=0.1g,0.2g --at case=LABEL``."""
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.model.suggest import did_you_mean
+from slipsweep.model.units import conversion, quantity_in
+
+#: What may be given for an axis: a number in its own unit, a text with another ("0.3g"), a label, or several of them.
+At = float | str | Sequence[float | str]
+
+#: Numbers as near as this, of the largest on an axis, are the same: single precision keeps seven digits.
+_SAME = 1e-7
+
+#: Fewest digits that a text is taken to have: 5 stands for 5.00.
+_DIGITS = 3
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place on an axis: the value, and its index; None where it lies between the values of the result."""
+
+    value: float
+    index: int | None
+
+
+def axis_labels(data: xr.Dataset, dim: str) -> list[str]:
+    """Names along a dimension: those of cases, motions and inputs; empty where it has numbers, or nothing."""
+    for name in ("label", dim) if dim == "case" else (dim,):
+        if name in data.variables and data[name].dims == (dim,) and data[name].dtype.kind in "OUST":
+            return [str(one) for one in data[name].values]
+    return []
+
+
+def axis_numbers(data: xr.Dataset, dim: str) -> np.ndarray:
+    """The numbers along a dimension; 1, 2, ... where it has none."""
+    there = dim in data.variables and data[dim].dtype.kind not in "OUST"
+    return np.asarray(data[dim].values, np.float64) if there else np.arange(1.0, 1.0 + data.sizes[dim])
+
+
+def axis_values(data: xr.Dataset, dim: str) -> list[Any]:
+    """The values along a dimension, or their labels; of one without either the numbers from 1."""
+    labels = axis_labels(data, dim)
+    return labels or (data[dim].values.tolist() if dim in data.coords else list(range(1, data.sizes[dim] + 1)))
+
+
+def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[str, list[Place]]:
+    """Find values on the axes of a result.
+
+    A text stands for a value of the result that it is equal to in the digits that it has, in its own unit: what a
+    message or a caption prints can be typed.
+
+    Parameters
+    ----------
+    data : Dataset
+        A result of `sweep`, or a file of one.
+    at : mapping of axis to value or values
+        In the axis's own unit, or texts with another ("0.3g"); labels of cases and motions, or their numbers from 1.
+        A text may hold several values, with commas.  A parameter that is one number for the whole result may be named
+        too, with that number.
+    where : str
+        What the result is called in errors.
+
+    Returns
+    -------
+    dict of str to list of Place
+        In the order given, without those of parameters that are one number.
+
+    Raises
+    ------
+    InputError
+        There is no such axis, or a value lies outside of it.
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> from slipsweep.files.selection import find
+    >>> result = slipsweep.sweep(5.0, 0.4, [2.0, 2.943, 4.0], 1.0)
+    >>> find(result, {"amplitude": "0.3g"})
+    {'amplitude': [Place(value=2.943, index=1)]}
+    """
+    single = [str(name) for name, one in data.coords.items() if not one.dims and one.dtype.kind in "iuf"]
+    dims = [str(dim) for dim in data.sizes]
+    found = {}
+    for name, cut in at.items():
+        if name not in (*dims, *single):
+            raise InputError(f"{where}: {name} = {cut}: no such axis; {did_you_mean(name, [*dims, *single])}")
+        labels = axis_labels(data, name) if name in dims else []
+        texts: Sequence[float | str]
+        if isinstance(cut, str):
+            texts = [cut] if cut in labels else [one.strip() for one in cut.split(",")]
+        else:
+            texts = [cut] if np.ndim(cut) == 0 else list(cut)  # type: ignore[arg-type, list-item]
+        values = axis_numbers(data, name) if name in dims else np.atleast_1d(data[name].values)
+        units = str(data[name].attrs.get("units", "1")) if name in data.variables else "1"
+        g = float(data.attrs.get("g", math.nan))
+        places = [_place(f"{where}: {name}", one, labels, values, units, g) for one in texts]
+        if name in dims:
+            found[name] = list(dict.fromkeys(places))
+        elif any(place.index is None for place in places):
+            raise InputError(f"{where}: {name} = {cut}: is {values[0]:.6g}{_unit(units)} in the whole result")
+    return found
+
+
+def places_at(
+    data: xr.Dataset, source: object, at: Mapping[str, At], dims: Collection[str]
+) -> dict[str, NDArray[np.intp]]:
+    """Indices of values on some axes of a result, for `Dataset.isel`; as `find`.
+
+    Parameters
+    ----------
+    dims : collection of str
+        The axes that may be cut.
+
+    Raises
+    ------
+    InputError
+        As `find`, or a value lies between those of the result: the message names its neighbours.
+    """
+    others = {str(dim) for dim in data.sizes if dim not in dims}
+    for name, cut in at.items():
+        if name in others:
+            raise InputError(f"{source}: {name} = {cut}: cannot be selected here; {did_you_mean(name, [*dims])}")
+    places = find(data, at, str(source))
+    for name, found in places.items():
+        for place in found:
+            if place.index is None:
+                raise InputError(f"{source}: {between(data, name, place.value)}")
+    return {name: np.array([place.index for place in found], np.intp) for name, found in places.items()}
+
+
+def between(data: xr.Dataset, name: str, value: float) -> str:
+    """That a value is not among those of a result, and between which it lies."""
+    values = np.sort(axis_numbers(data, name))
+    above = int(np.clip(np.searchsorted(values, value), 1, values.size - 1))
+    units = _unit(str(data[name].attrs.get("units", "1"))) if name in data.variables else ""
+    return (
+        f"{name} = {value:.6g}: not among the values of the result; "
+        f"its neighbours are {values[above - 1]:.6g} and {values[above]:.6g}{units}"
+    )
+
+
+def _place(key: str, given: float | str, labels: list[str], values: np.ndarray, units: str, g: float) -> Place:
+    """The place of one value or label."""
+    if given in labels:
+        index = labels.index(str(given))
+        return Place(index + 1.0, index)
+    text = str(given)
+    if labels and not text.isdecimal():
+        raise InputError(f"{key} = {text}: must be a number or one of {', '.join(labels)}")
+    number = quantity_in(key, text, units, g) if isinstance(given, str) else float(given)
+    slack = _SAME * float(np.abs(values).max())
+    if isinstance(given, str):
+        mantissa, exponent, unit = re.findall(r"^\s*[-+]?([\d.]+)(?:[eE]([-+]?\d+))?\s*(.*?)\s*$", text)[0]
+        digits = max(_DIGITS, len(mantissa.replace(".", "").lstrip("0")))
+        typed = abs(float(f"{mantissa}e{exponent or 0}"))
+        if typed:
+            last = 10.0 ** (math.floor(math.log10(typed)) + 1 - digits)
+            slack = max(slack, 0.5 * last * conversion(key, units, unit or None, g))
+    nearest = int(np.argmin(np.abs(values - number)))
+    if abs(values[nearest] - number) <= slack:
+        return Place(float(values[nearest]), nearest)
+    low, high = values.min(), values.max()
+    if not low <= number <= high:
+        there = f"{low:.6g} to {high:.6g}" if values.size > 1 else f"{low:.6g}"
+        raise InputError(f"{key} = {text}: outside the range of the result, {there}{_unit(units)}")
+    return Place(number, None)
+
+
+def _unit(units: str) -> str:
+    return "" if units == "1" else f" {units}"

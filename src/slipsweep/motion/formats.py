@@ -1,0 +1,323 @@
+"""Files of recorded motions: what each format has in its header, and where its accelerations stand.
+
+* **CSV**: a column of times (s) and one of accelerations; separators comma, semicolon, tab or blanks; numbers with
+  decimal points or commas.  Lines that begin with ``#`` and a line of names may stand before the numbers.  The unit
+  comes from the header, in brackets: ``acceleration (m/s2)``.
+* **Values**: accelerations alone, one or several to a line, as SLAMMER reads them; the interval is given, or stands in
+  the header: ``dt = 0.01``.
+* **PEER AT2**: lines of header, one of them with NPTS and DT, then accelerations in g.
+* **ESM / ITACA ASCII**: lines ``KEY: VALUE`` (``SAMPLING_INTERVAL_S``, ``NDATA``, ``UNITS``), then accelerations.
+* **K-NET / KiK-net ASCII**: 17 lines of header, then counts; times the scale factor of the header they are in gal.
+* **COSMOS V1, V2** (Strong Motion Data Format 1.20, 2001): lines of text, 100 integers, 100 reals, comments, then
+  values in a Fortran format, without blanks between them; a file may hold several channels.  Integers 2 and 3 are the
+  physical parameter (1: acceleration) and the code of the unit, real 62 the sampling interval in milliseconds.
+"""
+
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.model.parameters import shown
+from slipsweep.motion.reading import UNITS, Reading
+
+Floats = NDArray[np.float64]
+
+#: A day of acceleration at 100 samples a second; what is larger is no record.
+MOST_BYTES = 200_000_000
+
+#: Codes of units in COSMOS files that are accelerations (Table 2 of the format).
+_COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
+
+#: Other spellings of units in headers.
+_SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+class Samples(NamedTuple):
+    """What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one."""
+
+    times: Floats
+    values: Floats
+    unit: str | None
+
+
+def read_lines(path: Path, what: str) -> tuple[bytes, list[str]]:
+    """The content of a file that is to hold a record or a test, and its lines."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except ValueError as error:  # a name that no system has
+        raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a {what} must have that many at most")
+    # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
+    return content, content.decode("utf-8-sig", errors="replace").splitlines()
+
+
+def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, Samples]:
+    """The name of a file's format, and what the file holds (InputError: not of that format)."""
+    kind = _format_of(lines, reading) if reading.format == "auto" else reading.format
+    if kind != "cosmos" and reading.channel is not None:
+        raise InputError(f"{path}: channel = {reading.channel}: only COSMOS files hold several; this one is {kind}")
+    if kind != "values" and reading.interval is not None:
+        raise InputError(f"{path}: interval = {reading.interval:g}: only for a file without times; this one is {kind}")
+    if kind == "cosmos":
+        return kind, _read_cosmos(path, lines, reading.channel)
+    if kind == "values":
+        return kind, _read_values(path, lines, reading.interval)
+    readers = {"csv": _read_csv, "at2": _read_at2, "esm": _read_esm, "knet": _read_knet}
+    return kind, readers[kind](path, lines)
+
+
+def _format_of(lines: list[str], reading: Reading) -> str:
+    """The format of a file, from its header."""
+    if lines and _COSMOS_HEAD.search(lines[0]):
+        return "cosmos"
+    if any("NPTS" in line.upper() for line in lines[:6]):
+        return "at2"
+    if any(line.startswith("SAMPLING_INTERVAL_S:") for line in lines[:100]):
+        return "esm"
+    if lines and lines[0].startswith("Origin Time"):
+        return "knet"
+    header, body = _header(lines)
+    alone = bool(body) and len(_cells(body[0][1])) == 1
+    return "values" if alone or reading.interval is not None or _interval_in(header) else "csv"
+
+
+# ------------------------------------------------------------------------------------- columns
+
+
+def _read_csv(path: Path, lines: list[str]) -> Samples:
+    header, body = _header(lines)
+    if not body:
+        raise InputError(f"{path}: no line of a time and an acceleration")
+
+    def two(line: str) -> list[str]:
+        time, value = _cells(line)
+        return [time, value or "nan"]
+
+    times, values = _numbers(path, body, two, "a time and an acceleration").reshape(-1, 2).T
+    for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
+        raise InputError(
+            f"{path}: line {body[at + 1][0]}: time {times[at + 1]:.15g}: must be greater than {times[at]:.15g}, "
+            "the time before it"
+        )
+    return Samples(times, values, _unit_in(header))
+
+
+def _read_values(path: Path, lines: list[str], interval: float | None) -> Samples:
+    header, body = _header(lines)
+    own = _interval_in(header)
+    if interval is not None and own is not None and interval != own:
+        raise InputError(f"{path}: interval = {interval:g}: the file itself says {own:g}; leave interval out")
+    step = interval or own
+    if step is None:
+        raise InputError(f"{path}: interval: must be given, s: the file has accelerations alone, without times")
+    # commas are decimal where no number has a point and none has two of them, as 0,123 has
+    is_decimal = not any("." in line or re.search(r",[^\s,]*,", line) for _, line in body)
+
+    def values(line: str) -> list[str]:
+        return (line.replace(",", ".") if is_decimal else line.replace(",", " ")).replace(";", " ").split()
+
+    found = _numbers(path, body, values)
+    return Samples(_even(path, found, step), found, _unit_in(header))
+
+
+def _header(lines: list[str]) -> tuple[str, list[tuple[int, str]]]:
+    """The text before the numbers, and the numbered lines from the first that begins with one; no comments."""
+    for at, line in enumerate(lines):
+        if any(re.fullmatch(_NUMBER, cell) for cell in _cells(line)[:1]):
+            numbered = enumerate(lines[at:], at + 1)
+            return "\n".join(lines[:at]), [
+                (number, one) for number, one in numbered if one.strip() and not one.startswith("#")
+            ]
+    return "\n".join(lines), []
+
+
+def _cells(line: str) -> list[str]:
+    """The cells of a line, between semicolons, tabs, commas or blanks; decimal commas become points."""
+    for separator in ";\t":
+        if separator in line:
+            return [cell.strip().replace(",", ".") for cell in line.split(separator)]
+    words = line.split()
+    if "," in line and (len(words) == 1 or any(word[0] == "," or word[-1] == "," for word in words)):
+        return [cell.strip() for cell in line.split(",")]
+    return [word.replace(",", ".") for word in words]
+
+
+def _unit_in(header: str) -> str | None:
+    """The unit of acceleration that a header gives in brackets, the last if there are several."""
+    found = None
+    for text in re.findall(r"[(\[]\s*([^)\]]+?)\s*[)\]]", header):
+        unit = re.sub(r"\s+|\^|\*\*", "", text.lower()).replace("²", "2").replace("s-2", "/s2")
+        unit = _SPELLINGS.get(unit, unit)
+        found = unit if unit in UNITS else found
+    return found
+
+
+def _interval_in(header: str) -> float | None:
+    """The sampling interval that a header gives: ``dt = 0.01``."""
+    found = re.search(rf"\b(?:dt|interval)\s*[=:]\s*({_NUMBER})", header, re.IGNORECASE)
+    return float(found[1]) if found else None
+
+
+# -------------------------------------------------------------------- one header, then accelerations
+
+
+def _read_at2(path: Path, lines: list[str]) -> Samples:
+    at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), 0)
+    header = "\n".join(lines[:at]).upper()
+    if "VELOCITY" in header or "DISPLACEMENT" in header:
+        raise InputError(f"{path}: its header speaks of velocity or displacement: must be an acceleration (.AT2)")
+    # in files of the first database "4096  0.0100  NPTS, DT"
+    before = re.match(rf"\s*(\d{{1,9}})\s+({_NUMBER})\s+NPTS,\s*DT", lines[at] if lines else "", re.IGNORECASE)
+    points, interval = (
+        before.groups()
+        if before
+        else (
+            _in_header(path, lines[at : at + 1], name, pattern)[0]
+            for name, pattern in (("NPTS=", r"NPTS\s*=\s*(\d{1,9})\b"), ("DT=", rf"DT\s*=\s*({_NUMBER})"))
+        )
+    )
+    values = _numbers(path, enumerate(lines[at + 1 :], at + 2))
+    return Samples(_even(path, values, float(interval), int(points)), values, "g")
+
+
+def _read_esm(path: Path, lines: list[str]) -> Samples:
+    body = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
+    interval, points, unit = (
+        _in_header(path, lines[:body], name, rf"^{name}:\s*({pattern})\s*$")[0]
+        for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", r"\d{1,9}"), ("UNITS", r"\S+"))
+    )
+    unit = unit.lower().replace("^", "")
+    if unit not in UNITS:
+        raise InputError(f"{path}: UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
+    values = _numbers(path, enumerate(lines[body:], body + 1))
+    return Samples(_even(path, values, float(interval), int(points)), values, unit)
+
+
+def _read_knet(path: Path, lines: list[str]) -> Samples:
+    memo = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
+    frequency, duration, full_scale, counts = (
+        float(number)
+        for name, pattern in (
+            ("Sampling Freq(Hz)", rf"^Sampling Freq\(Hz\)\s*({_NUMBER})"),
+            ("Duration Time(s)", rf"^Duration Time\(s\)\s*({_NUMBER})"),
+            ("Scale Factor", rf"^Scale Factor\s*({_NUMBER})\(gal\)/({_NUMBER})"),
+        )
+        for number in _in_header(path, lines[:memo], name, pattern)
+    )
+    if not (0.0 < frequency < 1e6 and 0.0 < counts < 1e100 and 0.0 < full_scale < 1e100):
+        raise InputError(f"{path}: {frequency:g} Hz, {full_scale:g} gal, {counts:g} counts: must be > 0")
+    values = _numbers(path, enumerate(lines[memo + 1 :], memo + 2)) * (full_scale / counts)
+    return Samples(_even(path, values, 1.0 / frequency, round(min(duration * frequency, 1e9))), values, "gal")
+
+
+def _in_header(path: Path, header: list[str], name: str, pattern: str) -> tuple[str, ...]:
+    """What a pattern finds in a header (InputError: nothing)."""
+    found = re.search(pattern, "\n".join(header), re.MULTILINE | re.IGNORECASE | re.ASCII)
+    if found is None:
+        raise InputError(f"{path}: no {name} in its header, or none that can be read: another format, or damaged")
+    return found.groups()
+
+
+# ----------------------------------------------------------------------------------- COSMOS
+
+_COSMOS_HEAD = re.compile(r"\(Format v\s*[\d.]+ with\s+(\d{1,4})\s+text lines\)", re.IGNORECASE)
+# of each section's first line: how many numbers (or lines) follow, and how many columns each of them has
+_COSMOS_HEADER = r"\s*(\d{1,9})\s+%s-header values follow on\s+\d+\s+lines\s*,\s*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
+_COSMOS_COMMENTS = r"\s*(\d{1,9})\s+Comment line"
+_COSMOS_DATA = r"\s*(\d{1,9})\s+\w+.*?\bpts?\b.*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
+
+
+def _read_cosmos(path: Path, lines: list[str], channel: int | None) -> Samples:
+    starts = [at for at, line in enumerate(lines) if _COSMOS_HEAD.search(line)]
+    read = (_cosmos_channel(path, lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
+    channels = [one for one in read if one is not None]
+    if channel is None and len(channels) > 1:
+        raise InputError(f"{path}: holds {len(channels)} channels of acceleration: give channel, from 1 on")
+    if not 1 <= (channel or 1) <= len(channels):
+        raise InputError(f"{path}: channel = {channel or 1}: it holds {len(channels)} channels of acceleration")
+    return channels[(channel or 1) - 1]
+
+
+def _cosmos_channel(path: Path, lines: list[str], start: int) -> Samples | None:
+    """The channel that begins at a line and goes to the last one; None if it is no acceleration."""
+    head = _COSMOS_HEAD.search(lines[start])
+    at, whole = _cosmos_values(path, lines, start + int(head[1] if head else 0), _COSMOS_HEADER % "Integer")
+    at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
+    if whole.size < 3 or reals.size < 62:
+        raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
+    at += 1 + int(_cosmos_line(path, lines, at, _COSMOS_COMMENTS)[1])
+    at, values = _cosmos_values(path, lines, at, _COSMOS_DATA)
+    # what a V2 file may have behind the acceleration is its velocity and displacement
+    if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
+        raise InputError(f"{path}: no line End-of-data after the values: cut off, or damaged")
+    if whole[1] != 1:
+        return None
+    if whole[2] not in _COSMOS_UNITS:
+        known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
+        raise InputError(f"{path}: code {whole[2]:.0f} for the unit of its values: must be one of {known}")
+    return Samples(_even(path, values, reals[61] / 1000.0), values, _COSMOS_UNITS[int(whole[2])])
+
+
+def _cosmos_line(path: Path, lines: list[str], at: int, pattern: str) -> re.Match[str]:
+    found = re.match(pattern, lines[at], re.IGNORECASE) if at < len(lines) else None
+    if found is None:
+        line = shown(lines[at]) if at < len(lines) else "the end of the file"
+        raise InputError(f"{path}: line {at + 1}: {line}: not what the COSMOS format has here: damaged?")
+    return found
+
+
+def _cosmos_values(path: Path, lines: list[str], at: int, pattern: str) -> tuple[int, Floats]:
+    """A section: a line that says how many values follow and in what columns, then these; and the line after it."""
+    head = _cosmos_line(path, lines, at, pattern)
+    count, width = int(head[1]), max(int(head[2]), 1)
+
+    def cells(line: str) -> list[str]:
+        return [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
+
+    end, announced = at + 1, 0
+    while announced < count and end < len(lines) and not lines[end].lower().startswith("end-of-data"):
+        announced += len(cells(lines[end]))
+        end += 1
+    if announced != count:
+        raise InputError(f"{path}: line {end}: {announced} values, where {count} are announced")
+    return end, _numbers(path, enumerate(lines[at + 1 : end], at + 2), cells, f"numbers, {width} columns each")
+
+
+# --------------------------------------------------------------------------------- all formats
+
+
+def _numbers(
+    path: Path,
+    lines: Iterable[tuple[int, str]],
+    cells: Callable[[str], Iterable[str]] = str.split,
+    what: str = "numbers",
+) -> Floats:
+    """All numbers in the cells of numbered lines, in their order."""
+    values: list[float] = []
+    for number, line in lines:
+        try:
+            values.extend(map(float, cells(line)))
+        except ValueError:
+            raise InputError(f"{path}: line {number}: {shown(line)}: must be {what}") from None
+    return np.array(values)
+
+
+def _even(path: Path, values: Floats, interval: float, points: int | None = None) -> Floats:
+    """Times of evenly sampled values, whose header may say how many they are."""
+    if points is not None and values.size != points:
+        raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
+    if not 0.0 < interval < 1e300:
+        raise InputError(f"{path}: sampling interval {interval:g}: must be a finite number > 0")
+    with np.errstate(over="ignore"):  # what is not finite then is refused
+        return np.arange(values.size, dtype=np.float64) * interval

@@ -1,0 +1,145 @@
+"""Records are looked at before they are used: samples that are missing, and motions that no ground makes.
+
+What is found is refused, with the time and the value, unless the user accepts it by a word: `gaps="linear"`,
+`implausible="accept"`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.errors import InputError
+from slipsweep.motion.intensity import Motion, peak_displacement, peak_velocity
+from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
+
+Floats = NDArray[np.float64]
+
+#: An interval of more median ones than this is a gap; of fewer intervals the median says nothing.
+_GAP, _FEWEST = 5.0, 16
+
+#: Magnitudes that programs write where they have no value.
+_FILL = np.array([999.0, 9999.0, 99999.0, 999999.0, 999.9, 999.99, 9999.9, 9999.99, 32767.0, 32768.0, 1e20, 1e30])
+
+#: A value that is held for so long (s, and samples) while the ground shakes is of a sensor that stands still.
+_HELD, _HELD_SAMPLES = 0.5, 20
+
+#: Peaks that were recorded lie between these, g: the largest ever are 2.7 horizontally, 4 vertically.
+_WEAKEST, _STRONGEST = 0.001, 3.0
+
+#: Displacement of the ground (m) that is a drift where the velocity at the end is more than a share of the peak's, and
+#: one that is a drift anyhow: the largest along a fault are 9.
+_DRIFT, _DRIFT_VELOCITY, _LARGEST_DISPLACEMENT = 2.0, 0.05, 10.0
+
+
+def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> tuple[Floats, Floats, str]:
+    """Times (s) and values, in any unit, without those that stand for missing samples; and what is missing, in words.
+
+    Raises
+    ------
+    InputError
+        Something is missing, and `gaps` is not "linear": with the time and the value.
+    """
+    missing = _is_fill(values)
+    findings = []
+    if missing.any():
+        first, kinds = times[missing][0], np.unique(values[missing])[:3]
+        shown = ", ".join("blank" if np.isnan(value) else f"{value:g}" for value in kinds)
+        count = f"{missing.sum()} fill value{'s' if missing.sum() > 1 else ''}"
+        findings.append(f"{count} ({shown}), first at t = {first:.6g} s")
+    intervals = np.diff(times)
+    if intervals.size >= _FEWEST and (intervals > 0.0).all():
+        median = float(np.median(intervals))
+        gap = np.flatnonzero(intervals > _GAP * median)
+        more = f", and {gap.size - 1} more" if gap.size > 1 else ""
+        findings += [
+            f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
+            f"median interval of {median:.4g} s){more}"
+            for at in gap[:1]
+        ]
+        findings += [
+            f"the value {value:.6g} is held from t = {first:.6g} to {last:.6g} s"
+            for value, first, last in _held(times[~missing], values[~missing])[:1]
+        ]
+    found = "; ".join(findings)
+    if found and gaps == "refuse":
+        raise InputError(f"{name}: {found}: samples are missing; gaps = 'linear' interpolates between the others")
+    return times[~missing], values[~missing], found
+
+
+def check_plausible(record: Motion, unit: str, implausible: str, has_gaps: bool) -> str:
+    """What no ground does, in words; empty if the record, read in `unit`, is plausible.
+
+    A drift behind samples that were interpolated (`has_gaps`) is theirs: told, but not refused.
+
+    Raises
+    ------
+    InputError
+        Something is implausible, and `implausible` is not "accept": with the time and the value.
+    """
+    peak, drift = _odd_peak(record, unit), _drift(record)
+    found = "; ".join(text for text in (peak, drift) if text)
+    if implausible == "refuse" and (peak or (drift and not has_gaps)):
+        raise InputError(f"{record.name}: {found}; or implausible = 'accept' takes the record as it is")
+    return found
+
+
+def _is_fill(values: Floats) -> NDArray[np.bool_]:
+    """Which values stand for missing samples."""
+    missing = np.isnan(values)
+    magnitude = np.where(missing, 0.0, np.abs(values))
+    known = np.isin(magnitude, _FILL)
+    others = np.flatnonzero(~known & ~missing)
+    if known.any() and others.size:
+        # 999 gal may be a peak: then its neighbours are on the way to it
+        between = np.interp(np.arange(values.size), others, values[others])
+        missing |= known & (np.abs(values - between) > 0.5 * magnitude)
+    largest = magnitude == magnitude.max(initial=0.0)
+    rest = magnitude[~largest].max(initial=0.0)
+    if largest.sum() > 1 and magnitude.max(initial=0.0) > 20.0 * rest > 0.0 and values.size > _FEWEST:
+        missing |= largest  # the same number again and again, far above all others
+    return missing
+
+
+def _held(times: Floats, values: Floats) -> list[tuple[float, float, float]]:
+    """Values that do not change while the ground shakes, and their first and last times."""
+    peak = np.abs(values).max(initial=0.0)
+    starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    lasts = np.concatenate([starts[1:], [values.size]]) - 1
+    is_long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
+    found = []
+    for first, last in zip(starts[is_long], lasts[is_long], strict=True):
+        neighbours = values[[first - 1, last + 1]] if first > 0 and last < values.size - 1 else values[[first, last]]
+        jumps = np.abs(neighbours - values[first]).min() > 0.05 * peak
+        if abs(values[first]) > 0.01 * peak or jumps:  # else the ground is at rest
+            found.append((float(values[first]), float(times[first]), float(times[last])))
+    return found
+
+
+def _odd_peak(record: Motion, unit: str) -> str:
+    """A peak that was never recorded, and the unit that would explain it; a few samples typed by hand may be weak."""
+    at = int(np.abs(record.acceleration).argmax())
+    peak = record.peak / STANDARD_GRAVITY
+    if (peak >= _WEAKEST or record.times.size <= _FEWEST) and peak <= _STRONGEST:
+        return ""
+    limit = f"above {_STRONGEST:g} g" if peak > 1.0 else f"below {_WEAKEST:g} g"
+    read = f"peak acceleration {record.acceleration[at] / STANDARD_GRAVITY:.4g} g at t = {record.times[at]:.6g} s"
+    in_unit = {other: peak * factor / UNITS[unit] for other, factor in UNITS.items()}
+    likely = min(in_unit, key=lambda other: abs(np.log(max(in_unit[other], 1e-300) / 0.3)))
+    if 0.02 <= in_unit[likely] <= 1.5:
+        read += f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)"
+    return f"{read}: {limit}, check units"
+
+
+def _drift(record: Motion) -> str:
+    """A ground that moves away, as the integral of an offset does; a few corners typed by hand may end in motion."""
+    if record.times.size <= _FEWEST:
+        return ""
+    with np.errstate(over="ignore", invalid="ignore"):
+        displacement, velocity = peak_displacement(record), peak_velocity(record)
+        end = float(np.trapezoid(record.acceleration, record.times))
+    moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * velocity
+    if not moves_on and not displacement > _LARGEST_DISPLACEMENT:
+        return ""
+    return (
+        f"the ground moves {displacement:.3g} m and has a velocity of {end:.3g} m/s at t = {record.times[-1]:.6g} s: "
+        "an offset or a drift; baseline = 'linear' takes a straight line off the acceleration"
+    )

@@ -1,0 +1,309 @@
+"""A run gives the same bits whole and in chunks, in netCDF and Zarr, here and on workers, and after an interruption."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import slipsweep
+from slipsweep.errors import InputError, RunError
+from slipsweep.files import spec, storing
+from slipsweep.files.jobs import Job, limit_job, sweep_job
+from slipsweep.files.opening import read_result
+from slipsweep.grid.tally import tally_of
+
+GRID = """
+[axes.theta]
+values = [0, 5, 10]
+[axes.mu_s]
+values = [0.3, 0.5]
+[axes.amplitude]
+start = 0.1
+stop = 1
+num = 4
+units = "g"
+"""
+
+WAVE = GRID + "[axes.frequency]\nvalues = [0.5, 1, 2]\n"
+
+#: One of each kind of study.
+STUDIES = {
+    "sweep": WAVE
+    + """
+[output]
+variables = ["permanent_displacement", "newmark_displacement", "limiting_acceleration", "sliding_mode", "validity"]
+""",
+    "newmark": WAVE + '[model]\nfriction = "newmark"\n',
+    "step": WAVE + '[solver]\nmethod = "step"\nsteps_per_cycle = 64\n[excitation]\nwaveform = "triangle"\n',
+    "cases": """
+[[cases]]
+label = "mild ± slope, wet"
+theta = 5
+amplitude = 3
+[[cases]]
+label = "steep"
+theta = 25
+amplitude = 5
+[axes.mu_s]
+values = [0.3, 0.5, 0.7]
+[axes.frequency]
+values = [1, 2]
+""",
+    "record": GRID + '[excitation]\nrecord = "motions/m1.csv"\nunits = "g"\npolarity = "both"\n',
+    "suite": GRID + '[excitation]\nrecords = ["motions/*.csv"]\nunits = "g"\n',
+    "samples": WAVE + "[uncertainty]\nsamples = 16\ndecay_rate = {distribution = 'lognorm', s = 0.3, scale = 2.0}\n",
+}
+
+
+def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
+    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
+    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
+    path.write_text("time,acceleration\n" + "".join(rows))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with two recorded motions, and a sweep of every kind."""
+    (tmp_path / "motions").mkdir()
+    write_motion(tmp_path / "motions" / "m1.csv", 3, 80, 0.01)
+    write_motion(tmp_path / "motions" / "m2.csv", 4, 60, 0.02)
+    for name, text in STUDIES.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    return tmp_path
+
+
+def job_of(folder: Path, study: str) -> Job:
+    if study == "limits":
+        return limit_job(spec.load(folder / "sweep.toml"), [0.01, 0.1], 8.0)
+    return sweep_job(spec.load(folder / f"{study}.toml"))
+
+
+def stored(job: Job, path: Path | str, **options: Any) -> storing.Report:
+    return storing.run(job, path, command="slipsweep run", **options)
+
+
+def without_time(table: xr.Dataset) -> xr.Dataset:
+    """A result without what tells of one run only."""
+    return table.load().assign_attrs(history="")
+
+
+@pytest.mark.parametrize("output", ["b.nc", "b.zarr"])
+@pytest.mark.parametrize("study", [*STUDIES, "limits"])
+def test_every_study_runs_every_way(folder: Path, study: str, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = job_of(folder, study)
+    whole = stored(job, folder / "a.nc")
+    monkeypatch.setattr(storing, "CHUNK_CELLS", int(5 * job.plan.cost) + 1)
+    parts = stored(job_of(folder, study), folder / output)
+    one, other = read_result(folder / "a.nc"), read_result(folder / output)
+    xr.testing.assert_identical(without_time(other), without_time(one))
+    assert not list(folder.glob("*.part"))
+    assert (parts.tally.modes, parts.tally.flags) == (whole.tally.modes, whole.tally.flags)
+    again = tally_of(one, job.plan)
+    assert (again.modes, again.flags, again.cells) == (whole.tally.modes, whole.tally.flags, job.plan.cells)
+    # a result repeats its run, and has the values of Python's own functions
+    if study != "limits" and output == "b.zarr":
+        stored(sweep_job(spec.load(folder / output)), folder / "c.nc")
+        np.testing.assert_equal(
+            [one.values for one in read_result(folder / "c.nc").data_vars.values()],
+            [one.values for one in one.data_vars.values()],
+        )
+
+
+@pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
+def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(storing, "CHUNK_CELLS", 6)
+    kind, path = (storing._ZarrChunks if output.endswith("zarr") else storing._NetcdfChunks), folder / output
+    write, seen = kind.write, []
+
+    def failing(self: Any, number: int, arrays: Any) -> None:
+        if number == 3:
+            raise OSError(28, "No space left on device")
+        seen.append(number)
+        write(self, number, arrays)
+
+    monkeypatch.setattr(kind, "write", failing)
+    with pytest.raises(OSError, match="No space") as failure:
+        stored(job_of(folder, "sweep"), path)
+    assert failure.value.__notes__ == [f"3 of 24 chunks are kept in {path}.part: --resume goes on"]
+    assert not path.exists()
+    monkeypatch.setattr(kind, "write", lambda self, number, arrays: (seen.append(number), write(self, number, arrays)))
+
+    with pytest.raises(InputError, match=r"left chunks in .*part; give --resume to go on with them, or --overwrite"):
+        stored(job_of(folder, "sweep"), path)
+    with pytest.raises(InputError, match="has chunks of another sweep file; go on with that one"):
+        stored(job_of(folder, "newmark"), path, resume=True)
+    monkeypatch.setattr("slipsweep.files.jobs.__version__", "9.9")
+    with pytest.raises(InputError, match="another version of slipsweep"):
+        stored(job_of(folder, "sweep"), path, resume=True)
+    monkeypatch.undo()
+    monkeypatch.setattr(kind, "write", lambda self, number, arrays: (seen.append(number), write(self, number, arrays)))
+
+    report = stored(job_of(folder, "sweep"), path, resume=True)  # with the chunks it was begun with
+    assert sorted(seen) == list(range(24))
+    assert not report.found
+    stored(job_of(folder, "sweep"), folder / "whole.nc")
+    xr.testing.assert_identical(without_time(read_result(path)), without_time(read_result(folder / "whole.nc")))
+
+    assert stored(job_of(folder, "sweep"), path, resume=True).found
+    with pytest.raises(InputError, match="is of another sweep or version; give --overwrite"):
+        stored(job_of(folder, "newmark"), path, resume=True)
+    with pytest.raises(InputError, match="exists already; give --overwrite"):
+        stored(job_of(folder, "sweep"), path)
+    stored(job_of(folder, "newmark"), path, overwrite=True)
+    assert read_result(path).attrs["model"] == "newmark"
+
+
+def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stored(job_of(folder, "suite"), folder / "a.nc")
+    write_motion(folder / "motions" / "m2.csv", 5, 60, 0.02)
+    with pytest.raises(InputError, match="another sweep or version"):
+        stored(job_of(folder, "suite"), folder / "a.nc", resume=True)
+
+
+def test_two_runs_on_one_output(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(storing, "CHUNK_CELLS", 6)
+    solve = storing._solve
+
+    def solve_and_run_again(target: Any, *arguments: Any) -> None:
+        with pytest.raises(RunError, match=r"a\.nc: another run is writing it"):
+            stored(job_of(folder, "sweep"), folder / "a.nc", overwrite=True)
+        solve(target, *arguments)
+
+    monkeypatch.setattr(storing, "_solve", solve_and_run_again)
+    stored(job_of(folder, "sweep"), folder / "a.nc")
+    assert read_result(folder / "a.nc").sizes["theta"] == 3
+
+
+def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
+    (folder / "large.toml").write_text(WAVE.replace("num = 4", "num = 9000000").replace("[0.5, 1, 2]", "[0.5, 1]"))
+    text = (folder / "large.toml").read_text().replace("values = [0.3, 0.5]", "start = 0.3\nstop = 1\nnum = 900000")
+    (folder / "large.toml").write_text(text)
+    with pytest.raises(InputError, match=r"a\.nc: takes .*TB, and as much again .* are free on the disk"):
+        stored(job_of(folder, "large"), folder / "a.nc")
+    with pytest.raises(InputError, match=r"--memory = 100 MB: must be .* at least"):
+        stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(memory=100_000_000))
+
+
+def test_memory_is_what_is_asked_for(folder: Path) -> None:
+    """A run in chunks takes no more than --memory says, and a tenth."""
+    text = WAVE.replace("num = 4", "num = 2000").replace("[0.5, 1, 2]", str([0.01 * i + 1 for i in range(600)]))
+    (folder / "a.toml").write_text(text)
+    code = (
+        "import resource, sys; from slipsweep.cli import main; "
+        "assert not main(['run', 'a.toml', '-o', 'a.nc', '-q', '--memory', '460MB']); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    assert int(done.stdout) * 1024 < 1.1 * 460e6
+
+
+@pytest.mark.parametrize("output", ["w.nc", "w.zarr"])
+def test_workers_give_the_same_bits(folder: Path, output: str) -> None:
+    pytest.importorskip("distributed")
+    stored(job_of(folder, "sweep"), folder / "a.nc")
+    stored(job_of(folder, "sweep"), folder / output, means=storing.Means(workers=1))
+    xr.testing.assert_identical(without_time(read_result(folder / output)), without_time(read_result(folder / "a.nc")))
+
+
+def test_a_store_at_an_address(folder: Path) -> None:
+    address = "memory://bucket/address.zarr"
+    stored(job_of(folder, "sweep"), address)
+    stored(job_of(folder, "sweep"), folder / "a.nc")
+    xr.testing.assert_identical(without_time(read_result(address)), without_time(read_result(folder / "a.nc")))
+    assert stored(job_of(folder, "sweep"), address, resume=True).found
+    assert not list(Path().glob(".address*"))
+
+
+@pytest.mark.parametrize(
+    ("means", "message"),
+    [
+        ({"workers": 0}, "--workers = 0: must be from 1 to 1024"),
+        ({"workers": 2, "scheduler": "a:1"}, "--workers, --scheduler: give one of them"),
+    ],
+)
+def test_clusters_that_are_none(folder: Path, means: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(**means))
+
+
+def test_a_number_too_large_for_the_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = WAVE.replace("start = 0.1\nstop = 1", "start = 1e36\nstop = 1e39") + '[output]\ndtype = "float32"\n'
+    text += '[model]\nfriction = "newmark"\n'
+    (folder / "a.toml").write_text(text)
+    for cells in (1000, 6):
+        monkeypatch.setattr(storing, "CHUNK_CELLS", cells)
+        with pytest.raises(InputError, match=r'a\.toml: output\.dtype = "float32": .* must be "float64"'):
+            stored(job_of(folder, "a"), folder / "a.nc")
+        assert not list(folder.glob("a.nc*"))
+
+
+# --------------------------------------------------------------------------------- opening
+
+
+def test_results_open_as_sweep_returns_them(folder: Path) -> None:
+    stored(job_of(folder, "sweep"), folder / "a.nc")
+    opened = slipsweep.open_result(folder / "a.nc")
+    assert all(one.chunks is not None for one in opened.data_vars.values())
+    arguments = {"theta": [0, 5, 10], "mu_s": [0.3, 0.5], "amplitude": opened.amplitude.values}
+    expected = slipsweep.sweep(**arguments, frequency=[0.5, 1, 2], variables=list(opened.data_vars))
+    xr.testing.assert_equal(opened, expected)
+    assert opened.sliding_mode.dtype == expected.sliding_mode.dtype == np.int8
+    for name in opened.data_vars:
+        assert opened[name].attrs["long_name"] == expected[name].attrs["long_name"]
+
+
+def packed(table: xr.Dataset) -> xr.Dataset:
+    about = {"scale_factor": 1e-5, "dtype": "int32", "_FillValue": -9}
+    table.permanent_displacement.encoding = about
+    return table
+
+
+#: What other programs do to a file, and leave its meaning.
+EDITS = {
+    "packed": packed,
+    "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
+    "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),
+    "single precision": lambda table: table.astype("float32", keep_attrs=True).assign(validity=table.validity),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_what_other_programs_have_rewritten(folder: Path, edit: str) -> None:
+    stored(job_of(folder, "sweep"), folder / "a.nc")
+    whole = read_result(folder / "a.nc").load()
+    EDITS[edit](xr.open_dataset(folder / "a.nc").load()).to_netcdf(folder / "b.nc")
+    again = slipsweep.open_result(folder / "b.nc")
+    assert again.sliding_mode.dtype.kind in "if"
+    np.testing.assert_allclose(
+        again.permanent_displacement.transpose(*whole.permanent_displacement.dims),
+        whole.permanent_displacement,
+        atol=2e-5,
+    )
+    np.testing.assert_array_equal(again.sliding_mode.transpose(*whole.sliding_mode.dims), whole.sliding_mode)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "no such file"),
+        (b"", "not a netCDF file, or a damaged one"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "not a netCDF file, or a damaged one"),
+        ("foreign", "not written by slipsweep"),
+        ("folder", "neither a netCDF file nor a Zarr store"),
+    ],
+)
+def test_what_is_no_result(tmp_path: Path, content: Any, message: str) -> None:
+    path = tmp_path / "a.nc"
+    if content == "foreign":
+        xr.Dataset({"a": 1}).to_netcdf(path)
+    elif content == "folder":
+        path.mkdir()
+    elif content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=message) as refused:
+        slipsweep.open_result(path)
+    assert "\n" not in str(refused.value)
