@@ -8,7 +8,7 @@ by the scaling law and costs no kernel call.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,45 +17,21 @@ from slipsweep.errors import RunError
 from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
-from slipsweep.grid.tables import Empty
+from slipsweep.grid.solvers import ROWS, Solve, options_of, solver_of
 from slipsweep.jit.decorators import of_arrays
-from slipsweep.kernels import block as physics
-from slipsweep.kernels import newmark as newmark_kernels
-from slipsweep.kernels.block import Cell, Options
-from slipsweep.kernels.grid import (
-    COSINE_KERNEL,
-    NEWMARK_RECORD_KERNEL,
-    NEWMARK_SINE_KERNEL,
-    PARAMETER_KERNEL,
-    RECORD_KERNEL,
-    REMAINING_KERNEL,
-    SINE_KERNEL,
-    SQUARE_KERNEL,
-    STEP_KERNEL,
-    TRIANGLE_KERNEL,
-    WAVE_KERNEL,
-    Grid,
-    Results,
-    tile_of,
-)
-from slipsweep.kernels.sine.cells import room_of
-from slipsweep.kernels.step.rates import RECTANGLE, SIMPSON, TRAPEZOID
-from slipsweep.kernels.step.table import steps_of
+from slipsweep.kernels.block import UNSOLVED, Cell
+from slipsweep.kernels.grid import Cells, find_parameters
 from slipsweep.model import equations as eq
-from slipsweep.model.options import Mendez, Model, Newmark, Solver, Step
-from slipsweep.model.variables import FRICTION_PARAMETERS, RECORD_COUNTS, RESULT_DTYPES, STRENGTHS, Validity
+from slipsweep.model.options import Model, Solver
+from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, STRENGTHS, Validity
 from slipsweep.motion.amplitude import peak_acceleration
-from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Cosine, Sine, Square, Triangle, Waveform
+from slipsweep.motion.waveforms import Waveform
 
-if TYPE_CHECKING:
-    from slipsweep.jit.cache import Handed, Kernel
-
-#: Cells whose friction parameters are computed together, wanted or not (50 bytes each).
-_FRICTION_CELLS = 65536
+#: Cells that a kernel solves in a call: their arrays stay in the cache, and Ctrl-C is heard between two calls.
+_TILE = 16384
 
 #: Amplitudes that are computed from peak displacements at a time (2 MB).
 _AMPLITUDES = 262144
@@ -63,29 +39,16 @@ _AMPLITUDES = 262144
 #: Results in which `mark_flexible_blocks` sets flags together.
 _FLAGS = 65536
 
-RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
-RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
-RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
-
 #: Inputs that Newmark's block does not know.
 _NOT_NEWMARKS = ("decay_rate", "delta_mu", "minimum_friction", "structure_frequency")
 
-#: Results that come out of a kernel; the codes in the order of its rows, and those of a record.
-MOTION_CODES = ("sliding_mode", "validity")
-MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", *MOTION_CODES)
-RECORD_CODES = (*RECORD_COUNTS, "validity")
+#: Results of a motion that come out of a kernel.
+MOTION_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 
 Array = NDArray[np.float64]
 
 #: Results by their names.
 Arrays: TypeAlias = dict[str, NDArray[Any]]
-
-#: The fields of `Cell`, each as one row.
-_Rows: TypeAlias = tuple[Array, ...]
-
-#: Solves cells of a grid, from one number up to another, into flat results.
-_Call: TypeAlias = Callable[[Grid, int, int, _Rows, Array, Results], None]
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -94,19 +57,6 @@ class Problem:
     model: Model
     excitation: Waveform | Record | Suite
     solver: Solver
-
-    def options(self, wants_peak: bool) -> Options:
-        """The options as the kernels want them."""
-        model, solver = self.model, self.solver if isinstance(self.solver, Step) else Step()
-        return Options(
-            rise=RISES[model.rise] if isinstance(model, Mendez) else physics.NEWMARK,
-            recoupling=RECOUPLINGS[model.recoupling] if isinstance(model, Mendez) else physics.INTEGRATE,
-            cycles=self.excitation.cycles if isinstance(self.excitation, Waveform) else 1,
-            rule=RULES[solver.rule],
-            steps_per_cycle=solver.steps_per_cycle,
-            wants_peak=wants_peak,
-            g=model.g,
-        )
 
 
 def cell_inputs(arrays: Mapping[str, Array], dimensions: int, g: float) -> list[Array]:
@@ -200,12 +150,7 @@ def solve(asked: Request) -> Arrays:
     """
     results = asked.results()
     for where, part in _parts(asked):
-        # most parts lie in one piece in the results, and are solved where they lie
-        found = {name: np.require(values[where], requirements="C") for name, values in results.items()}
-        _solve_into(found, part)
-        for name, values in results.items():
-            if not np.may_share_memory(values, found[name]):
-                values[where] = found[name]
+        _solve_into({name: values[where] for name, values in results.items()}, part)
     return results
 
 
@@ -306,30 +251,16 @@ def _amplitudes(arrays: Mapping[str, Array]) -> int:
     return math.prod(np.broadcast_shapes(arrays["displacement_amplitude"].shape, arrays["frequency"].shape))
 
 
-def _is_plain(motion: Waveform | Record | Suite) -> bool:
-    """Whether a motion is a wave without ramps for which there are shorter ways."""
-    return isinstance(motion, (Sine, Cosine, Triangle, Square)) and motion.ramp_in == motion.ramp_out == 0.0
-
-
-def _lanes(motion: Waveform | Record | Suite, newmark: bool) -> "tuple[Handed, Kernel | None]":
-    """What solves a plain motion in lanes, and what solves the cells that it leaves, if it leaves any."""
-    for wave, kernel in ((Cosine, COSINE_KERNEL), (Triangle, TRIANGLE_KERNEL), (Square, SQUARE_KERNEL)):
-        if isinstance(motion, wave):
-            return kernel, WAVE_KERNEL
-    return (NEWMARK_SINE_KERNEL, None) if newmark else (SINE_KERNEL, REMAINING_KERNEL)
-
-
 def _solve_into(results: Arrays, asked: Request) -> None:
-    """Solve a part of a grid that one motion shakes; `results` lie without gaps."""
+    """Solve a part of a grid that one motion shakes, into views of the results."""
     problem, shape, arrays = asked.problem, asked.shape, asked.arrays
     extremes = extremes_of(problem.excitation)
-    inputs, periods, codes = kernel_inputs(asked)
-    # what is out of the ordinary is looked at, for which flags are wanted in any case
+    inputs, periods = kernel_inputs(asked)
+    # what is out of the ordinary is looked at, for which flags are needed in any case
     looked_at = (np.array(problem.model.g), *inputs[1:], periods, *extremes.values())
     ordinary = all(map(is_ordinary, looked_at))
     filled = results if ordinary else {"validity": np.empty(shape, RESULT_DTYPES["validity"]), **results}
-    call, work = _kernel_call(asked, "peak_relative_velocity" in results)
-    unsolved = _fill(filled, codes, shape, inputs, periods, call, work, asked.progress)
+    unsolved = _fill(filled, asked, inputs, periods)
     if not ordinary:
         check_served(problem.model.g, {**arrays, **extremes}, results, filled["validity"])
     _refuse_unsolved(unsolved, shape, arrays)
@@ -379,64 +310,14 @@ def _extreme_factors(motion: Record | Suite, values: Mapping[str, Array]) -> lis
     return found
 
 
-def kernel_inputs(asked: Request) -> tuple[list[Array], Array, tuple[str, ...]]:
-    """What kernels take: the fields of `Cell`, 1/ω or the factor on time, and the names of their rows of codes."""
+def kernel_inputs(asked: Request) -> tuple[list[Array], Array]:
+    """What kernels take: the fields of `Cell`, and 1/ω or the factor on time."""
     motion, arrays, dimensions, g = asked.problem.excitation, asked.arrays, len(asked.shape), asked.problem.model.g
     if isinstance(motion, Waveform):
-        return cell_inputs(arrays, dimensions, g), 1.0 / (2.0 * math.pi * arrays["frequency"]), MOTION_CODES
+        return cell_inputs(arrays, dimensions, g), 1.0 / (2.0 * math.pi * arrays["frequency"])
     assert isinstance(motion, Record)  # `motions` has made a suite into its parts
     own = {**arrays, "amplitude": strength_factor(motion, arrays)}
-    return cell_inputs(own, dimensions, g), arrays["time_scale"], RECORD_CODES
-
-
-def _kernel_call(asked: Request, wants_peak: bool) -> tuple[_Call, int]:
-    """What solves a stretch of cells, and what a cell of them takes, in cells of the cycle solver."""
-    problem, options = asked.problem, asked.problem.options(wants_peak)
-    motion, solver = problem.excitation, problem.solver
-    if isinstance(motion, Record):
-        recorded = wave_of_record(motion, float(asked.arrays["polarity"].item()))
-        # some 1 µs against 0.1, and more for a long record
-        cost = max(16, recorded.pieces.shape[0] // 128)
-        own = newmark_kernels.record_of(recorded)
-        if isinstance(problem.model, Newmark):
-
-            def call_newmark(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-                tile, lanes = tile_of(grid), newmark_kernels.room_of()
-                NEWMARK_RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, own, targets, tile, lanes)
-
-            return call_newmark, cost
-
-        def call(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            RECORD_KERNEL(grid, first, last, rows, periods, options, recorded, own, targets, tile_of(grid))
-
-        return call, cost
-    assert isinstance(motion, Waveform)
-    if _is_plain(motion) and not isinstance(solver, Step):
-        kernel, left = _lanes(motion, isinstance(problem.model, Newmark))
-
-        def call_lanes(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            tile, remaining = tile_of(grid), np.empty(((last - first + 1) // 2, 2), np.int64)
-            count = kernel(grid, first, last, rows, periods, options, targets, tile, room_of(), remaining)
-            if left and count:
-                # only here: to cut a wave into pieces takes 0.1 s, a seventh of a small run
-                left(grid, remaining[:count], rows, periods, options, wave_of(motion), targets, tile)
-
-        return call_lanes, 1
-    wave = wave_of(motion)
-    if isinstance(solver, Step):
-        steps = steps_of(wave, options.steps_per_cycle, options.rule)
-
-        def call_step(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-            STEP_KERNEL(grid, first, last, rows, periods, options, steps, targets, tile_of(grid))
-
-        # a step takes about 1/16 of a cell of the cycle solver
-        return call_step, 1 + options.steps_per_cycle // 16
-
-    def call_wave(grid: Grid, first: int, last: int, rows: _Rows, periods: Array, targets: Results) -> None:
-        whole = np.array([[first, last]])
-        WAVE_KERNEL(grid, whole, rows, periods, options, wave, targets, tile_of(grid))
-
-    return call_wave, 1
+    return cell_inputs(own, dimensions, g), arrays["time_scale"]
 
 
 def amplitudes(asked: Request) -> Arrays:
@@ -454,47 +335,56 @@ def coulomb_yield_acceleration(theta: Array, mu_s: Array, g: float) -> Array:
         return np.asarray(of_arrays(eq.coulomb_yield_acceleration)(mu_s, np.tan(np.radians(theta)), g))
 
 
-def _fill(
-    results: Mapping[str, NDArray[Any]],
-    codes: tuple[str, ...],
-    shape: tuple[int, ...],
-    inputs: list[Array],
-    periods: Array,
-    call: _Call,
-    work_per_cell: int,
-    progress: Callable[[int], None] | None,
-) -> tuple[int, ...] | None:
-    """Fill in results of a `shape` by `call` of a kernel.
+def _cells_of(inputs: list[Array], slab: tuple[slice, ...], shape: tuple[int, ...]) -> Cells:
+    """The cells of a slab of a grid, (cells,) each."""
+    parts = (cut({"values": values}, slab)["values"] for values in inputs)
+    return Cells(*(np.ascontiguousarray(np.broadcast_to(part, shape)).reshape(-1) for part in parts))
 
-    u and v go as the squares of `periods` and as `periods`; `codes` are the names of the kernel's rows of codes.
+
+def _fill(results: Arrays, asked: Request, inputs: list[Array], periods: Array) -> tuple[int, ...] | None:
+    """Fill in results, tile by tile; u and v go as the squares of `periods` and as `periods` (the scaling law).
+
     Returns a cell that was not solved, if there is one.
     """
-    scaled = scaled_dimension(shape, inputs, periods)
-    grid = layout(shape, scaled, [*inputs, periods])
-
-    def target(name: str) -> NDArray[Any]:
-        return results.get(name, np.empty(0, RESULT_DTYPES.get(name, "float64"))).reshape(-1)
-
-    targets = Results(
-        target("permanent_displacement"),
-        target("peak_relative_velocity"),
-        tuple(map(target, codes)),
-        unsolved=np.full(1, -1),
-    )
-    rows, flat_periods = tuple(flat(values) for values in inputs), flat(periods)
+    shape, scaled = asked.shape, scaled_dimension(asked.shape, inputs, periods)
+    cell_shape = tuple(1 if axis == scaled else size for axis, size in enumerate(shape))
+    polarity = float(asked.arrays["polarity"].item()) if "polarity" in asked.arrays else 1.0
+    wants_peak = "peak_relative_velocity" in results
+    solve_cells, cost = solver_of(asked.problem, wants_peak, polarity)
+    tile = max(_TILE // cost, 1)
+    tiles = list(slabs(cell_shape, tile))
+    unsolved: list[tuple[int, ...]] = []
 
     def work(first: int, last: int) -> None:
-        call(grid, first, last, rows, flat_periods, targets)
-        if progress is not None:
-            progress((last - first) * grid.frequencies)
+        if first == last:  # what a first call compiles, seconds long, is compiled on the thread that hears Ctrl-C
+            solve_cells(Cells(*(np.empty(0) for _ in Cells._fields)), np.empty((len(ROWS), 0)))
+        for slab in tiles[first:last]:
+            _fill_tile(results, slab, scaled)
+
+    def _fill_tile(results: Arrays, slab: tuple[slice, ...], scaled: int | None) -> None:
+        lengths = tuple(len(range(*one.indices(size))) for one, size in zip(slab, cell_shape, strict=True))
+        cells = _cells_of(inputs, slab, lengths)
+        found = np.empty((len(ROWS), cells.mu_s.size))
+        solve_cells(cells, found)
+        where = tuple(slice(None) if axis == scaled else one for axis, one in enumerate(slab))
+        seconds = cut({"periods": periods}, where)["periods"]
+        for name, values in results.items():
+            target, own = values[where], found[ROWS[name]].reshape(lengths)
+            if name == "permanent_displacement":
+                np.multiply(own, seconds * seconds, out=target)
+            elif name == "peak_relative_velocity":
+                np.multiply(own, seconds, out=target)
+            else:
+                np.copyto(target, own, casting="unsafe")
+        wrong = np.flatnonzero(found[ROWS["validity"]].astype(np.int64) & UNSOLVED)
+        if wrong.size:
+            at = np.unravel_index(int(wrong[0]), lengths)
+            unsolved.append(tuple(int(i) + (one.start or 0) for i, one in zip(at, slab, strict=True)))
+        asked.tell(cells.mu_s.size * (shape[scaled] if scaled is not None else 1))
 
     if math.prod(shape):
-        # a result takes about 1/32 of a cell of the cycle solver
-        threads.spread(math.prod(int(size) for size in grid.shape), work, work_per_cell + grid.frequencies // 32)
-    if targets.unsolved[0] < 0:
-        return None
-    at = [int(i) for i in np.unravel_index(int(targets.unsolved[0]), tuple(grid.shape))]
-    return tuple(at.pop(0) if axis != scaled else 0 for axis in range(len(shape)))
+        threads.spread(len(tiles), work, tile * cost)
+    return unsolved[0] if unsolved else None
 
 
 def _refuse_unsolved(cell: tuple[int, ...] | None, shape: tuple[int, ...], arrays: Mapping[str, Array]) -> None:
@@ -517,57 +407,32 @@ def friction_parameters(asked: Request) -> Arrays:
 
 def estimates(asked: Request, checked: bool = False) -> Arrays:
     """As `friction_parameters`; unless `checked`, an estimate that is no finite number is given as it is."""
-    results, options = asked.results(), asked.problem.options(False)
-    parts = list(slabs(asked.shape, _FRICTION_CELLS))
+    results, options = asked.results(), options_of(asked.problem, wants_peak=False)
+    parts = list(slabs(asked.shape, _TILE))
+    inputs = cell_inputs(asked.arrays, len(asked.shape), asked.problem.model.g)
 
     def solve_slab(slab: tuple[slice, ...]) -> None:
-        own = asked.part(slab)
-        inputs = cell_inputs(own.arrays, len(own.shape), own.problem.model.g)
-        grid = layout(own.shape, None, [*inputs, np.ones((1,) * len(own.shape))])
-        cells = math.prod(own.shape)
-        parameters = np.empty((len(FRICTION_PARAMETERS), cells))
-        codes = {name: np.empty(cells, RESULT_DTYPES[name]) for name in ("sliding_mode", "validity")}
-        rows = tuple(flat(values) for values in inputs)
-        PARAMETER_KERNEL(
-            grid, 0, cells, rows, options, tile_of(grid), parameters, codes["sliding_mode"], codes["validity"]
-        )
-        found: Arrays = dict(zip(FRICTION_PARAMETERS, parameters, strict=True)) | codes
-        shaped = {name: found[name].reshape(own.shape) for name in asked.wanted}
+        shape = tuple(len(range(*one.indices(size))) for one, size in zip(slab, asked.shape, strict=True))
+        cells = _cells_of(inputs, slab, shape)
+        rows = np.empty((len(FRICTION_PARAMETERS) + 2, cells.mu_s.size))
+        find_parameters(cells, options, rows)
+        found = dict(zip((*FRICTION_PARAMETERS, "sliding_mode", "validity"), rows, strict=True))
+        shaped = {name: found[name].reshape(shape).astype(results[name].dtype) for name in asked.wanted}
         if checked:
-            check_served(asked.problem.model.g, own.arrays, shaped, codes["validity"].reshape(own.shape))
+            validity = found["validity"].reshape(shape).astype(np.int16)
+            check_served(asked.problem.model.g, cut(asked.arrays, slab), shaped, validity)
         for name, values in shaped.items():
             if checked and values.dtype.kind == "f":
                 values[np.isinf(values)] = math.nan  # of a cell without a value
             results[name][slab] = values
-        asked.tell(cells)
+        asked.tell(cells.mu_s.size)
 
     def work(first: int, last: int) -> None:
         for slab in parts[first:last]:
             solve_slab(slab)
 
-    # the kernel gives all parameters: slab by slab, those not wanted take no room
-    threads.spread(len(parts), work, _FRICTION_CELLS)
+    threads.spread(len(parts), work, _TILE)
     return results
-
-
-def expect_kernels(solver: Callable[..., Any], problem: Problem) -> None:
-    """Say which kernels one of the functions above will call, whatever the grid, and which perhaps."""
-    if solver is friction_parameters:
-        PARAMETER_KERNEL.expect()
-    if solver not in (solve, newmark):
-        return
-    newmarks = isinstance(problem.model, Newmark) or solver is newmark
-    if isinstance(problem.excitation, (Record, Suite)):
-        (NEWMARK_RECORD_KERNEL if newmarks else RECORD_KERNEL).expect()
-    elif isinstance(problem.solver, Step):
-        STEP_KERNEL.expect()
-    elif _is_plain(problem.excitation):
-        kernel, left = _lanes(problem.excitation, newmarks)
-        kernel.expect()
-        if left:
-            left.expect(perhaps=True)
-    else:
-        WAVE_KERNEL.expect()
 
 
 def mark_flexible_blocks(validity: NDArray[np.int16], frequency: Array, structure_frequency: Array) -> None:
@@ -589,30 +454,3 @@ def cut(arrays: Mapping[str, Array], slices: tuple[slice, ...]) -> dict[str, Arr
         where: Any = (part if size > 1 else slice(None) for part, size in zip(slices, values.shape, strict=True))
         parts[name] = values[(*where, ...)]  # the dots keep an array without dimensions an array
     return parts
-
-
-def flat(values: Array) -> Array:
-    """One row of float64 as the kernels are compiled for; a copy only where there is no other way."""
-    return np.require(values, np.float64, ["C", "ALIGNED", "WRITEABLE"]).reshape(-1)
-
-
-def layout(shape: tuple[int, ...], scaled: int | None, arrays: list[Array]) -> Grid:
-    """Strides of the cells' dimensions for the inputs, the periods and the results; the scaled dimension apart."""
-    dimensions = [axis for axis in range(len(shape)) if axis != scaled]
-    rows = [_strides(values.shape) for values in arrays] + [_strides(shape)]
-    return Grid(
-        # a grid without dimensions is one cell along one
-        shape=np.array([shape[axis] for axis in dimensions] or [1], np.int64),
-        strides=np.array([[row[axis] for axis in dimensions] or [0] for row in rows], np.int64),
-        frequencies=1 if scaled is None else shape[scaled],
-        frequency_stride=0 if scaled is None else rows[-2][scaled],
-        result_stride=0 if scaled is None else rows[-1][scaled],
-    )
-
-
-def _strides(shape: tuple[int, ...]) -> list[int]:
-    """Strides in elements of a C-contiguous array, 0 along dimensions of length 1."""
-    strides = []
-    for axis, size in enumerate(shape):
-        strides.append(math.prod(shape[axis + 1 :]) if size > 1 else 0)
-    return strides

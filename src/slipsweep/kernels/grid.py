@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, uncounted
-from slipsweep.kernels.block import Cell, Motion, store
+from slipsweep.kernels.block import FRICTION_ESTIMATED, Cell, Motion, Options, decay_rate_of, interface_of, store
 from slipsweep.motion.pieces import Wave
 
 #: Rows of a tile's results.
@@ -74,3 +75,22 @@ def solve_each(solve: Callable[..., Motion], cells: Cells, common: Any, results:
     """
     for j in range(results.shape[1]):
         store(solve(cell_at(cells, j), common), j, results)
+
+
+@kernel
+def find_parameters(cells: Cells, options: Options, parameters: np.ndarray) -> None:
+    """Write Üy, Eqs. 7-11 and λ of the cells of a tile, their mode and the validity known before the motion.
+
+    `parameters` is (8, cells), its rows in that order (`variables.FRICTION_PARAMETERS`).
+    """
+    for j in range(parameters.shape[1]):
+        cell = cell_at(cells, j)
+        found = interface_of(cell, options.rise, options.g)
+        parameters[0, j] = found.yield_acceleration
+        parameters[1, j] = found.limiting_acceleration
+        parameters[2, j] = found.acceleration_ratio
+        parameters[3, j] = found.minimum_friction
+        parameters[4, j] = found.delta_mu
+        parameters[5, j] = decay_rate_of(cell, found.delta_mu, found.minimum_friction, options.g)
+        parameters[6, j] = found.sliding_mode
+        parameters[7, j] = found.validity & ~FRICTION_ESTIMATED  # known only with the motion

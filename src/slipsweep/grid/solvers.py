@@ -1,0 +1,84 @@
+"""Which kernel solves a problem: the sine's SIMD batches, the exact walk under a wave or a record, or steps."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.block import UNSOLVED, Motion, Options
+from slipsweep.kernels.exact import workspace_of
+from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.record import solve_record
+from slipsweep.kernels.sine.newmark import solve_newmark_sine
+from slipsweep.kernels.sine.solve import solve_sine
+from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_steps
+from slipsweep.kernels.waves import solve_waves
+from slipsweep.model.options import Mendez, Newmark, Step
+from slipsweep.motion.cutting import wave_of, wave_of_record
+from slipsweep.motion.records import Record
+from slipsweep.motion.steps import own_steps, steps_of
+from slipsweep.motion.waveforms import Sine, Waveform
+
+if TYPE_CHECKING:
+    from slipsweep.grid.engine import Problem
+
+RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
+RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
+RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
+
+#: Results by their names: the row of a kernel's results that each is found in.
+_NAMES = {"displacement": "permanent_displacement", "peak_velocity": "peak_relative_velocity"}
+ROWS = {_NAMES.get(field, field): row for row, field in enumerate(Motion._fields)}
+
+#: Solves cells into rows of results, (fields of `Motion`, cells).
+Solve = Callable[[Cells, np.ndarray], Any]
+
+
+def options_of(problem: "Problem", wants_peak: bool) -> Options:
+    """What all cells of a problem share, as the kernels take it."""
+    model = problem.model
+    return Options(
+        rise=RISES[model.rise] if isinstance(model, Mendez) else physics.NEWMARK,
+        recoupling=RECOUPLINGS[model.recoupling] if isinstance(model, Mendez) else physics.INTEGRATE,
+        cycles=problem.excitation.cycles if isinstance(problem.excitation, Waveform) else 1,
+        wants_peak=wants_peak,
+        g=model.g,
+    )
+
+
+def solver_of(problem: "Problem", wants_peak: bool, polarity: float) -> tuple[Solve, int]:
+    """What solves the cells of a problem that one motion shakes, and the time of a cell in those of the sine's."""
+    motion, options = problem.excitation, options_of(problem, wants_peak)
+    if isinstance(motion, Record):
+        recorded = wave_of_record(motion, polarity)
+
+        def under_record(cells: Cells, results: np.ndarray) -> None:
+            solve_record(cells, options, recorded, workspace_of(recorded), results)
+
+        return under_record, max(64, recorded.pieces.shape[0] // 8)
+    assert isinstance(motion, Waveform)
+    if isinstance(problem.solver, Step):
+        steps = steps_of(wave_of(motion), RULES[problem.solver.rule], problem.solver.steps_per_cycle)
+
+        def by_steps(cells: Cells, results: np.ndarray) -> None:
+            solve_steps(cells, options, wave_of(motion), own_steps(steps), results)
+
+        return by_steps, 1 + problem.solver.steps_per_cycle // 16
+
+    def under_wave(cells: Cells, results: np.ndarray) -> None:
+        wave = wave_of(motion)
+        solve_waves(cells, options, wave, workspace_of(wave), results)
+
+    if not isinstance(motion, Sine) or motion.ramp_in or motion.ramp_out:
+        return under_wave, 16
+    in_batches = solve_newmark_sine if isinstance(problem.model, Newmark) else solve_sine
+
+    def under_sine(cells: Cells, results: np.ndarray) -> None:
+        if in_batches(cells, options, results):
+            left = np.flatnonzero(results[ROWS["validity"]] == UNSOLVED)
+            found = np.empty((len(Motion._fields), left.size))
+            under_wave(Cells(*(values[left] for values in cells)), found)
+            results[:, left] = found
+
+    return under_sine, 1
