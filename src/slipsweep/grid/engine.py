@@ -17,7 +17,7 @@ from slipsweep.errors import RunError
 from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
-from slipsweep.grid.solvers import ROWS, Solve, options_of, solver_of
+from slipsweep.grid.solvers import ROWS, options_of, solver_of
 from slipsweep.jit.decorators import of_arrays
 from slipsweep.kernels.block import UNSOLVED, Cell
 from slipsweep.kernels.grid import Cells, find_parameters
@@ -49,6 +49,7 @@ Array = NDArray[np.float64]
 
 #: Results by their names.
 Arrays: TypeAlias = dict[str, NDArray[Any]]
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -112,8 +113,6 @@ class Request:
         Names of results; nothing else is computed.
     progress : callable, optional
         Called with a number of result cells as they are finished, from any thread.
-    empty : callable
-        Makes the arrays of the results.
     """
 
     problem: Problem
@@ -121,11 +120,10 @@ class Request:
     arrays: Mapping[str, Array]
     wanted: tuple[str, ...]
     progress: Callable[[int], None] | None = None
-    empty: Empty = np.empty
 
     def results(self) -> Arrays:
         """Arrays for what is wanted, not filled in: of `shape`, float64 but for codes (`variables.RESULT_DTYPES`)."""
-        return {name: self.empty(self.shape, RESULT_DTYPES.get(name, "float64")) for name in self.wanted}
+        return {name: np.empty(self.shape, RESULT_DTYPES.get(name, "float64")) for name in self.wanted}
 
     def tell(self, cells: int) -> None:
         """Tell of progress, if anybody wants to know."""
@@ -150,7 +148,7 @@ def solve(asked: Request) -> Arrays:
     """
     results = asked.results()
     for where, part in _parts(asked):
-        _solve_into({name: values[where] for name, values in results.items()}, part)
+        _solve_into({name: values[(*where, ...)] for name, values in results.items()}, part)
     return results
 
 
@@ -166,7 +164,6 @@ def newmark(asked: Request) -> Arrays:
         arrays=arrays,
         wanted=("permanent_displacement",),
         progress=asked.progress if same else None,
-        empty=asked.empty if same else np.empty,
     )
     moved = solve(own)["permanent_displacement"]
     if same:
@@ -369,7 +366,7 @@ def _fill(results: Arrays, asked: Request, inputs: list[Array], periods: Array) 
         where = tuple(slice(None) if axis == scaled else one for axis, one in enumerate(slab))
         seconds = cut({"periods": periods}, where)["periods"]
         for name, values in results.items():
-            target, own = values[where], found[ROWS[name]].reshape(lengths)
+            target, own = values[(*where, ...)], found[ROWS[name]].reshape(lengths)
             if name == "permanent_displacement":
                 np.multiply(own, seconds * seconds, out=target)
             elif name == "peak_relative_velocity":

@@ -18,7 +18,7 @@ from slipsweep.motion.pieces import BEGIN, FINISH, FIRST, LAST, TOP, Wave
 
 
 class Zeros(NamedTuple):
-    """How many zeros D has on the way from Üg = 0 up to the largest and down to the least Üg; −1: not all were found."""
+    """How many zeros D has from Üg = 0 up to the largest and down to the least Üg; −1: not all were found."""
 
     up: int
     down: int
@@ -81,9 +81,7 @@ def most_gained(
 
 
 @scalar
-def follow_cycle(
-    block: Block, wave: Wave, c: int, p: int, tau: float, zeros: Zeros, workspace: Workspace
-) -> Gain:
+def follow_cycle(block: Block, wave: Wave, c: int, p: int, tau: float, zeros: Zeros, workspace: Workspace) -> Gain:
     """Eq. 4 from rest, τ on piece p, to the end of cycle c, whose `gains` are known."""
     pieces = wave.pieces
     velocity, displacement, peak = 0.0, 0.0, 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar, summed
+from slipsweep.jit.decorators import scalar, summed
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.block import Block, friction
 from slipsweep.kernels.excitation import base_acceleration, offset_at
@@ -94,9 +94,7 @@ def panel_lag(block: Block, pieces: np.ndarray, p: int, near: float, until: floa
 
 
 @scalar
-def curved_lag(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float
-) -> Lag:
+def curved_lag(block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float) -> Lag:
     """`Lag` where |Üg| goes along a curve, panel by panel from the end where the friction is larger."""
     length = block.law.decay_length(block.decay_rate, block.g)
     e_foldings = abs(x_end - x_start) / length
@@ -125,7 +123,9 @@ def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: f
     """`Lag` over a part of piece p."""
     amplitude = block.amplitude
     # most parts begin or end where the piece does
-    x_start = amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
+    x_start = (
+        amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
+    )
     x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else base_acceleration(pieces, p, amplitude, end)
     x_start, x_end = abs(x_start), abs(x_end)
     if int(pieces[p, DEGREE]) <= 1:
@@ -134,9 +134,7 @@ def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: f
 
 
 @scalar
-def eq4_integrals(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float
-) -> tuple[float, float]:
+def eq4_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float) -> tuple[float, float]:
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest, after Eq. 4."""
     lag = lag_integrals(block, pieces, p, start, end)
     side_g = math.copysign(block.g, pieces[p, TOP])

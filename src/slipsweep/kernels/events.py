@@ -22,10 +22,9 @@ _MOST_STEPS = 200
 #: double one by halves.
 _AT_ORIGIN = 1e-30
 
-def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Callable[..., float]:
-    """The jitted root finder of a function: ``value_and_slope(where, x)`` gives f(x) and df/dx.
 
-    """
+def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Callable[..., float]:
+    """The jitted root finder of a function: ``value_and_slope(where, x)`` gives f(x) and df/dx."""
 
     @scalar
     def root(where: Any, below: float, above: float, x: float, origin: float) -> float:

@@ -45,8 +45,8 @@ _SLIVER, _ROUNDING = 1e-10, 4.5e-16
 #: More phases than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
 MOST_PHASES = 32
 
-#: Kinds of motion in a log of it.
-HOLD, FOLLOW, ATTENUATE = range(3)
+#: Kinds of motion in a log of it; the last row that is used is followed by one of none.
+NOTHING, HOLD, FOLLOW, ATTENUATE = range(4)
 
 #: A log of the motion, for time histories: its kind, the piece, τ and phase where it starts, phase at the end, and b, V
 #: and W at the start.
@@ -104,8 +104,10 @@ class RisePhase(NamedTuple):
     follows_after: bool
 
 
-def workspace_of(wave: Wave, logged: int = 0) -> Workspace:
-    """A workspace for a wave, with a log of so many rows."""
+def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
+    """A workspace for a wave; a log has as many rows as a pulse may have parts."""
+    longest = int(np.diff(wave.interval, axis=1).max(initial=0))
+    logged = longest * MOST_PHASES + wave.pieces.shape[0] + 3 if keeps_log else 0
     return Workspace(
         log=np.empty(logged, LOG),
         gains=np.empty(int(np.diff(wave.cycle).max()), GAINS),
@@ -176,6 +178,7 @@ def logged(state: State, log: np.ndarray, kind: int, piece: int, tau: float, sta
     row = log[state.logged]
     row["kind"], row["piece"], row["tau"], row["start"], row["end"] = kind, piece, tau, start, end
     row["held"], row["velocity"], row["displacement"] = state.held, state.velocity, state.displacement
+    log[state.logged + 1]["kind"] = NOTHING
     return State(
         state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
         state.stopped_at, state.least_held, state.slips, state.logged + 1,
@@ -208,7 +211,7 @@ def next_break(block: Block, x: float, end: float) -> float:
 
 @scalar
 def onset(block: Block, x: float, top: float) -> float:
-    """t1: Üg on the rise from x ≥ Üy to `top` at which the block at rest starts to slide, D > 0 (`top` if it does not)."""
+    """t1: Üg on the rise from x ≥ Üy to `top` at which the block at rest starts to slide (`top` if it does not)."""
     if block.rise == NEWMARK or relative_acceleration(block, inside(x, top)) > 0.0:
         return x
     for _ in range(MOST_PHASES):

@@ -4,12 +4,22 @@ A pulse begins where the base's acceleration comes to Üy, or jumps past it, aft
 earliest), and lasts to where the next one begins.  Velocity is all that one leaves to the next.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar
-from slipsweep.kernels.block import FRICTION_ESTIMATED, NEAR_MODE_LIMIT, Block
+from slipsweep.jit.decorators import scalar
+from slipsweep.kernels.block import (
+    FRICTION_ESTIMATED,
+    NEAR_MODE_LIMIT,
+    NO_VALUE,
+    UNSOLVED,
+    Block,
+    Motion,
+    settled,
+    without_estimates,
+)
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.motion.pieces import BEGIN, FIRST, JUMPS, LAST, Wave
 
@@ -63,3 +73,14 @@ def rises_anew(pieces: np.ndarray, p: int) -> bool:
     first, last = pieces[p, FIRST], pieces[p, LAST]
     fell = p > 0 and pieces[p - 1, FIRST] > pieces[p - 1, LAST]
     return pieces[p, JUMPS] > 0.0 or (first > 0.0 and (first == last or (first < last and fell)))
+
+
+@scalar
+def motion_of(block: Block, validity: int, found: Pulse) -> Motion:
+    """The motion of a cell under a waveform; an iteration that has not ended has made its W or V NaN."""
+    validity |= found.validity
+    if math.isnan(found.displacement) and validity & NO_VALUE == 0:
+        validity |= UNSOLVED
+    validity = settled(without_estimates(validity), found.displacement, block.amplitude)
+    mode = -1 if validity & NO_VALUE else block.sliding_mode
+    return Motion(found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan)

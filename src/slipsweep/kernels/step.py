@@ -28,9 +28,8 @@ from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
 from slipsweep.kernels.grid import Cells, solve_each
-from slipsweep.kernels.pulse import Pulse, beginning, first_pulse, validity_before
+from slipsweep.kernels.pulse import Pulse, beginning, first_pulse, motion_of, validity_before
 from slipsweep.kernels.train import train_of
-from slipsweep.kernels.waves import motion_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
 from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave

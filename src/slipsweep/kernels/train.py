@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     NO_VALUE,
     NOT_RECOUPLED,

@@ -6,23 +6,18 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, scalar, uncounted
+from slipsweep.jit.decorators import scalar, uncounted
 from slipsweep.kernels.block import (
-    NO_VALUE,
-    UNSOLVED,
     YIELD_GOVERNS,
-    Block,
     Cell,
     Motion,
     Options,
     block_of,
-    settled,
-    without_estimates,
 )
 from slipsweep.kernels.continuous import slide_continuously
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace, yield_governs
 from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted_wave
-from slipsweep.kernels.pulse import Pulse, validity_before
+from slipsweep.kernels.pulse import Pulse, motion_of, validity_before
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
@@ -37,17 +32,6 @@ class Problem(NamedTuple):
     options: Options
     wave: Wave
     workspace: Workspace
-
-
-@scalar
-def motion_of(block: Block, validity: int, found: Pulse) -> Motion:
-    """The motion of a cell under a waveform; an iteration that has not ended has made its W or V NaN."""
-    validity |= found.validity
-    if math.isnan(found.displacement) and validity & NO_VALUE == 0:
-        validity |= UNSOLVED
-    validity = settled(without_estimates(validity), found.displacement, block.amplitude)
-    mode = -1 if validity & NO_VALUE else block.sliding_mode
-    return Motion(found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan)
 
 
 @scalar

@@ -1,8 +1,8 @@
 """Friction laws: the friction coefficient as a function of the base's acceleration.
 
 A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone and takes any law; the exact
-kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of the paper is `EXPONENTIAL`, Eq. 6;
-its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of the
+paper is `EXPONENTIAL`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
 """
 
 import math
@@ -111,7 +111,7 @@ def moments_of_decay(z: float) -> tuple[float, float, float, float]:
 def exponential_moments(
     start: float, change: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> tuple[float, float, float, float]:
-    """Moments of Eq. 6 where |Üg| goes along a straight line from `start` by `change` (docs/numerics.md#straight-pieces).
+    """Moments of Eq. 6 along a straight line of |Üg| from `start` by `change` (docs/numerics.md#straight-pieces).
 
     The exponential is taken from the end where the friction is larger, so that its argument is never positive:
     nothing overflows, however large λ is.

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.grid.engine import Problem
-from slipsweep.kernels.block import TILE
-from slipsweep.kernels.history import record_history
+from slipsweep.grid.solvers import options_of
+from slipsweep.kernels.block import Cell
+from slipsweep.kernels.exact import workspace_of
+from slipsweep.kernels.history import History, record_history
 from slipsweep.model.options import Cycle, Mendez
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import wave_of_record
@@ -31,14 +33,12 @@ class Forward:
     def __init__(self, theta: float, mu_s: float, model: Mendez) -> None:
         self.theta, self.mu_s, self.model = theta, mu_s, model
         self.runs = 0
-        self._cell = np.array([math.tan(math.radians(theta)), mu_s, 1.0, math.nan, math.nan, math.nan, math.nan])
 
     def __call__(self, record: Record, parameters: Floats, times: Floats) -> Floats:
         """Columns of `HISTORY` at the times, for Üy, λ and Δμ."""
         self.runs += 1
-        cell = self._cell.copy()
-        cell[3:6] = parameters
-        history = np.empty((times.size, len(COLUMN)))
-        options = Problem(self.model, record, Cycle()).options(True)
-        record_history(np.repeat(cell, TILE), options, wave_of_record(record, 1.0), times, history)
-        return history
+        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, 1.0, *map(float, parameters), math.nan)
+        table, wave = np.empty((len(COLUMN), times.size)), wave_of_record(record, 1.0)
+        options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
+        record_history(cell, options, wave, workspace_of(wave, keeps_log=True), times, History(*table))
+        return table.T

@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.kernels.friction import mobilised_friction
+from slipsweep.kernels.history import eq1_friction
 from slipsweep.model.parameters import check_finite, check_single, shown
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, SLIDES
 from slipsweep.motion.shaking import TABLE, ShakingTest, removed_text
@@ -148,7 +148,7 @@ def friction_table(
             f"(g + Üg tan θ must be > 0); are its units right?"
         )
     friction = np.empty_like(table)
-    mobilised_friction(table, block, mu_s, tan_theta, g, friction)
+    eq1_friction(table, block, mu_s, tan_theta, g, friction)
     limit, why = threshold_of(test, threshold)
     slides = slides_of(test.times, table, block, limit)
     stops = [None if one.stop is None else test.times[one.stop] for one in slides]

@@ -18,8 +18,10 @@ from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, check_problem, plan_sweep
 from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
-from slipsweep.kernels.block import TILE
-from slipsweep.kernels.history import history, record_history
+from slipsweep.grid.solvers import options_of
+from slipsweep.kernels.block import Cell
+from slipsweep.kernels.exact import workspace_of
+from slipsweep.kernels.history import History, record_history, wave_history
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import MOST_POINTS, check_numbers, check_whole, number_text
 from slipsweep.model.variables import HALF_WAVES, HISTORY, VALUELESS, SlidingMode
@@ -122,12 +124,13 @@ class _History:
 
     def sampled(self, phases: Floats) -> Floats:
         """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
-        motion, table = self.problem.excitation, np.empty((phases.size, len(HISTORY)))
+        motion, table = self.problem.excitation, np.empty((len(HISTORY), phases.size))
         wave = wave_of_record(motion, float(self.inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
-        cell = engine.kernel_inputs(Request(self.problem, (), self.inputs, ()))[0]
-        cells = np.repeat([float(values) for values in cell], TILE)
-        kernel = record_history if isinstance(motion, Record) else history
-        arguments = cells, self.problem.options(True), wave, phases, table
+        given = engine.kernel_inputs(Request(self.problem, (), self.inputs, ()))[0]
+        cell = Cell(*(float(values) for values in given))
+        kernel = record_history if isinstance(motion, Record) else wave_history
+        options = options_of(self.problem, wants_peak=True)
+        arguments = cell, options, wave, workspace_of(wave, keeps_log=True), phases, History(*table)
         if isinstance(motion, Waveform) and motion.cycles > _MANY_CYCLES:
             # the main thread hears Ctrl-C while it waits; a thread that is a daemon does not hold up the exit
             thread = threading.Thread(target=kernel, args=arguments, daemon=True)
@@ -136,8 +139,8 @@ class _History:
         else:
             kernel(*arguments)
         if self._valueless:  # from the beginning on, also where the flag is raised later
-            table[:, 1:] = math.nan
-        return table
+            table[1:] = math.nan
+        return table.T
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """The variables of a history."""
@@ -168,7 +171,7 @@ class _History:
             mode = np.where((mode != SlidingMode.STUCK) & (peak > limit), SlidingMode.CONTINUOUS, mode)
         if self._valueless:
             mode = np.full(peak.shape, SlidingMode.MISSING)
-        first, after = wave.stretch.T
+        first, after = wave.interval.T
         found = {
             "half_wave_start": self.unit * wave.pieces[first, START],
             "half_wave_end": self.unit * wave.pieces[after - 1, END],
