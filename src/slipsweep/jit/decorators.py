@@ -30,6 +30,12 @@ inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
 
 
+#: The same for functions of a friction law, which kernels are given as values: one that is registered is no object
+#: at a place in memory, and numba keeps a kernel on disk that is given it.
+registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
+    error_model="numpy", fastmath={"contract", "arcp"}
+)
+
 _ffi = cffi.FFI()
 
 

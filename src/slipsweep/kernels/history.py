@@ -18,7 +18,7 @@ from slipsweep.kernels.excitation import base_acceleration, held_integrals, phas
 from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.kernels.record import block_in_pulse, end_of_following, recorded_pulse, slides_continuously
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import EXPONENTIAL
+from slipsweep.model.friction import exponential
 from slipsweep.motion.pieces import BEGIN, END, FINISH, START, Wave
 
 
@@ -268,12 +268,12 @@ def record_history(
     """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
     fill_recorded_base(wave, cell.amplitude, times, found)
     rest(found)
-    block = block_in_pulse(EXPONENTIAL, cell, options, cell.amplitude * wave.highest)
+    block = block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
     at, velocity, displacement = 0, 0.0, 0.0
     k = first_pulse(block, wave, 0)
     while at < times.size and k < wave.height.size:
         following, peak = first_pulse(block, wave, k + 1), cell.amplitude * wave.height[k]
-        block = block_in_pulse(EXPONENTIAL, cell, options, peak)
+        block = block_in_pulse(exponential(), cell, options, peak)
         workspace.log[0]["kind"] = NOTHING
         now = recorded_pulse(block, options, wave, k, following, peak, velocity, workspace)
         if slides_continuously(block, peak):
@@ -295,7 +295,7 @@ def wave_history(
     cell: Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
 ) -> None:
     """Fill a history under a waveform at increasing phases."""
-    block = block_of(EXPONENTIAL, cell, options.rise, options.g)
+    block = block_of(exponential(), cell, options.rise, options.g)
     fill_base(block, options.cycles, wave, phases, found)
     rest(found)
     if block.sliding_mode == eq.CONTINUOUS:

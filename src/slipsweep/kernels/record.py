@@ -43,7 +43,7 @@ from slipsweep.kernels.excitation import offset_at, phase_at
 from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
+from slipsweep.model.friction import FrictionLaw, exponential
 from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, LAST, TOP, Wave
 
 
@@ -264,7 +264,7 @@ def respond(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
 
 @scalar
 def _solve(cell: Cell, problem: Problem) -> Motion:
-    return respond(EXPONENTIAL, cell, problem)
+    return respond(exponential(), cell, problem)
 
 
 @kernel

@@ -31,7 +31,7 @@ from slipsweep.kernels.grid import Cells, solve_each
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse, motion_of, validity_before
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
+from slipsweep.model.friction import FrictionLaw, exponential
 from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
 from slipsweep.motion.steps import Steps
 
@@ -473,7 +473,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps
 @scalar
 def _solve(cell: Cell, common: tuple[Options, Wave, Steps]) -> Motion:
     options, wave, steps = common
-    return solve_cell(EXPONENTIAL, cell, options, wave, steps)
+    return solve_cell(exponential(), cell, options, wave, steps)
 
 
 @kernel

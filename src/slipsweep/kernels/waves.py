@@ -20,7 +20,7 @@ from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted
 from slipsweep.kernels.pulse import Pulse, motion_of, validity_before
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import EXPONENTIAL, FrictionLaw
+from slipsweep.model.friction import FrictionLaw, exponential
 from slipsweep.motion.pieces import Wave
 
 _train = train_of(pulse)
@@ -53,7 +53,7 @@ def solve_exactly(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
 
 @scalar
 def _solve(cell: Cell, problem: Problem) -> Motion:
-    return solve_exactly(EXPONENTIAL, cell, problem)
+    return solve_exactly(exponential(), cell, problem)
 
 
 @kernel

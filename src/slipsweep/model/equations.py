@@ -9,7 +9,7 @@ were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 
 import math
 
-from slipsweep.jit.decorators import inlined
+from slipsweep.jit.decorators import inlined, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model.variables import SlidingMode
 
@@ -100,7 +100,7 @@ def original_friction_coefficient(ground_acceleration: float, mu_s: float, decay
     return friction_coefficient(ground_acceleration, mu_s, 0.0, decay_rate, g)
 
 
-@inlined
+@registered
 def friction_coefficient(
     ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> float:

@@ -2,7 +2,7 @@
 
 A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone and takes any law; the exact
 kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of the
-paper is `EXPONENTIAL`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+paper is `exponential`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined
+from slipsweep.jit.decorators import inlined, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model import equations as eq
 
@@ -51,14 +51,14 @@ class FrictionLaw(NamedTuple):
         return tuple(name for name, function in self._asdict().items() if function is None)
 
 
-@inlined
+@registered
 def exponential_derivatives(friction: float, decay_rate: float, g: float) -> tuple[float, float]:
     """Derivatives of Eq. 6 by |Üg|: −(λ/g) μ and (λ/g)² μ."""
     rate = decay_rate / g
     return -rate * friction, rate * rate * friction
 
 
-@inlined
+@registered
 def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> float:
     """Where d²Ü/dÜg² of Eqs. 4 and 6 turns positive: (2 tan θ / λ − 1) g / tan θ; not positive where λ ≥ 2 tan θ.
 
@@ -67,13 +67,13 @@ def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> flo
     return (2.0 * tan_theta / decay_rate - 1.0) * g / tan_theta
 
 
-@inlined
+@registered
 def exponential_static_acceleration(mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
     """|Üg| at which Eq. 6 gives μs: (g/λ) ln((μs + Δμ)/μs)."""
     return g / decay_rate * log((mu_s + delta_mu) / mu_s)
 
 
-@inlined
+@registered
 def exponential_decay_length(decay_rate: float, g: float) -> float:
     """g/λ, over which μ of Eq. 6 falls to a part 1/e."""
     return g / decay_rate
@@ -107,7 +107,7 @@ def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     return all_over, before, after, (before - after) / large
 
 
-@inlined
+@registered
 def exponential_moments(
     start: float, change: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> tuple[float, float, float, float]:
@@ -122,12 +122,14 @@ def exponential_moments(
     return largest * whole, largest * early, largest * late, largest * both
 
 
-#: Eq. 6, μ = (μs + Δμ) exp(−λ|Üg|/g), and with Δμ = 0 Eq. 5.
-EXPONENTIAL = FrictionLaw(
-    friction=eq.friction_coefficient,
-    derivatives=exponential_derivatives,
-    inflection=exponential_inflection,
-    static_acceleration=exponential_static_acceleration,
-    moments=exponential_moments,
-    decay_length=exponential_decay_length,
-)
+@inlined
+def exponential() -> FrictionLaw:
+    """Eq. 6, μ = (μs + Δμ) exp(−λ|Üg|/g), and with Δμ = 0 Eq. 5: the law of the paper."""
+    return FrictionLaw(
+        eq.friction_coefficient,
+        exponential_derivatives,
+        exponential_inflection,
+        exponential_static_acceleration,
+        exponential_moments,
+        exponential_decay_length,
+    )
