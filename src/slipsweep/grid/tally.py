@@ -28,11 +28,10 @@ class Ratios:
 
     @classmethod
     def of(cls, values: NDArray[Any], others: NDArray[Any]) -> "Ratios":
-        """Count values over others, where both are positive."""
-        there = (values > 0.0) & (others > 0.0) & np.isfinite(values) & np.isfinite(others)
-        logs = np.log(values[there] / others[there])
-        ends = (math.log(_LEAST), math.log(_LARGEST))
-        return cls(np.histogram(np.clip(logs, *ends), _CLASSES, ends)[0])
+        """Count values over others, where neither is zero or missing; a negative one as the least."""
+        there = (values != 0.0) & (others != 0.0) & np.isfinite(values) & np.isfinite(others)
+        ratios = np.clip(np.divide(values[there], others[there], dtype=np.float64), _LEAST, _LARGEST)
+        return cls(np.histogram(np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST)))[0])
 
     @property
     def number(self) -> int:
