@@ -21,6 +21,7 @@ from slipsweep.cli.common import (
     place_of,
 )
 from slipsweep.cli.help import Panel, examples
+from slipsweep.cli.suite import echo_suite
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
 from slipsweep.model.variables import PARAMETERS, SlidingMode
@@ -66,6 +67,7 @@ def run(
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec
+    from slipsweep.files.opening import read_result
     from slipsweep.grid.resources import grid_text, size_text
 
     chunks = Chunks(overwrite, resume, memory, workers, scheduler)
@@ -115,6 +117,7 @@ def run(
     echo_tally(report.tally)
     if why := _why_nothing_slides(template, report.tally):
         typer.echo(why)
+    echo_suite(read_result(report.path), most=20)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")
 
 

@@ -51,6 +51,7 @@ def simulate(
     *,
     theta: Annotated[str | None, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")] = None,
     mu_s: Annotated[float | None, BLOCK("Static friction coefficient.")] = None,
+    phi: Annotated[str | None, BLOCK("Friction angle instead of --mu-s: 21 (degrees).", metavar="VALUE")] = None,
     yield_acceleration: Annotated[
         str | None, BLOCK("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", metavar="VALUE")
     ] = None,
@@ -98,6 +99,7 @@ def simulate(
         check_ending(path, tuple(writers))
     typed = {
         "theta": theta,
+        "phi": phi,
         "amplitude": amplitude,
         "displacement_amplitude": displacement_amplitude,
         "frequency": frequency,
