@@ -17,7 +17,7 @@ from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.files import storing as store
 from slipsweep.files.jobs import sweep_job
-from slipsweep.model.variables import DRAWN, RECORD_INPUTS, WAVEFORM_INPUTS, Validity
+from slipsweep.model.variables import Validity
 from slipsweep.studies.sampling import check_sampling
 from tests.support.commands import command
 
@@ -137,7 +137,7 @@ BLOCK = {
 
 
 @pytest.mark.parametrize("kind", ["absolute", "factor", "offset"])
-@pytest.mark.parametrize("name", [name for name in DRAWN if name not in RECORD_INPUTS or name in WAVEFORM_INPUTS])
+@pytest.mark.parametrize("name", [*BLOCK, "yield_coefficient"])
 def test_each_parameter_and_kind(name: str, kind: str) -> None:
     """One parameter drawn, against a sweep over its draws."""
     left_out = "amplitude" if name == "displacement_amplitude" else "displacement_amplitude"
@@ -162,6 +162,19 @@ def test_each_parameter_and_kind(name: str, kind: str) -> None:
     expected = swept.quantile([0.25, 0.75])
     assert 0 < expected[0] < expected[1]
     np.testing.assert_allclose(found.displacement_quantile, expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize("kind", ["absolute", "factor", "offset"])
+def test_a_friction_angle_is_the_coefficient_of_its_tangent(kind: str) -> None:
+    width = {"absolute": (20.0, 1.0), "factor": (1.0, 0.05), "offset": (0.0, 1.0)}[kind]
+    uncertain = {"phi": {"distribution": "norm", "loc": width[0], "scale": width[1], "kind": kind}}
+    case: dict[str, Any] = {"theta": 5.0, "amplitude": [3.0, 5.0], "frequency": 1.0}
+    given = {} if kind == "absolute" else {"phi": 20.0}
+    found = slipsweep.sample(**case, **given, uncertain=uncertain, samples=64)
+    draws = drawn(uncertain, samples=64)["phi"]
+    angles = {"absolute": draws, "factor": 20.0 * draws, "offset": 20.0 + draws}[kind]
+    u = slipsweep.sweep(**case, phi=np.sort(angles)).permanent_displacement
+    np.testing.assert_allclose(found.displacement_quantile.sel(quantile=0.5), u.median("phi"), rtol=1e-12)
 
 
 def test_of_a_displacement_amplitude() -> None:
