@@ -445,14 +445,14 @@ def test_values_on_axes_are_found_as_messages_print_them(grid: xr.Dataset) -> No
     for at, expected in (
         ({"amplitude": "0.3g"}, {"amplitude": [0]}),
         ({"amplitude": "294.3 cm/s^2, 4"}, {"amplitude": [0, 1]}),
-        ({"mu_s": "0.333", "theta": "5deg"}, {"mu_s": [1]}),
+        ({"mu_s": "0.3333", "theta": "5deg"}, {"mu_s": [1]}),
         ({"frequency": printed}, {"frequency": [2]}),
         ({"frequency": f"{printed}Hz"}, {"frequency": [2]}),
         ({"frequency": f"{float(printed) * 1000:g}mHz"}, {"frequency": [2]}),
     ):
         found = places_at(result, "result", at, list(map(str, result.dims)))
         assert {name: places.tolist() for name, places in found.items()} == expected
-    assert find(result, {"mu_s": 0.333})["mu_s"][0].index is None  # a number is what it is
+    assert find(result, {"mu_s": 0.3333})["mu_s"][0].index is None  # a number is what it is
     wrong: tuple[tuple[dict[str, Any], str], ...] = (
         ({"frequency": "1.2"}, r"frequency = 1.2: not among the values of the result; its neighbours are 0.948683 and"),
         ({"mu_s": "0.5"}, "mu_s = 0.5: outside the range of the result, 0.3 to 0.4"),
