@@ -232,15 +232,6 @@ def test_what_is_refused(options: dict[str, Any], message: str) -> None:
         sampling_of(ANGLES, **options)
 
 
-def test_draws_of_the_runs_are_checked() -> None:
-    """They are others than those of the statistics, and one of them may be none that physics allows."""
-    uncertain = {"mu_s": stats.norm(0.4, 0.4 / 3.3), "amplitude": FACTOR}
-    case: dict[str, Any] = {"theta": 5.0, "amplitude": 4.0, "frequency": 1.0, "samples": 1024, "seed": 9}
-    slipsweep.sample(**case, uncertain=uncertain)
-    with pytest.raises(InputError, match=r"uncertain.mu_s = norm.*of the draws are not"):
-        slipsweep.sample(**case, uncertain=uncertain, sensitivity=True)
-
-
 # -------------------------------------------------------------------- files, commands, charts
 
 SWEEP = """

@@ -93,14 +93,6 @@ def test_beside_numpy(over: Any) -> None:
     np.testing.assert_array_equal(found.valueless_flag_count.sel(flag=int(UPLIFT)), found.valueless_count)
 
 
-def test_what_counts_as_zero() -> None:
-    """Also what goes upslope, and what is no more than `zero`."""
-    given = suite_result([[-0.01, 0.004, 0.01, 0.2]], [[Validity.UPSLOPE, 0, 0, 0]], ("mu_s", "motion"))
-    assert float(suite_statistics(given).zero_probability[0]) == 0.25
-    found = suite_statistics(given, zero="1cm")
-    assert (float(found.zero_probability[0]), float(found.nonzero_median[0])) == (0.75, 0.2)
-
-
 def test_of_a_sweep() -> None:
     """A steep slope has no value, a flat one does not slide; what xarray computes is the same."""
     motions = [
@@ -135,16 +127,6 @@ def test_what_is_refused(given: dict[str, Any], message: str) -> None:
     result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
     with pytest.raises(InputError, match=message):
         suite_statistics(result, **given)
-
-
-def test_results_that_are_refused() -> None:
-    result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
-    with pytest.raises(InputError, match="result: dimensions mu_s: must have motion, as a result of a suite has"):
-        suite_statistics(result.isel(motion=0))
-    with pytest.raises(InputError, match="result: validity: missing"):
-        suite_statistics(result.drop_vars("validity"))
-    with pytest.raises(InputError, match="must be a Dataset"):
-        suite_statistics(result.permanent_displacement)
 
 
 def test_info_prints_the_numbers_of_a_suite(tmp_path: Path) -> None:

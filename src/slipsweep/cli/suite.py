@@ -1,6 +1,7 @@
-"""The statistics of a suite, as `slipsweep run` and `slipsweep info` print them."""
+"""What commands make of a suite: statistics that `run` and `info` print, the fragility that others write."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slipsweep.cli.common import echo
@@ -29,3 +30,13 @@ def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] = ()) -> Non
     lengths = displacements(typed, float(table.attrs["g"])) if typed else None
     for line in summary_lines(table, lengths, most):
         echo(line)
+
+
+def write_fragility(table: "xr.Dataset", path: Path, overwrite: bool, lengths: Sequence[float] | None = None) -> None:
+    """Write P(u > d) along the axis amplitude as an .xml file of OpenQuake, for displacements in m."""
+    from slipsweep.files import outputs
+    from slipsweep.studies.fragility import fragility, openquake_fragility
+
+    text = openquake_fragility(fragility(table, lengths))
+    with outputs.complete_or_absent(path, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
