@@ -499,6 +499,62 @@ def test_bad_friction_parameters_are_named() -> None:
         slipsweep.friction_parameters(5.0, -1.0, 3.0)
 
 
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"cycles": 15}, r"sweep\(\) has no argument 'cycles': give excitation=Sine\(cycles=15\)"),
+        ({"rule": "simpson"}, r"give solver=Step\(rule='simpson'\)"),
+        ({"g": 1.6}, r"give model=Mendez\(g=1.6\)"),
+    ],
+)
+def test_an_option_in_the_wrong_place_is_told_where_it_goes(option: dict[str, Any], message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        slipsweep.sweep(5, 0.4, 3.0, 2.0, **option)
+
+
+def test_a_friction_angle_is_mu_s() -> None:
+    angles = np.array([17.0, 22.0])
+    found = slipsweep.sweep(5, phi=angles, amplitude=[3.0, 5.0], frequency=2.0)
+    expected = slipsweep.sweep(5, np.tan(np.radians(angles)), amplitude=[3.0, 5.0], frequency=2.0)
+    assert found.permanent_displacement.dims == ("phi", "amplitude")
+    np.testing.assert_array_equal(found.phi, angles)
+    np.testing.assert_array_equal(found.mu_s, expected.mu_s)
+    np.testing.assert_array_equal(found.permanent_displacement, expected.permanent_displacement)
+    with pytest.raises(InputError, match="phi, mu_s: must not both be given"):
+        slipsweep.sweep(5, 0.4, phi=20, amplitude=3.0, frequency=2.0)
+
+
+def test_units_of_arrays_are_converted() -> None:
+    amplitude = xr.DataArray([0.3, 0.5], dims="amplitude", attrs={"units": "g"})
+    found = slipsweep.sweep(5, 0.4, amplitude, 2.0)
+    np.testing.assert_allclose(found.amplitude, [0.3 * 9.81, 0.5 * 9.81])
+    with pytest.raises(InputError, match="amplitude"):
+        slipsweep.sweep(5, 0.4, amplitude.assign_attrs(units="Hz"), 2.0)
+
+
+@pytest.mark.parametrize("planning", [True, False])
+def test_all_results_of_a_chunk_are_computed_once(planning: bool) -> None:
+    """With dask's array query planning on and off, which is chosen before dask.array is imported."""
+    code = f"""
+import dask
+dask.config.set({{"array.query-planning": {planning}}})
+import slipsweep
+from slipsweep.grid.plans import Plan
+solve, calls = Plan.solve, []
+Plan.solve = lambda self, *given: calls.append(1) or solve(self, *given)
+names = ["permanent_displacement", "peak_relative_velocity", "limiting_acceleration", "validity"]
+given = dict(theta=[1, 5, 8], mu_s=[0.3, 0.4], amplitude=[3.0, 5.0], frequency=[1.0, 2.0], variables=names)
+whole = slipsweep.sweep(**given)
+calls.clear()
+lazy = slipsweep.sweep(**given, chunks={{"theta": 1, "frequency": 1}})
+assert not calls
+assert lazy.compute(scheduler="threads").identical(whole)
+assert len(calls) == 6, calls
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_unknown_arguments_are_errors() -> None:
     with pytest.raises(TypeError, match="colour"):
         slipsweep.sweep(**{**GOOD, "colour": "red"})

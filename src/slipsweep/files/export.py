@@ -382,22 +382,26 @@ def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write
 @contextmanager
 def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
     import pandas as pd
+    from xlsxwriter.exceptions import XlsxWriterException
 
     options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True}
-    with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
-        below: dict[str, int] = {}
+    below: dict[str, int] = {}
+    try:
+        with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
 
-        def write(table: Table, frame: pd.DataFrame, number: int) -> None:
-            for name in frame.select_dtypes("float32"):  # its shortest digits: those of a double would be 0.10000000149
-                frame[name] = frame[name].astype(str).astype(float)
-            start = below.get(table.name, 0)
-            frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=number == 0, index=False)
-            below[table.name] = start + len(frame) + (number == 0)
+            def write(table: Table, frame: pd.DataFrame, number: int) -> None:
+                for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
+                    frame[name] = frame[name].astype(str).astype(float)
+                start = below.get(table.name, 0)
+                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=number == 0, index=False)
+                below[table.name] = start + len(frame) + (number == 0)
 
-        yield write
-        about = pd.DataFrame(_about(tables, source))
-        about.to_excel(book, sheet_name="about", header=False, index=False)
-        book.sheets["about"].set_column(0, 1, 40)
+            yield write
+            about = pd.DataFrame(_about(tables, source))
+            about.to_excel(book, sheet_name="about", header=False, index=False)
+            book.sheets["about"].set_column(0, 1, 40)
+    except XlsxWriterException as error:
+        raise OSError(str(error)) from error
 
 
 def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
