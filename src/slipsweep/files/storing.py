@@ -357,8 +357,8 @@ class _Chunks:
         raise NotImplementedError
 
     def written(self, chunks: Any) -> Any:
-        """A dask array, for those who write chunks where they are computed; None if that cannot be."""
-        raise NotImplementedError
+        """A dask array of chunks that are written where they are computed; None if this process writes them."""
+        return None
 
     def write(self, number: int, arrays: Arrays) -> None:
         """Write a chunk."""
@@ -374,9 +374,6 @@ class _NetcdfChunks(_Chunks):
 
     def finished(self) -> set[int]:
         return {int(one.stem) for one in self.folder.glob("*.chunk")}
-
-    def written(self, chunks: Any) -> Any:
-        return None
 
     def write(self, number: int, arrays: Arrays) -> None:
         temporary = self.folder / f"{number:06}.tmp"
@@ -492,17 +489,19 @@ class _ZarrChunks(_Chunks):
     def written(self, chunks: Any) -> Any:
         import dask.array as da
 
-        about = _Region(self.store, self.cut, {name: one.dims for name, one in self._results.items()}, self.job.dtypes)
-        return da.map_blocks(_write_region, chunks, about=about, dtype=bool, meta=np.empty((0,) * chunks.ndim, bool))
+        return da.map_blocks(
+            _write_region, chunks, about=self.region, dtype=bool, meta=np.empty((0,) * chunks.ndim, bool)
+        )
 
     @property
-    def _results(self) -> dict[str, Any]:
-        return {str(name): one for name, one in self.job.plan.template().data_vars.items()}
+    def region(self) -> "_Region":
+        """What those who write chunks need to know."""
+        template = self.job.plan.template()
+        return _Region(self.store, self.cut, {name: template[name].dims for name in self.job.dtypes}, self.job.dtypes)
 
     def write(self, number: int, arrays: Arrays) -> None:
-        about = _Region(self.store, self.cut, {name: one.dims for name, one in self._results.items()}, self.job.dtypes)
         with writing(self.path):
-            about.write(self.indices[number], arrays)
+            self.region.write(self.indices[number], arrays)
 
     def finish(self, command: str, overwrite: bool) -> Tally:
         import zarr
