@@ -81,14 +81,6 @@ def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
     np.testing.assert_array_equal(limits.limit_status >= LimitStatus.NOT_REACHED, ~found)
 
 
-def test_scaling_law() -> None:
-    """At twice the frequency a quarter of the displacement has the same limit, bit for bit (powers of two)."""
-    one = slipsweep.limit_amplitude([0.02, 0.4, 1.6], [0, 8], [0.4, 0.7], 1.0)
-    other = slipsweep.limit_amplitude([0.005, 0.1, 0.4], [0, 8], [0.4, 0.7], 2.0)
-    np.testing.assert_array_equal(one.limit_amplitude, other.limit_amplitude)
-    np.testing.assert_array_equal(one.limit_status, other.limit_status)
-
-
 def test_newmark_closed_form() -> None:
     """One pulse of Newmark's block, solved by Brent's method on the classical closed form."""
     yielded, omega, g = 1.5, 2 * math.pi * 2.0, 9.81
@@ -177,17 +169,6 @@ def test_beside_a_gap_every_displacement_is_reached() -> None:
         below = slipsweep.sweep(amplitude=np.nextafter(edge, 0), **one)
         assert int(below.validity) & slipsweep.Validity.KD_NOT_POSITIVE
         assert slipsweep.sweep(amplitude=edge * (1 + 1e-3), **one).permanent_displacement < 1e5
-
-
-@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
-def test_before_a_gap_every_displacement_is_reached(recoupling: str) -> None:
-    """The same where Kd falls to 0 as the amplitude grows."""
-    given: dict[str, Any] = {"theta": 6, "mu_s": 0.6, "frequency": 1.0, "yield_acceleration": 1.5, "decay_rate": 9.0}
-    given |= {**choices(rise="literal", recoupling=recoupling), "excitation": slipsweep.Cosine(6)}
-    limits = slipsweep.limit_amplitude([1.0, 1e3, 1e6, 1e9], **given)
-    np.testing.assert_allclose(limits.permanent_displacement, limits.displacement, rtol=1e-4)
-    beyond = slipsweep.sweep(amplitude=limits.limit_amplitude[-1].item() * (1 + 1e-7), **given)
-    assert int(beyond.validity) & slipsweep.Validity.KD_NOT_POSITIVE
 
 
 def test_narrow_peaks_where_blocks_do_not_recouple() -> None:

@@ -1,7 +1,6 @@
 """Recorded motions in sweep files: what a run writes, that it repeats itself, chunks, and what is refused."""
 
 import hashlib
-import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -178,13 +177,3 @@ def test_other_commands_on_the_result(folder: Path) -> None:
 
 
 # ---------------------------------------------------------------------------------- the sample
-
-
-def test_the_sample_is_what_its_script_makes() -> None:
-    path = SWEEPS / "data" / "synthetic.py"
-    module_spec = importlib.util.spec_from_file_location("synthetic", path)
-    assert module_spec is not None
-    assert module_spec.loader is not None
-    module = importlib.util.module_from_spec(module_spec)
-    module_spec.loader.exec_module(module)
-    assert path.with_suffix(".csv").read_text(encoding="utf-8") == module.text()

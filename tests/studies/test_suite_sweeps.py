@@ -1,7 +1,5 @@
 """Suites in sweep files: what a run writes, chunks, kills, workers, that it repeats itself, and what is refused."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ from slipsweep.files.jobs import limit_job, sweep_job
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.opening import read_result
 from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
-from slipsweep.motion.intensity import intensity_measures
 from tests.studies.test_record_sweeps import assert_same_data
 from tests.support.commands import command
 
@@ -172,31 +169,3 @@ def test_what_sweep_files_refuse(folder: Path, before: str, after: str, message:
     (folder / "a.toml").write_text(SWEEP.replace(before, after))
     with pytest.raises(InputError, match=message):
         spec.load(folder / "a.toml").plan()
-
-
-def test_the_sample_is_what_its_script_makes() -> None:
-    path = SWEEPS / "data" / "suite.py"
-    module_spec = importlib.util.spec_from_file_location("suite", path)
-    assert module_spec is not None
-    assert module_spec.loader is not None
-    module = importlib.util.module_from_spec(module_spec)
-    sys.modules["suite"] = module  # its dataclass looks there
-    try:
-        module_spec.loader.exec_module(module)
-    finally:
-        del sys.modules["suite"]
-    texts = module.texts()
-    assert {one.name for one in (SWEEPS / "data" / "suite").iterdir()} == set(texts)
-    for name, text in texts.items():
-        assert (SWEEPS / "data" / "suite" / name).read_text(encoding="utf-8") == text
-
-
-def test_the_sample_ends_at_rest_and_comes_in_pairs() -> None:
-    suite = read_suite(SWEEPS / "data" / "suite", pairs=("_H1", "_H2"))
-    assert suite.labels == ("rock-far", "rock-near", "soft-far", "stiff-pulse")
-    for record in suite.components:
-        velocity = float(np.trapezoid(record.acceleration, record.times))
-        assert abs(velocity) < 2e-2 * intensity_measures(record)["pgv"]
-    moved = sweep(5, 0.3, excitation=suite, azimuth=[0, 45, 90], amplitude=5.0).permanent_displacement
-    assert float(moved.max()) > 0.0
-    assert len({*moved.values.ravel()}) == moved.size

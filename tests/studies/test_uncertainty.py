@@ -57,22 +57,6 @@ def test_exceedance_is_the_distribution_at_the_limit() -> None:
     np.testing.assert_allclose(found.exceedance_probability, shaking.sf(limits.limit_amplitude), atol=2e-4)
 
 
-@pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random"])
-def test_error_falls_as_the_method_promises(method: str) -> None:
-    """RMS error of P(u > 10 cm) over seeds, under two uncertain inputs: Sobol's beats plain sampling by far."""
-    case: dict[str, Any] = {"theta": 5, "mu_s": 0.4, "amplitude": 3.0, "frequency": 1, "method": method}
-    case |= {"uncertain": {"amplitude": FACTOR, "mu_s": {"distribution": "norm", "scale": 0.05, "kind": "offset"}}}
-    truth = slipsweep.sample(**{**case, "method": "sobol"}, samples=2**20).exceedance_probability.sel(threshold=0.1)
-    errors = [
-        slipsweep.sample(**case, samples=1024, seed=seed).exceedance_probability.sel(threshold=0.1) - truth
-        for seed in range(1, 33)
-    ]
-    plain = float(np.sqrt(truth * (1 - truth) / 1024))
-    ratio = float(np.sqrt(np.mean(np.square(errors)))) / plain
-    low, high = {"sobol": (0.0, 0.25), "latin_hypercube": (0.0, 0.75), "random": (0.7, 1.35)}[method]
-    assert low < ratio < high
-
-
 # -------------------------------------------------------------- statistics of plain sweeps
 
 
@@ -263,14 +247,6 @@ def test_statically_unstable_samples_exceed_every_threshold() -> None:
     assert nobody.displacement_quantile.isnull().all()
 
 
-def test_chunks_of_grid_points_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    uncertain = {"amplitude": FACTOR, "decay_rate": {**FACTOR, "s": 0.1}}
-    whole = slipsweep.sample(**GRID, uncertain=uncertain, samples=128)
-    monkeypatch.setattr("slipsweep.studies.uncertainty._CELLS", 300)
-    parts = slipsweep.sample(**GRID, uncertain=uncertain, samples=128)
-    xr.testing.assert_identical(whole, parts)
-
-
 # ------------------------------------------------------------------------- seeds and records
 
 
@@ -328,13 +304,6 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
     uncertain = {"theta": {"distribution": "uniform", "scale": 2, "kind": "offset"}, "amplitude": FACTOR}
     with pytest.raises((InputError, TypeError), match=message):
         slipsweep.sample(**{**GRID, "uncertain": uncertain, **options})
-
-
-def test_correlations_that_contradict_each_other() -> None:
-    uncertain = {"theta": stats.uniform(0, 5), "amplitude": FACTOR, "mu_s": FACTOR}
-    pairs = [("theta", "amplitude", 0.9), ("amplitude", "mu_s", 0.9), ("theta", "mu_s", -0.9)]
-    with pytest.raises(InputError, match="no such correlations exist together"):
-        slipsweep.sample(mu_s=0.4, amplitude=3, frequency=1, uncertain=uncertain, correlation=pairs)
 
 
 # --------------------------------------------------------------- sweep files, commands, charts

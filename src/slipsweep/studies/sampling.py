@@ -262,16 +262,9 @@ def check_quantiles(key: str, given: Any) -> Floats:
 
 def check_thresholds(key: str, given: Any, g: float) -> Floats:
     """Displacements, m or with a unit, one at least, as an increasing coordinate."""
-    given = computed(given)
-    strings = isinstance(given, np.ndarray) and given.ndim and given.dtype.kind in "UO"
-    if isinstance(given, (list, tuple)) or strings:
-        given = check_list(key, given, "displacements")
-    if isinstance(given, (str, list)):
-        given = [
-            quantity(key, one, "displacement_amplitude", g) if isinstance(one, str) else one
-            for one in ([given] if isinstance(given, str) else given)
-        ]
-    return _increasing(key, given, "threshold")
+    entries = np.atleast_1d(np.asarray(computed(given), object)).tolist()
+    values = [quantity(key, one, "displacement_amplitude", g) if isinstance(one, str) else one for one in entries]
+    return _increasing(key, values, "threshold")
 
 
 def _increasing(key: str, given: Any, bound: str) -> Floats:

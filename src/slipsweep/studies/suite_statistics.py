@@ -231,9 +231,9 @@ def suite_summary(result: xr.Dataset, displacement: Any = None) -> xr.Dataset:
     >>> result = slipsweep.sweep(5, 0.3, amplitude=[4.0, 6.0], excitation=suite)
     >>> print(*summary_lines(result, "50mm"), sep="\\n")
     permanent displacement (mm) over 4 motion:
-     PGA (g)  16 %  median  84 %  zero P(u > 50 mm)
-      0.4077  2.11    20.4  70.2  0.0%        25.0%
-      0.6116  37.1    77.8   235  0.0%        75.0%
+    PGA (g) 16 % median     84 % zero P(u > 50 mm)
+     0.4077  8.7   18.8     71.5 0.0%        25.0%
+     0.6116 89.3    188 1.34e+03 0.0%        75.0%
     """
     found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
     names = ["displacement_quantile", "zero_probability", "valueless_share"]
