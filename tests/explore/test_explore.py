@@ -18,7 +18,7 @@ import xarray as xr
 
 from slipsweep import InputError, Sine, SlidingMode, Validity, read_suite, simulate, suite_statistics, sweep
 from slipsweep.explore.page import write_page
-from slipsweep.model.variables import FLAG_KIND_TEXT, VALIDITY_TEXT, FlagKind, flags_of
+from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, VALIDITY_TEXT, VALUELESS, FlagKind, flags_of
 from tests.support.commands import command
 
 pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
@@ -152,7 +152,10 @@ def test_histories_are_those_of_simulate(written: Path) -> None:
 def test_large_result_is_thinned_to_the_size_and_says_how(tmp_path: Path) -> None:
     # A = ω²d: no frequency gives another
     data = sweep(
-        [0, 5, 20], [0.3, 0.5], displacement_amplitude=np.linspace(0.1, 0.001, 460), frequency=np.geomspace(0.2, 10, 180)
+        [0, 5, 20],
+        [0.3, 0.5],
+        displacement_amplitude=np.linspace(0.1, 0.001, 460),
+        frequency=np.geomspace(0.2, 10, 180),
     )
     data.to_netcdf(tmp_path / "own.nc")
     excerpt = write_page(tmp_path / "own.nc", tmp_path / "page.html", size=2_500_000)
@@ -399,7 +402,8 @@ def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
     with xr.open_dataset(result, mask_and_scale=False) as data:
         seen = set()
         for theta, mu_s, x, y in (
-            (0, 0, 0.1, 0.1), (1, 0, 0.92, 0.6), (1, 0, 0.2, 0.97), (1, 1, 0.33, 0.05), (2, 0, 0.5, 0.5), (2, 1, 0.7, 0.4),
+            (0, 0, 0.1, 0.1), (1, 0, 0.92, 0.6), (1, 0, 0.5, 0.75), (1, 0, 0.2, 0.97), (1, 1, 0.33, 0.05),
+            (2, 0, 0.5, 0.5),
         ):  # fmt: skip
             move(opened, theta, mu_s)
             point(opened, x, y)

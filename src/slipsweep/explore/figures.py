@@ -46,7 +46,7 @@ def decades(excerpt: Excerpt) -> tuple[int, int]:
 
 
 def figures(excerpt: Excerpt) -> dict[str, Any]:
-    """The map, and the panels of a history, as Bokeh's JSON: `page.js` has Bokeh draw each in an element of its name."""
+    """The map, and the panels of a history, as Bokeh's JSON, which `page.js` has Bokeh draw."""
     from bokeh.embed import json_item
 
     return {"map": json_item(_map(excerpt)), "panels": json_item(_panels())}
@@ -112,7 +112,7 @@ def _colours(scale: str, span: tuple[int, int]) -> tuple[Any, Any]:
     from bokeh.models.annotations import ColorBar
     from matplotlib.colors import to_hex
 
-    from slipsweep.charts.maps import COLOURS
+    from slipsweep.charts.style import COLOURS
 
     low, high = span
     # three bands a decade: their edges are contours of displacement
