@@ -72,9 +72,9 @@ def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
         if scale_of(name) == "displacement":
             values, law = _by_law(excerpt, values)
         arrays[name] = packed(values, dims=variable.dims, law=law)
-    for name, coord in excerpt.table.coords.items():
-        if name not in coord.dims:
-            arrays[f"coordinate_{name}"] = packed(coord.values.astype("<f8"), dims=coord.dims)
+    for key, coord in excerpt.table.coords.items():
+        if key not in coord.dims:
+            arrays[f"coordinate_{key}"] = packed(coord.values.astype("<f8"), dims=coord.dims)
     return arrays
 
 
@@ -206,7 +206,7 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
             | {"labels": excerpt.labels.get(dim, [])}
             for dim in excerpt.sizes
         ],
-        "coords": {key: _dimension(key) for key, coord in table.coords.items() if key not in coord.dims},
+        "coords": {key: _dimension(str(key)) for key, coord in table.coords.items() if key not in coord.dims},
         "map": {"y": excerpt.map_dims[0], "x": excerpt.map_dims[1]},
         "layers": [
             {
