@@ -88,12 +88,11 @@ class Sampling:
     @property
     def independent(self) -> tuple[tuple[str, ...], ...]:
         """The parameters, those that are correlated with one another together, in the order of `distributions`."""
-        groups = [{name} for name in self.distributions]
-        for first, second, _ in self.correlation:
-            tied = [group for group in groups if {first, second} & group]
-            groups = [group for group in groups if group not in tied] + [set().union(*tied)]
-        ordered = [tuple(name for name in self.distributions if name in group) for group in groups]
-        return tuple(sorted(ordered, key=lambda group: [*self.distributions].index(group[0])))
+        from scipy.sparse.csgraph import connected_components
+
+        number, group = connected_components(self._matrix(), directed=False)
+        names = [*self.distributions]
+        return tuple(tuple(name for name, own in zip(names, group, strict=True) if own == k) for k in range(number))
 
     @property
     def sensitivity_runs(self) -> int:
