@@ -17,15 +17,15 @@ def main() -> None:
     """Do the rounds, and write the table."""
     given = machine.arguments(__doc__)
     rounds = 1 if given.tiny else ROUNDS
-    rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         whole = prepared(folder)
-        for fault, tried in FAULTS.items():
-            for number in range(rounds):
+        for number in range(rounds):
+            for fault, tried in FAULTS.items():
                 tried(folder, OUTPUTS[number % 2], whole, random.Random(number))
-            rows.append([fault, " ".join((tried.__doc__ or "").split()), rounds, rounds])
-            print(f"{fault}: {rounds}", flush=True)
+                print(number + 1, fault, flush=True)
+            done = number + 1
+            rows = [[fault, " ".join((tried.__doc__ or "").split()), done, done] for fault, tried in FAULTS.items()]
             text = f"{machine.measured_on(('netCDF4', 'zarr', 'distributed'))}\n\n"
             text += machine.table(["fault", "what it is", "tried", "survived"], rows)
             (given.folder / "faults.md").write_text(text)

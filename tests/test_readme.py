@@ -149,7 +149,7 @@ def test_blocks_about_statistics_of_suites_do_what_they_say(tmp_path: Path) -> N
         for name in ("Statistics", "What else takes a suite")
     )
     found = [block for block in blocks("docs/suites.md") if begin < block.line < end]
-    assert [block.language for block in found] == ["python", "text", "csv", "console"]
+    assert [block.language for block in found] == ["console", "python", "text", "csv", "console"]
     run_blocks("docs/suites.md", found, tmp_path)
 
 

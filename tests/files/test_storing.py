@@ -14,7 +14,6 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files import spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
-from slipsweep.grid.tally import tally_of
 
 GRID = """
 [axes.theta]
@@ -102,7 +101,7 @@ def test_every_study_runs_every_way(folder: Path, study: str, output: str, monke
     xr.testing.assert_identical(without_time(other), without_time(one))
     assert not list(folder.glob("*.part"))
     assert (parts.tally.modes, parts.tally.flags) == (whole.tally.modes, whole.tally.flags)
-    again = tally_of(one, job.plan)
+    again = storing.tally_of(one, job.plan)
     assert (again.modes, again.flags, again.cells) == (whole.tally.modes, whole.tally.flags, job.plan.cells)
     # a result repeats its run, and has the values of Python's own functions
     if study != "limits" and output == "b.zarr":
@@ -125,12 +124,16 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
         seen.append(number)
         write(self, number, arrays)
 
+    def noting(self: Any, number: int, arrays: Any) -> None:
+        seen.append(number)
+        write(self, number, arrays)
+
     monkeypatch.setattr(kind, "write", failing)
     with pytest.raises(OSError, match="No space") as failure:
         stored(job_of(folder, "sweep"), path)
     assert failure.value.__notes__ == [f"3 of 24 chunks are kept in {path}.part: --resume goes on"]
     assert not path.exists()
-    monkeypatch.setattr(kind, "write", lambda self, number, arrays: (seen.append(number), write(self, number, arrays)))
+    monkeypatch.setattr(kind, "write", noting)
 
     with pytest.raises(InputError, match=r"left chunks in .*part; give --resume to go on with them, or --overwrite"):
         stored(job_of(folder, "sweep"), path)
@@ -140,7 +143,7 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
     with pytest.raises(InputError, match="another version of slipsweep"):
         stored(job_of(folder, "sweep"), path, resume=True)
     monkeypatch.undo()
-    monkeypatch.setattr(kind, "write", lambda self, number, arrays: (seen.append(number), write(self, number, arrays)))
+    monkeypatch.setattr(kind, "write", noting)
 
     report = stored(job_of(folder, "sweep"), path, resume=True)  # with the chunks it was begun with
     assert sorted(seen) == list(range(24))
@@ -249,7 +252,7 @@ def test_results_open_as_sweep_returns_them(folder: Path) -> None:
     opened = slipsweep.open_result(folder / "a.nc")
     assert all(one.chunks is not None for one in opened.data_vars.values())
     arguments = {"theta": [0, 5, 10], "mu_s": [0.3, 0.5], "amplitude": opened.amplitude.values}
-    expected = slipsweep.sweep(**arguments, frequency=[0.5, 1, 2], variables=list(opened.data_vars))
+    expected = slipsweep.sweep(**arguments, frequency=[0.5, 1, 2], variables=list(map(str, opened.data_vars)))
     xr.testing.assert_equal(opened, expected)
     assert opened.sliding_mode.dtype == expected.sliding_mode.dtype == np.int8
     for name in opened.data_vars:

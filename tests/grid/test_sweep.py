@@ -3,8 +3,6 @@
 import math
 import subprocess
 import sys
-import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,10 +21,8 @@ from slipsweep.model.variables import (
     PARAMETERS,
     RESULT_DTYPES,
     RESULTS,
-    VALUELESS,
     Validity,
 )
-from slipsweep.motion.amplitude import peak_acceleration
 from tests.support.cases import choices
 
 AXES: dict[str, Any] = {
@@ -76,18 +72,6 @@ for name, *numbers in ("sweep", 1.8), ("simulate", 1.8), ("friction_parameters",
     assert all(callable(getattr(slipsweep, other)) for other in sys.argv[1:]), name
 print("well")
 """
-
-
-def test_public_functions_are_functions_in_every_order() -> None:
-    done = subprocess.run([sys.executable, "-c", IN_EVERY_ORDER, *PUBLIC], capture_output=True, text=True, check=False)
-    assert done.stdout == "well\n", done.stderr
-
-
-def test_no_module_bears_the_name_of_a_function() -> None:
-    import pkgutil
-
-    assert not {module.name for module in pkgutil.iter_modules(slipsweep.__path__)} & {*slipsweep.__all__}
-    assert {*PUBLIC} <= {*dir(slipsweep)}
 
 
 # ------------------------------------------------------------------- dimensions and shapes
@@ -204,26 +188,6 @@ def test_the_amplitude_is_a_coordinate_where_it_costs_nothing(
     np.testing.assert_allclose(asked.amplitude, expected.transpose(*asked.amplitude.dims))
 
 
-def test_slabs_of_amplitudes_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
-    given: dict[str, Any] = {
-        "theta": [0.0, 5.0], "mu_s": 0.38, "displacement_amplitude": np.linspace(0.01, 0.4, 7),
-        "frequency": np.linspace(0.3, 3.0, 5), "structure_frequency": [1.0, 4.0],
-    }  # fmt: skip
-    whole = slipsweep.sweep(**given)
-    shapes = []
-
-    def watched(d: Any, f: Any) -> Any:
-        shapes.append(np.broadcast_shapes(d.shape, f.shape))
-        return peak_acceleration(d, f)
-
-    monkeypatch.setattr(engine, "peak_acceleration", watched)
-    monkeypatch.setattr(engine, "_AMPLITUDES", 12)
-    counts: list[int] = []
-    xr.testing.assert_identical(slipsweep.sweep(**given, progress=counts.append), whole)
-    assert max(map(math.prod, shapes)) <= 12
-    assert sum(counts) == whole.validity.size
-
-
 def test_a_grid_of_displacement_amplitudes_is_lazy() -> None:
     """4e10 amplitudes would take 320 GB."""
     given: dict[str, Any] = {
@@ -280,30 +244,6 @@ def test_what_is_given_is_a_coordinate_and_no_result() -> None:
     result = slipsweep.sweep(**AXES, delta_mu=0.1, variables=["delta_mu", "decay_rate"])
     assert tuple(result.data_vars) == ("decay_rate",)
     assert result.delta_mu.item() == 0.1
-
-
-@pytest.mark.parametrize("solver", ["step", "cycle"])
-def test_the_frequency_axis_costs_no_kernel_calls(solver: str, cells_solved: list[int]) -> None:
-    slipsweep.sweep(**AXES, solver=solver)
-    assert sum(cells_solved) == 3 * 2 * 4
-    plan = plans.plan_sweep(Inputs(**AXES))
-    inputs = engine.cell_inputs(plan.tasks[0].inputs, 4, 9.81)
-    assert engine.cells_to_solve((3, 2, 4, 5), inputs, plan.tasks[0].inputs["frequency"]) == 3 * 2 * 4
-
-
-def test_cells_to_solve_of_other_grids(cells_solved: list[int]) -> None:
-    zipped = xr.DataArray([1.0, 2.0], dims="case")
-    for arguments, cells in [
-        # A = omega^2 d: every frequency is another motion
-        ({"theta": [0.0, 5.0], "displacement_amplitude": 0.05, "frequency": AXES["frequency"]}, 10),
-        # zipped with another parameter, the frequency is no dimension of its own
-        ({"theta": zipped, "amplitude": [2.0, 4.0, 6.0], "frequency": zipped}, 6),
-        # the longer of two dimensions
-        ({"theta": 0.0, "amplitude": 3.0, "frequency": xr.DataArray(np.ones((2, 7)), dims=("x", "y"))}, 2),
-    ]:
-        cells_solved.clear()
-        slipsweep.sweep(mu_s=0.38, **arguments)
-        assert sum(cells_solved) == cells
 
 
 def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
@@ -499,6 +439,62 @@ def test_bad_friction_parameters_are_named() -> None:
         slipsweep.friction_parameters(5.0, -1.0, 3.0)
 
 
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"cycles": 15}, r"sweep\(\) has no argument 'cycles': give excitation=Sine\(cycles=15\)"),
+        ({"rule": "simpson"}, r"give solver=Step\(rule='simpson'\)"),
+        ({"g": 1.6}, r"give model=Mendez\(g=1.6\)"),
+    ],
+)
+def test_an_option_in_the_wrong_place_is_told_where_it_goes(option: dict[str, Any], message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        slipsweep.sweep(5, 0.4, 3.0, 2.0, **option)
+
+
+def test_a_friction_angle_is_mu_s() -> None:
+    angles = np.array([17.0, 22.0])
+    found = slipsweep.sweep(5, phi=angles, amplitude=[3.0, 5.0], frequency=2.0)
+    expected = slipsweep.sweep(5, np.tan(np.radians(angles)), amplitude=[3.0, 5.0], frequency=2.0)
+    assert found.permanent_displacement.dims == ("phi", "amplitude")
+    np.testing.assert_array_equal(found.phi, angles)
+    np.testing.assert_array_equal(found.mu_s, expected.mu_s)
+    np.testing.assert_array_equal(found.permanent_displacement, expected.permanent_displacement)
+    with pytest.raises(InputError, match="phi, mu_s: must not both be given"):
+        slipsweep.sweep(5, 0.4, phi=20, amplitude=3.0, frequency=2.0)
+
+
+def test_units_of_arrays_are_converted() -> None:
+    amplitude = xr.DataArray([0.3, 0.5], dims="amplitude", attrs={"units": "g"})
+    found = slipsweep.sweep(5, 0.4, amplitude, 2.0)
+    np.testing.assert_allclose(found.amplitude, [0.3 * 9.81, 0.5 * 9.81])
+    with pytest.raises(InputError, match="amplitude"):
+        slipsweep.sweep(5, 0.4, amplitude.assign_attrs(units="Hz"), 2.0)
+
+
+@pytest.mark.parametrize("planning", [True, False])
+def test_all_results_of_a_chunk_are_computed_once(planning: bool) -> None:
+    """With dask's array query planning on and off, which is chosen before dask.array is imported."""
+    code = f"""
+import dask
+dask.config.set({{"array.query-planning": {planning}}})
+import slipsweep
+from slipsweep.grid.plans import Plan
+solve, calls = Plan.solve, []
+Plan.solve = lambda self, *given: calls.append(1) or solve(self, *given)
+names = ["permanent_displacement", "peak_relative_velocity", "limiting_acceleration", "validity"]
+given = dict(theta=[1, 5, 8], mu_s=[0.3, 0.4], amplitude=[3.0, 5.0], frequency=[1.0, 2.0], variables=names)
+whole = slipsweep.sweep(**given)
+calls.clear()
+lazy = slipsweep.sweep(**given, chunks={{"theta": 1, "frequency": 1}})
+assert not calls
+assert lazy.compute(scheduler="threads").identical(whole)
+assert len(calls) == 6, calls
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_unknown_arguments_are_errors() -> None:
     with pytest.raises(TypeError, match="colour"):
         slipsweep.sweep(**{**GOOD, "colour": "red"})
@@ -554,100 +550,3 @@ def test_peak_memory_is_that_of_the_result(call: str) -> None:
     done = subprocess.run([sys.executable, "-c", MEMORY.format(call=call)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 1.2
-
-
-@pytest.mark.parametrize(
-    "waveform", [slipsweep.Sine(10), slipsweep.Cosine(10), slipsweep.Triangle(10), slipsweep.Square(10)]
-)
-@pytest.mark.parametrize(
-    ("chart", "given"),
-    [
-        ("design_chart", {}),
-        ("design_chart", {"decay_rate": 2.7}),
-        ("design_chart", {"decay_rate": 1.0}),
-        ("design_chart", {"yield_acceleration": 0.59}),
-        ("mode_map", {}),
-    ],
-)
-def test_a_chart_takes_one_kernel(
-    chart: str, given: dict[str, float], waveform: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Lanes solve all its cells: what solves those they leave takes as long to compile as they do."""
-    monkeypatch.setattr(engine, "REMAINING_KERNEL", None)
-    monkeypatch.setattr(engine, "WAVE_KERNEL", None)
-    with (Path(__file__).parents[2] / "sweeps" / f"{chart}.toml").open("rb") as file:
-        axes = tomllib.load(file)["axes"]
-    grid = {name: np.linspace(axes[name]["start"], axes[name]["stop"], axes[name]["num"]) for name in ("theta", "mu_s")}
-    amplitude = 9.81 * np.linspace(axes["amplitude"]["start"], axes["amplitude"]["stop"], axes["amplitude"]["num"])
-    inputs = [values.ravel() for values in np.meshgrid(*grid.values(), amplitude)]
-    arrays = dict(zip((*grid, "amplitude"), inputs, strict=True)) | {"frequency": np.ones(1)}
-    arrays |= {name: np.full(1, value) for name, value in given.items()}
-    problem = engine.Problem(slipsweep.Mendez(), waveform, slipsweep.Cycle())
-    found = engine.solve(engine.Request(problem, inputs[0].shape, arrays, engine.MOTION_RESULTS))
-    has_value = (found["validity"] & VALUELESS) == 0
-    np.testing.assert_array_equal(np.isfinite(found["permanent_displacement"]), has_value)
-    assert has_value.mean() > 0.5
-
-
-class Noted:
-    """A kernel that notes what is said of it, and does nothing."""
-
-    def __init__(self, name: str, said: dict[str, set[str]]) -> None:
-        self.name, self.said = name, said
-
-    def expect(self, perhaps: bool = False) -> None:
-        self.said["perhaps" if perhaps else "expected"].add(self.name)
-
-    def __call__(self, *arguments: Any) -> int:
-        self.said["called"].add(self.name)
-        return 1  # some cells remain, where a kernel may leave some
-
-
-@pytest.mark.parametrize("solver", [slipsweep.Cycle(), slipsweep.Step()], ids=["cycle", "step"])
-@pytest.mark.parametrize("model", [slipsweep.Mendez(), slipsweep.Newmark()], ids=["mendez", "newmark"])
-@pytest.mark.parametrize(
-    "motion",
-    [
-        slipsweep.Sine(),
-        slipsweep.Cosine(),
-        slipsweep.Cosine(ramp_in=1),
-        slipsweep.Triangle(),
-        slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1),
-    ],
-    ids=["sine", "cosine", "ramped cosine", "triangle", "record"],
-)
-def test_the_kernels_that_are_expected_are_called(
-    motion: Any, model: Any, solver: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Those of which it is certain, and with them those of which it is not, where cells remain."""
-    said: dict[str, set[str]] = {"expected": set(), "perhaps": set(), "called": set()}
-    for name in [name for name in vars(engine) if name.endswith("_KERNEL")]:
-        monkeypatch.setattr(engine, name, Noted(name, said))
-    arrays = {"theta": np.zeros(1), "mu_s": np.ones(1)}
-    recorded = {"scale": np.ones(1), "time_scale": np.ones(1), "polarity": np.ones(1)}
-    arrays |= recorded if isinstance(motion, slipsweep.Record) else {"amplitude": np.ones(1), "frequency": np.ones(1)}
-    problem = engine.Problem(model, motion, solver)
-    engine.expect_kernels(engine.solve, problem)
-    engine.solve(engine.Request(problem, (1,), arrays, ("permanent_displacement",)))
-    assert said["called"] == said["expected"] | said["perhaps"]
-    assert len(said["expected"]) == 1
-
-
-def test_a_cosine_leaves_few_cells_to_the_kernel_of_all_waves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Blocks that stick at Üy when at rest and come there in motion, 1 % of a design chart."""
-    left: list[int] = []
-
-    def counting(grid: Any, stretches: Any, *rest: Any) -> None:
-        left.append(int((stretches[:, 1] - stretches[:, 0]).sum()))
-        wave_kernel(grid, stretches, *rest)
-
-    wave_kernel = engine.WAVE_KERNEL
-    monkeypatch.setattr(engine, "WAVE_KERNEL", counting)
-    axes: dict[str, Any] = {
-        "theta": np.linspace(0, 20, 21),
-        "mu_s": np.linspace(0.2, 0.9, 15),
-        "amplitude": 9.81 * np.linspace(0.05, 1.4, 136),
-    }
-    monkeypatch.setattr(engine.WAVE_KERNEL, "expect", wave_kernel.expect, raising=False)
-    found = slipsweep.sweep(**axes, frequency=1.0, excitation="cosine")
-    assert sum(left) < 0.01 * found.permanent_displacement.size

@@ -100,6 +100,7 @@ def test_baseline() -> None:
         ("a.csv", "no numbers\n", {"units": "g"}, "no line of a time and an acceleration"),
         ("a.csv", "0,1\n1,2\n", {"units": "g", "channel": 1}, "channel = 1: only COSMOS files hold several"),
         ("a.txt", "1\n2\n", {"units": "g"}, "interval: must be given"),
+        ("a.txt", "0,1\n0.1,2\n", {"units": "g", "interval": 0.1}, "the first of two columns is that of times"),
         ("a.txt", "dt = 0.01\n1\n2\n", {"units": "g", "interval": 0.02}, "the file itself says 0.01"),
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n", {}, "2 accelerations, where its header says 3"),
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n oops\n", {}, "line 6: ' oops'"),

@@ -134,24 +134,12 @@ def test_the_plane_moves_as_recorded(shaking: Record) -> None:
     np.testing.assert_array_equal(own.time.values[: late.times.size], late.times)
 
 
-def test_a_slide_after_the_record_has_a_bounded_number_of_points(shaking: Record) -> None:
-    half = Record(shaking.times[:900], shaking.acceleration[:900])
-    found = simulate(0.0, 0.4, excitation=half, model="newmark", yield_acceleration=1e-6)
-    assert found.time.size == 900 + 20_000
-    assert found.relative_velocity.values[-1] == 0.0
-    assert found.relative_velocity.values[-2] > 0.0
-    assert found.relative_displacement.values[-1] == pytest.approx(found.permanent_displacement.item(), rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
         ({"points_per_cycle": 16}, "points_per_cycle: not allowed with a Record"),
-        ({"scale": [1.0, 2.0]}, "scale: simulate takes one case"),
         ({"polarity": "both"}, "polarity: simulate takes one case"),
-        ({"polarity": 0}, "polarity = 0: must be 1, -1"),
         ({"frequency": 2.0}, "frequency: not allowed with a Record"),
-        ({"amplitude": 1.0, "scale": 1.0}, "amplitude, scale: must not both be given"),
         ({"times": [2.0, 1.0]}, "times: must be one row of finite, increasing numbers"),
     ],
 )
@@ -186,26 +174,3 @@ def test_on_the_command_line(tmp_path: Path) -> None:
     told = command(tmp_path, "info", "h.nc")
     assert (told.returncode, told.stderr) == (0, "")
     assert "scale = 2" in (tmp_path / "h.svg").read_text() or (tmp_path / "h.svg").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--units", "g"), "--units: only with --record"),
-        (("--record", "no.csv"), "no.csv: cannot be read"),
-        (("--record", "m.csv"), "m.csv: units: must be given"),
-        (("--record", "m.csv", "--units", "g", "--waveform", "sine"), "--waveform sine: not allowed with --record"),
-        (("--record", "m.csv", "--units", "g", "--cycles", "4"), "--waveform sine: not allowed with --record"),
-        (("--record", "m.csv", "--units", "g", "--frequency", "4"), "frequency: not allowed with a Record"),
-        (("--record", "m.csv", "--units", "g", "--points", "40"), "points_per_cycle: not allowed with a Record"),
-        (("--amplitude", "3"), "frequency: must be given"),
-        (("--amplitude", "3", "--frequency", "1", "--time-scale", "2"), "time_scale: not allowed with a waveform"),
-    ],
-)
-def test_refusals_on_the_command_line(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
-    (tmp_path / "m.csv").write_text("0,0\n0.1,0.5\n0.2,-0.5\n0.3,0\n")
-    done = command(tmp_path, *CASE, *arguments, "-o", "h.nc")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not (tmp_path / "h.nc").exists()

@@ -68,15 +68,6 @@ def test_limits_are_exact_and_the_first(shaking: Record) -> None:
     assert {LimitStatus.REACHED, LimitStatus.AT_MODE_JUMP} <= seen
 
 
-def test_peaks_before_a_pulse_changes_its_mode_are_seen(shaking: Record) -> None:
-    """Few steps of the scan are enough: both sides of every change are among its points."""
-    coarse, fine = (
-        limit_amplitude(np.geomspace(1e-3, 1.0, 7), [0.0, 5.0], [0.3, 0.5], excitation=shaking, amplitude_steps=steps)
-        for steps in (64, 4096)
-    )
-    xr.testing.assert_allclose(coarse.limit_amplitude, fine.limit_amplitude, rtol=1e-12)
-
-
 def test_time_and_sign_only_scale(shaking: Record) -> None:
     """u ∝ time_scale²: a displacement at twice the time is four of them; a record turned is the other sign."""
     block: dict[str, Any] = {"theta": [0.0, 8.0], "mu_s": [0.35, 0.6]}

@@ -104,11 +104,8 @@ def test_statistics_are_those_of_the_draws(shaking: Record, name: str) -> None:
     ("given", "uncertain", "message"),
     [
         ({}, {"frequency": NORMAL}, "uncertain.frequency: not allowed with a Record"),
-        ({"frequency": 1.0}, {"mu_s": NORMAL}, "frequency: not allowed with a Record"),
         ({"amplitude": 2.0}, {"scale": NORMAL}, "amplitude, scale: must not both be given"),
-        ({}, {"scale": NORMAL, "amplitude": NORMAL}, "scale: not allowed beside amplitude"),
         ({}, {"scale": ABOUT_ONE}, 'kind = "factor" needs scale given'),
-        ({}, {"decay_rate": ABOUT_ONE}, "under a record each pulse has an estimate of its own"),
         ({}, {"time_scale": {"distribution": "norm"}}, r"time_scale = norm.*% of the draws are not"),
     ],
 )
@@ -116,11 +113,6 @@ def test_refusals(shaking: Record, given: dict[str, Any], uncertain: dict[str, A
     block: dict[str, Any] = {"theta": 5.0, **({} if "mu_s" in uncertain else {"mu_s": 0.4})}
     with pytest.raises(InputError, match=message):
         sample(**block, **given, uncertain=uncertain, excitation=shaking, samples=16)
-
-
-def test_a_waveform_has_no_scales() -> None:
-    with pytest.raises(InputError, match=r"uncertain\.time_scale: not allowed with a waveform"):
-        sample(5.0, 0.4, 3.0, 1.0, uncertain={"time_scale": ABOUT_ONE})
 
 
 def test_pooled_motions_are_equally_likely_draws(shaking: Record) -> None:

@@ -170,30 +170,6 @@ def test_correlated_inputs_are_one() -> None:
 CASE: dict[str, Any] = {"theta": [0.0, 15.0], "amplitude": [0.5, 4.0, 8.0], "samples": 128, "sensitivity": True}
 
 
-def test_indices_have_the_dimensions_of_shares() -> None:
-    """They do not depend on the frequency, but where the amplitude does."""
-    friction = stats.uniform(0.35, 0.1)
-    found = slipsweep.sample(**CASE, frequency=[1.0, 2.0], uncertain={"mu_s": friction, "amplitude": FACTOR})
-    assert found.total_index.dims == ("theta", "amplitude", "input")
-    assert found.total_interval.dims == ("theta", "amplitude", "bound", "input")
-    assert found.sensitivity_status.dims == ("theta", "amplitude")
-    assert found.input.values.tolist() == ["mu_s", "amplitude"]
-    assert found.bound.values.tolist() == [0.025, 0.975]
-    other = slipsweep.sample(**CASE, frequency=7.0, uncertain={"mu_s": friction, "amplitude": FACTOR})
-    xr.testing.assert_identical(found.total_index, other.total_index.drop_vars("frequency"))
-    by_displacement = slipsweep.sample(
-        theta=5.0, displacement_amplitude=[0.02, 0.1], frequency=[1.0, 2.0], samples=64, sensitivity=True,
-        uncertain={"mu_s": friction, "displacement_amplitude": FACTOR},
-    )  # fmt: skip
-    assert by_displacement.total_index.dims == ("displacement_amplitude", "frequency", "input")
-    one = by_displacement.isel(displacement_amplitude=0, frequency=1)
-    alone = slipsweep.sample(
-        theta=5.0, displacement_amplitude=0.02, frequency=2.0, samples=64, sensitivity=True,
-        uncertain={"mu_s": friction, "displacement_amplitude": FACTOR},
-    )  # fmt: skip
-    np.testing.assert_array_equal(one.total_interval, alone.total_interval)
-
-
 def test_where_there_are_no_indices_the_status_says_why() -> None:
     """A block that never slides, and one that some draws make slide under its own weight."""
     uncertain = {"mu_s": stats.uniform(0.2, 0.2), "amplitude": {**FACTOR, "s": 0.05}}
@@ -230,15 +206,6 @@ def test_runs_without_a_value_and_what_differs_by_rounding() -> None:
 def test_what_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         sampling_of(ANGLES, **options)
-
-
-def test_draws_of_the_runs_are_checked() -> None:
-    """They are others than those of the statistics, and one of them may be none that physics allows."""
-    uncertain = {"mu_s": stats.norm(0.4, 0.4 / 3.3), "amplitude": FACTOR}
-    case: dict[str, Any] = {"theta": 5.0, "amplitude": 4.0, "frequency": 1.0, "samples": 1024, "seed": 9}
-    slipsweep.sample(**case, uncertain=uncertain)
-    with pytest.raises(InputError, match=r"uncertain.mu_s = norm.*of the draws are not"):
-        slipsweep.sample(**case, uncertain=uncertain, sensitivity=True)
 
 
 # -------------------------------------------------------------------- files, commands, charts

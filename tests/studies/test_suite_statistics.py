@@ -1,13 +1,16 @@
 """Statistics over a suite of motions, beside numpy and by hand; what is refused."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Record, Suite, Validity, suite_statistics, sweep
+from slipsweep import InputError, Newmark, Record, Suite, Validity, suite_statistics, sweep
+from slipsweep.model.options import MODELS
 from slipsweep.studies.suite_statistics import REASONS
+from tests.support.commands import command
 
 UNSTABLE, UPLIFT, CAUTION = Validity.STATICALLY_UNSTABLE, Validity.UPLIFT, Validity.NOT_RECOUPLED
 
@@ -90,14 +93,6 @@ def test_beside_numpy(over: Any) -> None:
     np.testing.assert_array_equal(found.valueless_flag_count.sel(flag=int(UPLIFT)), found.valueless_count)
 
 
-def test_what_counts_as_zero() -> None:
-    """Also what goes upslope, and what is no more than `zero`."""
-    given = suite_result([[-0.01, 0.004, 0.01, 0.2]], [[Validity.UPSLOPE, 0, 0, 0]], ("mu_s", "motion"))
-    assert float(suite_statistics(given).zero_probability[0]) == 0.25
-    found = suite_statistics(given, zero="1cm")
-    assert (float(found.zero_probability[0]), float(found.nonzero_median[0])) == (0.75, 0.2)
-
-
 def test_of_a_sweep() -> None:
     """A steep slope has no value, a flat one does not slide; what xarray computes is the same."""
     motions = [
@@ -134,11 +129,19 @@ def test_what_is_refused(given: dict[str, Any], message: str) -> None:
         suite_statistics(result, **given)
 
 
-def test_results_that_are_refused() -> None:
-    result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
-    with pytest.raises(InputError, match="result: dimensions mu_s: must have motion, as a result of a suite has"):
-        suite_statistics(result.isel(motion=0))
-    with pytest.raises(InputError, match="result: validity: missing"):
-        suite_statistics(result.drop_vars("validity"))
-    with pytest.raises(InputError, match="must be a Dataset"):
-        suite_statistics(result.permanent_displacement)
+def test_info_prints_the_numbers_of_a_suite(tmp_path: Path) -> None:
+    u = np.array([[[0.0, 0.0, 0.1], [0.02, 0.06, 0.3]]])
+    result = suite_result(u, np.zeros_like(u), ("yield_coefficient", "amplitude", "motion"))
+    result = result.assign_coords(amplitude=[1.962, 3.924], yield_coefficient=[0.1])
+    result.attrs |= {"source": "slipsweep test", **MODELS.attributes(Newmark())}
+    result.to_netcdf(tmp_path / "a.nc")
+    done = command(tmp_path, "info", "a.nc", "-d", "50mm")
+    lines = done.stdout.splitlines()
+    at = lines.index("permanent displacement (mm) over 3 motion:")
+    assert [line.split() for line in lines[at + 1 : at + 4]] == [
+        ["PGA", "(g)", "16", "%", "median", "84", "%", "zero", "P(u", ">", "50", "mm)"],
+        ["0.2", "0", "0", "68", "66.7%", "33.3%"],
+        ["0.4", "32.8", "60", "223", "0.0%", "66.7%"],
+    ]
+    cut = command(tmp_path, "info", "a.nc", "--at", "amplitude=3.924").stdout
+    assert ("32.8" in cut, "66.7%" in cut) == (True, False)

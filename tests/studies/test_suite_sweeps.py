@@ -1,7 +1,5 @@
 """Suites in sweep files: what a run writes, chunks, kills, workers, that it repeats itself, and what is refused."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ from slipsweep.files.jobs import limit_job, sweep_job
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.opening import read_result
 from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
-from slipsweep.motion.intensity import intensity_measures
 from tests.studies.test_record_sweeps import assert_same_data
 from tests.support.commands import command
 
@@ -136,9 +133,6 @@ def test_limits_of_a_suite(folder: Path) -> None:
         assert result.limit_amplitude.notnull().any()
 
 
-# -------------------------------------------------------------------------------------- chunks
-
-
 # --------------------------------------------------------------------------------- commands
 
 
@@ -159,57 +153,15 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
     assert "sha256" not in header
 
 
-def test_one_motion_over_time_at_a_target(folder: Path) -> None:
-    block = ("--theta", 5, "--mu-s", 0.1, "--record", "motions/m0.csv", "--units", "g", "--time-scale", 2)
-    motion = read_suite(folder / "motions", units="g")["m0"]
-    for target, value in (("pgv", "40 cm/s"), ("arias-intensity", "0.4")):
-        done = command(folder, "simulate", *block, f"--{target}", value)
-        assert done.returncode == 0, done.stderr
-        given: dict[str, Any] = {target.replace("-", "_"): 0.4}
-        found = sweep(5, 0.1, excitation=motion, time_scale=2, **given)
-        assert f"{float(found.permanent_displacement):.6g} m" in done.stdout
-
-
-def test_a_chart_of_limits_and_charts_that_there_are_not(folder: Path) -> None:
-    (folder / "a.toml").write_text(SWEEP.replace("[0, 5, 25]", "[5]").replace("[0.1, 0.3]", "[0.1]"))
-    done = command(folder, "limit", "a.toml", "-d", "50mm", "-o", "l.png")
-    assert done.returncode == 0, done.stderr
-    assert (folder / "l.png").stat().st_size > 10_000
-    command(folder, "run", "a.toml")
-    done = command(folder, "chart", "a.nc", "--kind", "contours", "-o", "c.png")
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-
-
-def test_damaged_files_are_told_line_by_line(folder: Path) -> None:
-    (folder / "motions" / "m1.csv").write_text("0,1\n0,2\n")
-    (folder / "motions" / "readme.csv").write_text("no numbers\n")
-    done = command(folder, "run", "a.toml")
-    assert done.returncode == 2
-    first, *more = done.stderr.splitlines()
-    assert first == ("slipsweep: error: a.toml: excitation.records: 2 of 4 files cannot be read: m1.csv, readme.csv")
-    assert [line.strip() for line in more] == [
-        "motions/m1.csv: line 2: time 0: must be greater than 0, the time before it",
-        "motions/readme.csv: no line of a time and an acceleration",
-    ]
-    assert not (folder / "a.nc").exists()
-
-
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
         ('["motions/*.csv"]', '["motions/*.AT2"]', r"excitation\.records: motions/\*\.AT2: no file fits"),
-        ('["motions/*.csv"]', "3", "excitation.records = 3: must be a folder"),
         ('["motions/*.csv"]', "[]", r"excitation\.records = \[\]: must name one motion"),
-        ('["motions/*.csv"]', '["motions/*.csv"]\nrecord = "motions/m0.csv"', "excitation.records: not allowed beside"),
         ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS"]', "excitation.pairs = "),
-        ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS", "_EW"]', "without the other component: m0.csv"),
         ('records = ["motions/*.csv"]', 'record = "motions/m0.csv"\npairs = ["a", "b"]', "excitation.pairs: only"),
-        ('"both"', '"both"\ncycles = 5', "excitation.cycles: not allowed with excitation.records"),
         ("[axes.time_scale]", "[axes.frequency]", "axes.frequency: not allowed with excitation.records"),
-        ("[axes.time_scale]", "[axes.scale]", "axes.scale: not allowed beside amplitude"),
         ("[axes.time_scale]", "[axes.pgv]", "axes.pgv: not allowed beside amplitude"),
-        ("[axes.time_scale]", "[axes.azimuth]", "azimuth: only with a Suite of pairs"),
     ],
 )
 def test_what_sweep_files_refuse(folder: Path, before: str, after: str, message: str) -> None:
@@ -217,57 +169,3 @@ def test_what_sweep_files_refuse(folder: Path, before: str, after: str, message:
     (folder / "a.toml").write_text(SWEEP.replace(before, after))
     with pytest.raises(InputError, match=message):
         spec.load(folder / "a.toml").plan()
-
-
-def test_strengths_of_records_are_not_those_of_waveforms(folder: Path) -> None:
-    for name in ("pgv", "arias_intensity", "azimuth"):
-        text = "".join(f"[axes.{one}]\nvalues = [0.5]\n" for one in ("theta", "mu_s", "frequency", name))
-        with pytest.raises(InputError, match=f"axes.{name}: only with excitation.record"):
-            spec.parse(text, "a.toml")
-
-
-def test_the_sample_is_what_its_script_makes() -> None:
-    path = SWEEPS / "data" / "suite.py"
-    module_spec = importlib.util.spec_from_file_location("suite", path)
-    assert module_spec is not None
-    assert module_spec.loader is not None
-    module = importlib.util.module_from_spec(module_spec)
-    sys.modules["suite"] = module  # its dataclass looks there
-    try:
-        module_spec.loader.exec_module(module)
-    finally:
-        del sys.modules["suite"]
-    texts = module.texts()
-    assert {one.name for one in (SWEEPS / "data" / "suite").iterdir()} == set(texts)
-    for name, text in texts.items():
-        assert (SWEEPS / "data" / "suite" / name).read_text(encoding="utf-8") == text
-
-
-def test_the_sample_ends_at_rest_and_comes_in_pairs() -> None:
-    suite = read_suite(SWEEPS / "data" / "suite", pairs=("_H1", "_H2"))
-    assert suite.labels == ("rock-far", "rock-near", "soft-far", "stiff-pulse")
-    for record in suite.components:
-        velocity = float(np.trapezoid(record.acceleration, record.times))
-        assert abs(velocity) < 2e-2 * intensity_measures(record)["pgv"]
-    moved = sweep(5, 0.3, excitation=suite, azimuth=[0, 45, 90], amplitude=5.0).permanent_displacement
-    assert float(moved.max()) > 0.0
-    assert len({*moved.values.ravel()}) == moved.size
-
-
-def test_the_sweep_of_the_sample(tmp_path: Path) -> None:
-    run(SWEEPS / "suite.toml", tmp_path / "a.nc")
-    with xr.open_dataset(tmp_path / "a.nc") as result:
-        assert result.sizes["motion"] == 8
-        u = result.permanent_displacement
-        assert float(u.max()) > 0.1
-        # more shaking moves the median block further
-        assert (u.median(["motion", "polarity"]).diff("amplitude") >= 0.0).all()
-
-
-def test_a_result_that_was_changed_is_told(folder: Path) -> None:
-    run(folder / "a.toml", folder / "a.nc")
-    with xr.open_dataset(folder / "a.nc") as result:
-        cut = result.load().isel(record=slice(0, 2)).drop_encoding()
-    cut.to_netcdf(folder / "b.nc")
-    with pytest.raises(InputError, match=r"b\.nc: record_count, record_label: are not those"):
-        spec.load(folder / "b.nc")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Pair, Record, Suite, limit_amplitude, sample, simulate, sweep
+from slipsweep import InputError, Pair, Record, Suite, limit_amplitude, sample, sweep
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import plan_sweep
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, RECORD_RESULTS
@@ -120,22 +120,6 @@ def test_an_azimuth_of_pairs_is_the_component_there() -> None:
             assert float(found.motion_mean_period.isel(where)) == intensity_measures(component)["mean_period"]
 
 
-def test_half_a_turn_is_the_other_polarity() -> None:
-    found = sweep(5, [0.1, 0.2], excitation=PAIRS, azimuth=[0, 90, 180, 270], polarity="both", scale=[1, 2])
-    moved = found.permanent_displacement
-    np.testing.assert_array_equal(moved.sel(azimuth=[180, 270], polarity=1), moved.sel(azimuth=[0, 90], polarity=-1))
-
-
-def test_an_azimuth_for_each_motion() -> None:
-    azimuth = xr.DataArray([20.0, 70.0], dims="motion")
-    found = sweep(5, [0.1, 0.2], excitation=PAIRS, azimuth=azimuth)
-    assert found.motion_pga.dims == ("motion",)
-    crossed = sweep(5, [0.1, 0.2], excitation=PAIRS, azimuth=[20.0, 70.0])
-    for at, degrees in enumerate((20.0, 70.0)):
-        own = crossed.permanent_displacement.isel(motion=at).sel(azimuth=degrees)
-        np.testing.assert_array_equal(found.permanent_displacement.isel(motion=at), own)
-
-
 # -------------------------------------------------------------------------- limits and samples
 
 
@@ -165,16 +149,6 @@ def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> Non
             np.testing.assert_allclose(found[name].isel(motion=at), alone[name], rtol=1e-14, err_msg=str(name))
 
 
-def test_samples_of_a_velocity_are_means_of_sweeps() -> None:
-    """A target that stretched time changes is that of the motion as stretched, also where time is drawn."""
-    given: dict[str, Any] = {"excitation": SUITE, "samples": 64, "seed": 3}
-    drawn = {"time_scale": {"distribution": "uniform", "loc": 1.0, "scale": 1.0}}
-    statistics = sample(5, 0.2, pgv=0.5, uncertain=drawn, **given, quantiles=[0.0001, 0.9999])
-    scales = np.linspace(1.0, 2.0, 400)
-    swept = sweep(5, 0.2, pgv=0.5, excitation=SUITE, time_scale=scales)
-    np.testing.assert_allclose(statistics.mean_displacement, swept.permanent_displacement.mean("time_scale"), rtol=0.03)
-
-
 # --------------------------------------------------------------------------------- what is refused
 
 
@@ -182,13 +156,9 @@ def test_samples_of_a_velocity_are_means_of_sweeps() -> None:
     ("given", "words"),
     [
         ({"amplitude": 2, "scale": 1}, "amplitude, scale: must not both be given"),
-        ({"pgv": 2, "arias_intensity": 1}, "pgv, arias_intensity: must not both be given"),
         ({"frequency": 1}, "frequency: not allowed with a Suite"),
-        ({"azimuth": 1}, "azimuth: only with a Suite of pairs"),
         ({"excitation": PAIRS}, "azimuth: must be given with pairs"),
-        ({"excitation": PAIRS, "azimuth": 400}, "azimuth = 400: must be 0 <= azimuth <= 360"),
         ({"pgv": -1}, "pgv = -1: must be"),
-        ({"solver": "step"}, "solver = .* not allowed with a Suite"),
         ({"variables": ["sliding_mode"]}, "variables = 'sliding_mode'"),
     ],
 )
@@ -207,16 +177,3 @@ def test_motions_that_do_not_move_are_not_scaled(strength: str) -> None:
     with pytest.raises(InputError, match=f"{strength}: still at azimuth 0 has no acceleration"):
         sweep(5, 0.3, excitation=turned, **given, azimuth=[90, 0])
     assert float(sweep(5, 0.3, excitation=turned, azimuth=0).permanent_displacement.item()) == 0.0
-
-
-def test_one_motion_of_a_suite_is_simulated() -> None:
-    with pytest.raises(InputError, match=r"simulate takes one motion of a Suite, such as suite\['noise1'\]"):
-        simulate(5, 0.3, excitation=SUITE)
-    history = simulate(5, 0.2, excitation=SUITE["noise2"], pgv=0.5)
-    swept = sweep(5, 0.2, excitation=SUITE, pgv=0.5)
-    assert float(history.permanent_displacement) == float(swept.permanent_displacement.sel(motion="noise2"))
-
-
-def test_other_shaking_does_not_know_these_strengths() -> None:
-    with pytest.raises(InputError, match="pgv: not allowed with a waveform"):
-        sweep(5, 0.3, amplitude=1, frequency=1, pgv=1)

@@ -8,7 +8,6 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-import slipsweep
 from slipsweep import InputError, Record, limit_amplitude, sample, simulate, sweep
 from slipsweep.cli import main
 
@@ -36,12 +35,6 @@ def test_results_are_those_of_the_yield_acceleration(motion: dict[str, Any]) -> 
         np.testing.assert_array_equal(found[name].values, known[name].values, strict=True)
 
 
-def test_g_is_that_of_the_model() -> None:
-    found = sweep(amplitude=3.0, frequency=1.0, yield_coefficient=0.1, model=slipsweep.Newmark(g=1.62))
-    known = sweep(0.0, 0.5, 3.0, 1.0, yield_acceleration=0.162, model="newmark")
-    assert found.permanent_displacement.item() == known.permanent_displacement.item()
-
-
 def test_limits_are_those_of_the_yield_acceleration() -> None:
     for motion in ({"frequency": 1.0}, {"excitation": RECORD}):
         found = limit_amplitude(0.05, **motion, yield_coefficient=KY, model="newmark")
@@ -67,28 +60,14 @@ def test_a_history_has_no_friction_coefficient() -> None:
     ("given", "message"),
     [
         ({"model": "mendez"}, "yield_coefficient: not allowed with model = 'mendez'"),
-        ({"theta": 5.0}, "theta: not allowed beside yield_coefficient"),
         ({"mu_s": 0.4}, "mu_s: not allowed beside yield_coefficient"),
-        ({"yield_acceleration": 1.0}, "yield_acceleration: not allowed beside yield_coefficient"),
         ({"yield_coefficient": np.nan}, "yield_coefficient = nan: must be"),
-        ({"variables": ["limiting_acceleration"]}, "limiting_acceleration needs theta and mu_s"),
     ],
 )
 def test_what_makes_no_sense_beside_it_is_refused(given: dict[str, Any], message: str) -> None:
     block: dict[str, Any] = {"amplitude": 1.0, "frequency": 1.0, "yield_coefficient": 0.1, "model": "newmark"}
     with pytest.raises(InputError, match=message):
         sweep(**block | given)
-
-
-def test_a_yield_acceleration_drawn_beside_it_is_refused() -> None:
-    """A factor on an estimate that nobody uses: all samples came out the same."""
-    block: dict[str, Any] = {"amplitude": 3.0, "frequency": 1.0, "model": "newmark", "samples": 64}
-    factor = {"yield_acceleration": {"distribution": "lognorm", "s": 0.1, "kind": "factor"}}
-    message = "yield_acceleration: not allowed beside yield_coefficient"
-    with pytest.raises(InputError, match=message):
-        sample(**block, yield_coefficient=KY, uncertain=factor)
-    with pytest.raises(InputError, match=message):
-        sample(**block, uncertain={**factor, "yield_coefficient": stats.uniform(0.1, 0.1)})
 
 
 def test_sweep_files_and_the_command_line_take_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ Values are drawn as they are; contours are those of their logarithm, in which u 
 over a logarithmic frequency axis.
 """
 
+import itertools
 import math
 from typing import Any
 
@@ -18,9 +19,10 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import KDTree
 
-from slipsweep.charts.answers import DISPLACEMENT, DRIVES, SIDE, newmark, sides_of, solve, thresholds
-from slipsweep.charts.sheet import Panel, Sheet, has_flags, is_log, over, reliable
+from slipsweep.charts.answers import DISPLACEMENT, newmark, thresholds
+from slipsweep.charts.sheet import Panel, Sheet, has_flags, is_log, reliable
 from slipsweep.charts.style import (
     COLOURS,
     LINES,
@@ -66,7 +68,7 @@ _SCRAP = 0.09
 #: Displacements that people design for, m.
 _LEAST, _MOST = 1e-3, 1.0
 
-#: What a contour's label takes to each side, and what it needs to the next contour, inches.
+#: What a contour's label takes to each side, and what it needs to the next line, inches.
 _LABEL_SPACE, _LINE_SPACE = 0.28, 0.11
 
 #: Ratios above one at which the colour changes; below one their inverses do.  The first is as good as one.
@@ -87,7 +89,7 @@ def contours(sheet: Sheet, name: str) -> Figure:
         The result.
     """
     drawn = reliable(sheet.data, name, sheet.look)
-    _prepare(sheet, drawn, name)
+    _prepare(sheet, drawn)
     if name == DISPLACEMENT:
         theirs = newmark(sheet.data)
         if sheet.data.attrs["model"] != "newmark":
@@ -116,7 +118,7 @@ def newmark_ratio(sheet: Sheet) -> Figure:
     """Draw the ratio of the permanent displacement to that of Newmark's block."""
     ours = reliable(sheet.data, DISPLACEMENT, sheet.look)
     theirs = newmark(sheet.data)
-    _prepare(sheet, (ours / theirs).where(theirs > 0), DISPLACEMENT, ratio=True)
+    _prepare(sheet, (ours / theirs).where(theirs > 0))
     ratio = sheet.data["drawn"].values
     sheet.notes += ratio_text(ratio)
     sheet.find_unsound(ours, theirs, f"Hatched {UNSOUND_HATCH}")
@@ -143,6 +145,7 @@ def modes(sheet: Sheet) -> Figure:
     """Draw the sliding mode of every cell, by colour and hatch."""
     _set_axes(sheet)
     sheet.data = sheet.data.merge(thresholds(sheet.data))
+    _draw_thresholds(sheet)
     for panel in sheet.panels:
         codes = panel.grid("sliding_mode")
         for mode, (colour, hatch) in MODES.items():
@@ -155,16 +158,11 @@ def modes(sheet: Sheet) -> Figure:
 # ------------------------------------------------------------------- what is drawn, per panel
 
 
-def _prepare(sheet: Sheet, drawn: xr.DataArray, name: str, ratio: bool = False) -> None:
-    """Set the axes, and add what the panels draw to the slice: values, thresholds, and values on the mode limit."""
+def _prepare(sheet: Sheet, drawn: xr.DataArray) -> None:
+    """Set the axes, and add to the slice what the panels draw: values and thresholds."""
     _set_axes(sheet)
-    data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn)
-    if "limit_line" in data and (sheet.x in DRIVES or sheet.y in DRIVES):
-        sides = sides_of(data["limit_line"])
-        edge = reliable(solve(sheet.data, [name, "validity"], **sides), name, sheet.look)
-        edge = edge / newmark(sheet.data, **sides) if ratio else edge
-        data["edge"] = edge.reset_coords(drop=True)
-    sheet.data = data
+    sheet.data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn)
+    _draw_thresholds(sheet)
 
 
 # ------------------------------------------------------------------------- filled contours
@@ -177,13 +175,12 @@ def _fill_panels(
     places, areas = sorted(texts), None
     look: dict[str, Any] = {"cmap": colours, "norm": norm}
     for panel in sheet.panels:
-        taken = _line_points(panel)
-        columns, rows = (_edges(panel.values(axis)) for axis in (panel.x, str(panel.y)))
+        xs, ys = panel.values(panel.x), panel.values(str(panel.y))
         with np.errstate(divide="ignore", invalid="ignore"):
-            # what contours leave open beside cells without a value has the colours of the cells
+            # what contours leave open beside the mode limit and cells without a value has the colours of the cells
             cells = np.ma.masked_invalid(logarithms(panel.grid("drawn")))
-            panel.axes.pcolormesh(columns, rows, cells, zorder=0.4, rasterized=True, **look)
-            for xs, ys, values in _sides(panel):
+            panel.axes.pcolormesh(_edges(xs), _edges(ys), cells, zorder=0.4, rasterized=True, **look)
+            for values in _sides(panel):
                 logs = np.ma.masked_invalid(logarithms(values))
                 if not logs.count():
                     continue
@@ -191,7 +188,7 @@ def _fill_panels(
                 line: dict[str, Any] = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
                 lines = panel.axes.contour(xs, ys, logs, places, **line)
                 lines.set_gid("contours")
-                _label_contours(panel, lines, texts, taken)
+                _label_contours(panel, lines, texts)
     if areas is None:
         return
     bar = sheet.figure.colorbar(areas, ax=[panel.axes for panel in sheet.panels], ticks=places, pad=0.02)
@@ -200,100 +197,38 @@ def _fill_panels(
     bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
 
 
-def _sides(panel: Panel) -> list[tuple[Floats, Floats, Floats]]:
-    """x, y and values of the cells below and beyond the mode limit, as grids that end on the limit.
-
-    Cells on the other side are moved onto the limit and have the result there.
-    """
-    xs, ys = np.meshgrid(panel.values(panel.x), panel.values(str(panel.y)))
+def _sides(panel: Panel) -> list[Floats]:
+    """Values below the mode limit and beyond it: no contour crosses the jump."""
     values = panel.grid("drawn")
     if "limit_line" not in panel.data:
-        return [(xs, ys, values)]
+        return [values]
     beyond = panel.grid("amplitude") > panel.grid("limit_line")
-    line = threshold_line(panel, "limit_line")
-    if line is None or not (beyond.any() and not beyond.all()):  # the limit is no line of this plane
-        return [(xs, ys, np.where(side, values, np.nan)) for side in (~beyond, beyond) if side.any()]
-    upright = panel.y in DRIVES
-    edges = over(panel.data["edge"], panel.data, (panel.x if upright else panel.y, SIDE))
-    # along the amplitude first; one more cell, on the limit, for lines that leave the map beside it
-    along, other, cells, above = (ys, xs, values, beyond) if upright else (xs.T, ys.T, values.T, beyond.T)
-    sides = []
-    for number, (away, end) in enumerate(((above, -1), (~above, 0))):
-        limit = np.where(np.isfinite(line[upright]), line[upright], along[end])
-        at = len(along) if end else 0
-        grids = (
-            np.insert(np.where(away, limit, along), at, limit, axis=0),
-            np.insert(other, at, other[0], axis=0),
-            np.insert(np.where(away, edges[:, number], cells), at, edges[:, number], axis=0),
-        )
-        place, across, found = grids if upright else (one.T for one in grids)
-        sides.append((across, place, found) if upright else (place, across, found))
-    return sides
+    return [np.where(side, values, np.nan) for side in (~beyond, beyond) if side.any()]
 
 
-def threshold_line(panel: Panel, name: str) -> tuple[Floats, Floats] | None:
-    """The line in the plane of a map on which the amplitude is a threshold acceleration.
-
-    Returns
-    -------
-    tuple of ndarray or None
-        x and y of the line; None if neither axis is one of amplitude.
-    """
-    for drive, other, swapped in ((str(panel.y), panel.x, False), (panel.x, str(panel.y), True)):
-        if drive not in DRIVES:
-            continue
-        along = panel.values(other)
-        values = over(panel.data[name], panel.data, (other,)) * panel.look.scale(drive, panel.g)
-        if drive == "displacement_amplitude":
-            values = values / (2 * math.pi * over(panel.data["frequency"], panel.data, (other,))) ** 2
-        return (values, along) if swapped else (along, values)
-    return None
-
-
-def _line_points(panel: Panel) -> list[Floats]:
-    """A few dozen points of the threshold lines, in inches: labels keep away from them."""
-    to_inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
-    shown = [line for name in LINES if name in panel.data and (line := threshold_line(panel, name)) is not None]
-    return [to_inches.transform(np.column_stack(line)[:: math.ceil(line[0].size / 60)]) for line in shown]
-
-
-def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str], taken: list[Floats]) -> None:
-    """Label each contour where it is farthest from edges, other contours and `taken`, if there is space.
-
-    `taken` holds points of lines and labels, in inches; the new labels are added.
-    """
-    to_inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
+def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
+    """Label each contour where it is farthest from the frame and from all other lines, if there is space."""
+    inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
     corners = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted()).get_points()
-    lines = [to_inches.transform(np.concatenate([*segments, np.empty((0, 2))])) for segments in drawn.allsegs]
-    lines = [points[np.isfinite(points).all(axis=1)] for points in lines]
-    lines = [points[:: math.ceil(len(points) / 300)] for points in lines if len(points)]
-    positions = []
-    for points in lines:
+    shown: list[Any] = [drawn, *(one for one in panel.axes.collections if one.get_gid() in LINES)]
+    nothing = np.empty((0, 2))
+    lines = [inches.transform(np.concatenate([*some, nothing])) for one in shown for some in one.allsegs]
+    labels: list[Floats] = []
+    for at, points in enumerate(lines[: len(drawn.levels)]):
+        if not len(points):
+            continue
         space = np.minimum(points - corners[0], corners[1] - points).min(axis=1)
-        for obstacle in taken:
-            space = np.minimum(space, _distance(points, obstacle))
-        # another contour may come nearer than the end of a label
-        for other in lines:
-            if other is not points:
-                space = np.minimum(space, _distance(points, other) * _LABEL_SPACE / _LINE_SPACE)
+        others = np.concatenate([nothing, *lines[:at], *lines[at + 1 :]])
+        space = np.minimum(space, _LABEL_SPACE / _LINE_SPACE * KDTree(others).query(points)[0])
+        if labels:
+            space = np.minimum(space, KDTree(labels).query(points)[0])
         best = int(np.argmax(space))
         if space[best] > _LABEL_SPACE:
-            taken.append(points[best : best + 1])
-            positions.append(tuple(to_inches.inverted().transform(points[best])))
-    if positions:
-        labels = panel.axes.clabel(
-            drawn, manual=positions, fmt=lambda place: texts[min(texts, key=lambda one: abs(one - place))],
-            fontsize=0.8 * panel.look.font, colors="black",
-        )  # fmt: skip
-        for label in labels:
-            label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
-
-
-def _distance(points: Floats, others: Floats) -> Floats:
-    """How far each point is from the nearest of some others."""
-    there = others[np.isfinite(others).all(axis=1)]
-    apart = points[:, None] - there[None]
-    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(axis=1, initial=np.inf))
+            labels.append(points[best])
+    if labels:
+        places: Any = inches.inverted().transform(labels)
+        for text in panel.axes.clabel(drawn, manual=places, fmt=texts, fontsize=0.8 * panel.look.font):
+            text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
 def _levels(name: str, values: Floats) -> list[float]:
@@ -338,14 +273,11 @@ def _set_axes(sheet: Sheet) -> None:
 
 
 def _finish(sheet: Sheet, name: str) -> Figure:
-    """Area of no sliding, threshold lines, hatching, legend and caption of a map."""
+    """Area of no sliding, hatching, legend and caption of a map."""
     scraps: dict[str, int] = {}
     for panel in sheet.panels:
         if name != "sliding_mode":
             _cover_no_sliding(sheet, panel)
-        for line, (text, look) in LINES.items():
-            if line in panel.data and _draw_threshold(panel, line, look):
-                sheet.remarks[text] = Line2D([], [], **look)
         hatches = {flag_name(flag): (has_flags(panel.data["validity"], flag), hatch) for flag, hatch in HATCHES.items()}
         if "unsound" in panel.data:
             hatches[UNSOUND] = panel.data["unsound"], UNSOUND_HATCH
@@ -371,23 +303,19 @@ def _cover_no_sliding(sheet: Sheet, panel: Panel) -> None:
     sheet.legend[NO_SLIDING] = Patch(facecolor="white", edgecolor="0.6", linewidth=0.6)
 
 
-def _draw_threshold(panel: Panel, name: str, look: dict[str, Any]) -> bool:
-    """Draw the line of a threshold acceleration; False where none is in the plane."""
-    line = threshold_line(panel, name)
-    if line is not None:
-        panel.axes.plot(*line, gid=name, **look)
-        corners = np.array([panel.axes.get_xlim(), panel.axes.get_ylim()])
-        inside = [(values >= low) & (values <= high) for values, (low, high) in zip(line, corners, strict=True)]
-        return bool((inside[0] & inside[1]).any())
-    excess = np.ma.masked_invalid(panel.grid("amplitude") - panel.grid(name))
-    if not excess.count() or not excess.min() < 0 < excess.max():
-        return False
-    drawn = panel.axes.contour(
-        panel.values(panel.x), panel.values(str(panel.y)), excess, [0.0], colors=look["color"],
-        linestyles=[look["linestyle"]], linewidths=look["linewidth"],
-    )  # fmt: skip
-    drawn.set_gid(name)
-    return True
+def _draw_thresholds(sheet: Sheet) -> None:
+    """Draw the lines on which the amplitude is the acceleration of yield or of the mode limit."""
+    for panel, (name, (text, look)) in itertools.product(sheet.panels, LINES.items()):
+        if name not in panel.data:
+            continue
+        excess = np.ma.masked_invalid(panel.grid("amplitude") - panel.grid(name))
+        if excess.count() and excess.min() < 0 < excess.max():
+            drawn = panel.axes.contour(
+                panel.values(panel.x), panel.values(str(panel.y)), excess, [0.0], colors=look["color"],
+                linestyles=[look["linestyle"]], linewidths=look["linewidth"],
+            )  # fmt: skip
+            drawn.set_gid(name)
+            sheet.remarks[text] = Line2D([], [], **look)
 
 
 def _mark(

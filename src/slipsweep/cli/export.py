@@ -8,6 +8,7 @@ import typer
 
 from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, progress_bar
 from slipsweep.cli.help import Panel, examples
+from slipsweep.cli.suite import write_fragility
 
 #: The group of options that only this command has.
 TABLE = Panel("Table")
@@ -21,7 +22,7 @@ EXAMPLE = examples(
 
 def export(
     file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
-    output: Annotated[Path, OUTPUT("Table to write: .csv, .parquet or .xlsx.", "--output", "-o", metavar="FILE")],
+    output: Annotated[Path, OUTPUT("Write .csv, .parquet, .xlsx or .xml.", "--output", "-o", metavar="FILE")],
     variables: Annotated[
         list[str] | None, TABLE("Result to export (default: all); may be repeated.", "--variable", metavar="NAME")
     ] = None,
@@ -43,10 +44,15 @@ def export(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a result as a table: CSV, Parquet or .xlsx.
+    """Write a result as a table: CSV, Parquet or .xlsx; or the fragility of a suite or of samples for OpenQuake (.xml).
 
     One row per case, coordinates as columns, units in the header; with --columns a table of one result over two axes.
     """
+    if output.suffix == ".xml":
+        _export_fragility(file, output, at, overwrite)
+        if not quiet:
+            typer.echo(output)
+        return
     from slipsweep.files import export as tables
     from slipsweep.grid.resources import size_text
 
@@ -64,3 +70,15 @@ def export(
     )
     if not quiet:
         typer.echo(f"{output}  {written} rows, {size_text(output.stat().st_size)}")
+
+
+def _export_fragility(file: str, output: Path, at: list[str] | None, overwrite: bool) -> None:
+    """Write P(u > d) along the axis amplitude, of the values that --at takes of others."""
+    from slipsweep.files import outputs
+    from slipsweep.files.opening import read_result
+    from slipsweep.files.selection import places_at
+
+    outputs.check_outputs([output], overwrite, reads=[Path(file)])
+    table = read_result(file)
+    axes = [str(dim) for dim in table.sizes if dim not in ("motion", "quantile")]
+    write_fragility(table.isel(places_at(table, file, cuts(at), axes), missing_dims="ignore"), output, overwrite)

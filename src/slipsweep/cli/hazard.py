@@ -8,6 +8,7 @@ import typer
 from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, write_figure
 from slipsweep.cli.help import Panel
 from slipsweep.cli.lengths import displacements
+from slipsweep.cli.suite import write_fragility
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
@@ -59,7 +60,6 @@ def hazard(
     for path in paths:
         check_ending(path, (*FIGURES, ".xml"))
     from slipsweep.files import outputs
-    from slipsweep.studies.fragility import fragility, openquake_fragility
     from slipsweep.studies.hazard import displacement_hazard
     from slipsweep.studies.hazard_curves import read_hazard_curve
 
@@ -71,8 +71,7 @@ def hazard(
     rates = displacement_hazard(result, given, lengths)
     for path in paths:
         if path.suffix == ".xml":
-            with outputs.complete_or_absent(path, overwrite) as temporary:
-                temporary.write_text(openquake_fragility(fragility(result, lengths)), encoding="utf-8")
+            write_fragility(result, path, overwrite, lengths)
         else:
             write_figure(_figure(result, given, rates), path, overwrite)
     if not quiet:

@@ -5,24 +5,34 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import echo, echo_tally, place_of
+from slipsweep.cli.common import cuts, echo, echo_tally, place_of
 from slipsweep.cli.help import examples
+from slipsweep.cli.suite import echo_suite
 from slipsweep.errors import InputError
 
-EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info history.nc")
+EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
 
 
 def info(
     file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
+    displacement: Annotated[
+        list[str] | None,
+        typer.Option("--displacement", "-d", metavar="LENGTH", help="Of a suite: P(u > LENGTH), too; may be repeated."),
+    ] = None,
+    at: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of a suite: statistics at values of an axis only.")
+    ] = None,
 ) -> None:
-    """Show what a result holds, how it was made, and its shares of flags."""
+    """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
     from slipsweep.files import contents
     from slipsweep.files.jobs import RUN
     from slipsweep.files.motions import read_embedded
     from slipsweep.files.opening import read_result
+    from slipsweep.files.selection import places_at
     from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import size_text
     from slipsweep.motion.records import Record
+    from slipsweep.studies.suite_statistics import SUITE
 
     table = read_result(file)
     echo(f"{Path(file)}  {size_text(nbytes_of(place_of(file)))}")
@@ -45,6 +55,11 @@ def info(
         echo_tally(contents.tally_in(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
+    if displacement and table.sizes.get("motion", 1) < 2:
+        raise InputError(f"{file}: --displacement: is for results of a suite of motions")
+    axes = [str(dim) for dim in table.sizes if dim not in SUITE]
+    chosen = table.isel(places_at(table, file, cuts(at), axes), missing_dims="ignore")
+    echo_suite(chosen, most=100, typed=displacement or ())
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
         if name != RUN:

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -21,8 +21,15 @@ from slipsweep.cli.common import (
     place_of,
 )
 from slipsweep.cli.help import Panel, examples
+from slipsweep.cli.suite import echo_suite
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
+from slipsweep.model.variables import PARAMETERS, SlidingMode
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from slipsweep.grid.tally import Tally
 
 #: The group of options that only this command has.
 SOLVER = Panel("Solver")
@@ -60,6 +67,7 @@ def run(
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec
+    from slipsweep.files.opening import read_result
     from slipsweep.grid.resources import grid_text, size_text
 
     chunks = Chunks(overwrite, resume, memory, workers, scheduler)
@@ -85,7 +93,8 @@ def run(
     if quiet:
         return
     grid = grid_text(job.plan.sizes) or "no axes"
-    about = job.plan.template().attrs
+    template = job.plan.template()
+    about = template.attrs
     if report.found:
         echo_found(report.path)
     else:
@@ -100,9 +109,55 @@ def run(
             typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{beside}")
             typer.echo(f"{report.tally.cells} samples solved in {took}")
     typer.echo(f"inputs: {about['friction_inputs']}")
+    _echo_inputs(template)
     if checked.recorded is not None:
         typer.echo(checked.recorded.summary())
     if "duplicate_motions" in about:
         typer.echo(f"the same motion under several labels: {about['duplicate_motions']}")
     echo_tally(report.tally)
+    if why := _why_nothing_slides(template, report.tally):
+        typer.echo(why)
+    echo_suite(read_result(report.path), most=20)
     typer.echo(f"{report.path}  {size_text(report.nbytes)}")
+
+
+def _echo_inputs(table: "xr.Dataset") -> None:
+    """Print the ranges of the parameters, with their units, accelerations also in g."""
+    g = float(table.attrs["g"])
+    for name, one in table.coords.items():
+        if name not in PARAMETERS:
+            continue
+        ends = [float(one.min()), float(one.max())][: 2 if one.size > 1 else 1]
+        units = PARAMETERS[str(name)]["units"]
+        text = f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}"
+        in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m s-2" else ""
+        typer.echo(f"  {name:<24}{text}{in_g}")
+
+
+def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
+    """The likely reason why every cell is stuck or has no value; empty where one slides."""
+    import numpy as np
+
+    modes = tally.modes or {}
+    still = modes.get(SlidingMode.STUCK, 0) + modes.get(SlidingMode.MISSING, 0)
+    if not modes or still < sum(modes.values()):
+        return ""
+    g, coords = float(table.attrs["g"]), table.coords
+    if modes[SlidingMode.MISSING] == still:
+        return (
+            "no cell has a value: the flags above say why; statically_unstable: theta reaches the friction angle, "
+            "atan(mu_s)"
+        )
+    if "amplitude" not in coords or not {"theta", "mu_s"} <= {*coords}:
+        return "no cell slides"
+    if "yield_acceleration" in coords:
+        least = float(coords["yield_acceleration"].min())
+    else:
+        slope = np.arctan(float(coords["mu_s"].min())) - np.radians(float(coords["theta"].max()))
+        least = g * float(np.tan(slope))
+    largest = float(coords["amplitude"].max())
+    hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
+    return (
+        f"no cell slides: largest amplitude {largest:.4g} m/s2 = {largest / g:.3g} g, smallest yield acceleration "
+        f"{least:.4g} m/s2 = {least / g:.3g} g{hint}"
+    )

@@ -51,6 +51,7 @@ def simulate(
     *,
     theta: Annotated[str | None, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")] = None,
     mu_s: Annotated[float | None, BLOCK("Static friction coefficient.")] = None,
+    phi: Annotated[str | None, BLOCK("Friction angle instead of --mu-s: 21 (degrees).", metavar="VALUE")] = None,
     yield_acceleration: Annotated[
         str | None, BLOCK("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", metavar="VALUE")
     ] = None,
@@ -98,6 +99,7 @@ def simulate(
         check_ending(path, tuple(writers))
     typed = {
         "theta": theta,
+        "phi": phi,
         "amplitude": amplitude,
         "displacement_amplitude": displacement_amplitude,
         "frequency": frequency,
@@ -116,15 +118,23 @@ def simulate(
 
     outputs.check_outputs(paths, overwrite, reads=[record] if record else ())
     inputs = Inputs(
+        theta=given.get("theta"),
         mu_s=mu_s,
+        phi=given.get("phi"),
+        amplitude=given.get("amplitude"),
+        frequency=given.get("frequency"),
+        displacement_amplitude=given.get("displacement_amplitude"),
         scale=scale,
+        pgv=given.get("pgv"),
+        arias_intensity=given.get("arias_intensity"),
         time_scale=time_scale,
         polarity=None if polarity is None else int(polarity),
+        yield_acceleration=given.get("yield_acceleration"),
         yield_coefficient=yield_coefficient,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
-        **given,
+        structure_frequency=given.get("structure_frequency"),
     )
     table = time_history(inputs, excitation=motion, model=model, points_per_cycle=points)
     flags = Validity(table["validity"].item())

@@ -10,23 +10,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.charts.slices import check_attributes
 from slipsweep.errors import InputError
-from slipsweep.files.results import FileVariable, ResultFile, result_file
-from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
+from slipsweep.files.opening import open_result
+from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
-from slipsweep.motion.amplitude import peak_acceleration
+from slipsweep.motion.waveforms import WAVEFORMS
 from slipsweep.studies.suite_statistics import suite_statistics
-
-#: Codes of cells, and what stands for a missing one.
-CODES = {"sliding_mode": -1, "validity": 0}
-
-#: Largest number that is drawn: products of a few of them are still numbers.
-_MOST = 1e75
 
 #: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
 LAYERS = {
     "permanent_displacement": "displacement",
+    "newmark_displacement": "Newmark's displacement",
     "displacement_quantile": "quantile of displacement",
     "mean_displacement": "mean displacement",
     "exceedance_probability": "probability of exceeding",
@@ -41,7 +35,8 @@ _QUANTILES, _THRESHOLDS = (0.16, 0.5, 0.84), (0.01, 0.1, 1.0)
 #: Dimensions of which statistics are made, or which are statistics themselves: none of their values is left out.
 _WHOLE = ("polarity", "motion", "quantile", "threshold")
 
-_ABOUT = STATISTICS | RESULTS
+#: Largest magnitude of a coordinate: products of a few of them are still numbers.
+_MOST = 1e75
 
 _VERTICAL = ("amplitude", "displacement_amplitude", *STRENGTHS[1:])
 
@@ -136,67 +131,79 @@ class Excerpt:
 def read_excerpt(path: Path, cells: int) -> Excerpt:
     """Read a result, or an evenly spaced part of it that has at most `cells` cells.
 
-    Memory stays small whatever the size of the file.
+    The file is read in chunks, of which only what is kept stays in memory.
 
     Raises
     ------
     InputError
         The file cannot be read, or holds no displacement over two parameters.
     """
-    with result_file(path) as file:
-        names = [name for name in SHOWN if name in file.results]
-        layers = [name for name in names if name in LAYERS]
-        if not layers:
-            raise InputError(
-                f"{path}: holds no permanent_displacement to draw; add it to output.variables and run the sweep again"
-            )
-        lengths = {dim: size for name in layers for dim, size in file[name].sizes.items()}
-        if 0 in lengths.values():
-            raise InputError(f"{path}: holds no cells")
-        map_dims = _map_dims(path, lengths)
-        check_attributes(file.attrs, str(path))
-        left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
-        if math.prod(left.values()) > cells:
-            raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
-        keep = {dim: file.axis(dim)[1][evenly(length, left[dim])] for dim, length in lengths.items()}
-        coords = _coordinates(file, keep)
-        results = {name: _read(file[name], keep, SHOWN[name]) for name in names}
-        labels = {dim: file.labels if dim == "case" else file.texts(dim) for dim in lengths if dim not in coords}
-        labels = {dim: [texts[at] for at in keep[dim]] for dim, texts in labels.items() if texts}
-        table = xr.Dataset(results, coords, file.attrs)
-    if "motion" in left and {"permanent_displacement", "validity"} <= results.keys():
+    result = open_result(path)
+    names = [name for name in SHOWN if name in result.data_vars]
+    layers = [name for name in names if name in LAYERS]
+    if not layers:
+        raise InputError(
+            f"{path}: holds no permanent_displacement to draw; add it to output.variables and run the sweep again"
+        )
+    lengths = {str(dim): size for name in layers for dim, size in result[name].sizes.items()}
+    if 0 in lengths.values():
+        raise InputError(f"{path}: holds no cells")
+    map_dims = _map_dims(path, lengths)
+    _check_attributes(path, result.attrs)
+    left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
+    if math.prod(left.values()) > cells:
+        raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
+    keep = {dim: _ascending(result, dim)[evenly(length, left[dim])] for dim, length in lengths.items()}
+    table = result[names].isel(keep).transpose(*lengths, ...).load(scheduler="single-threaded")
+    for name in names:
+        beyond = [dim for dim in table[name].dims if dim not in lengths]
+        if beyond:
+            raise InputError(f"{path}: {name}: lies along {beyond[0]}, along which no displacement does")
+        about = (STATISTICS | RESULTS)[name]
+        table[name] = table[name].astype(SHOWN[name]).assign_attrs(about)
+    labels = {dim: _labels(table, dim) for dim in lengths if dim not in PARAMETERS}
+    table = xr.Dataset({name: table[name].variable for name in names}, _coordinates(path, table), result.attrs)
+    if "motion" in left and {"permanent_displacement", "validity"} <= {*names}:
         table = _with_statistics(table)
-        left |= {dim: table[dim].values.size for dim in ("quantile", "threshold")}
-    return Excerpt(table, map_dims, lengths, left, labels)
+        left |= {dim: table.sizes[dim] for dim in ("quantile", "threshold")}
+    return Excerpt(table, map_dims, lengths, left, {dim: texts for dim, texts in labels.items() if texts})
+
+
+def _ascending(result: xr.Dataset, dim: str) -> NDArray[np.intp]:
+    """The order in which the values of a dimension increase; that of the file where it is none of numbers."""
+    values = result[dim].values if dim in PARAMETERS and dim in result.coords else None
+    return np.arange(result.sizes[dim]) if values is None else np.argsort(values, kind="stable")
+
+
+def _labels(table: xr.Dataset, dim: str) -> list[str]:
+    """Names along a dimension that has no numbers: of cases and motions."""
+    name = "label" if dim == "case" and "label" in table.variables else dim
+    if name not in table.coords or table[name].dtype.kind not in "OUST":
+        return []
+    return [text.decode(errors="replace") if isinstance(text, bytes) else str(text) for text in table[name].values]
 
 
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
     found = suite_statistics(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES)
-    results = {
-        name: xr.Variable(found[name].dims, found[name].values.astype(kind), _over_motions(found[name].attrs))
-        for name, kind in SHOWN.items()
-        if name in found.data_vars
-    }
-    return table.assign(results).assign_coords({dim: found[dim] for dim in ("quantile", "threshold")})
+    names = [name for name in SHOWN if name in found.data_vars]
+    for name in names:
+        text = str(found[name].attrs["long_name"])
+        text = text if "motions" in text else f"{text}, over all motions"
+        found[name] = found[name].astype(SHOWN[name]).assign_attrs(long_name=text)
+    added = {name: found[name].variable for name in names}
+    return table.assign(added).assign_coords({dim: found[dim].variable for dim in ("quantile", "threshold")})
 
 
-def _over_motions(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes that name what a statistic is of."""
-    text = str(attrs["long_name"])
-    return {**attrs, "long_name": text if "motions" in text else f"{text}, over all motions"}
-
-
-def amplitude_of(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> xr.Variable:
-    """The amplitude A = ω²d: files do not hold it where d and the frequency span a grid."""
-    return xr.apply_ufunc(peak_acceleration, displacement_amplitude, frequency)
-
-
-def check_drawable(path: Path, name: str, values: NDArray[Any], most: float = _MOST) -> None:
-    """Refuse numbers that no drawing library can place (InputError)."""
-    beyond = values[np.abs(values) > np.float64(most)]  # np.float64: single precision would make it infinite
-    if beyond.size:
-        raise InputError(f"{path}: {name}: holds {beyond.flat[0]:.4g}; what is drawn must be within +-{most:g}")
+def _check_attributes(path: Path, attrs: Mapping[Any, Any]) -> None:
+    """Refuse a file that does not say any more what was solved (InputError)."""
+    recorded = bool({"record", "suite"} & attrs.keys())
+    for name in ("model", "g", *(() if recorded else ("waveform", "cycles"))):
+        if name not in attrs:
+            raise InputError(f"{path}: attribute {name!r}: missing; it says what was solved")
+    MODELS.from_attributes(attrs)
+    if not recorded:
+        WAVEFORMS.from_attributes(attrs)
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
@@ -215,50 +222,22 @@ def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
     return up, across
 
 
-def _coordinates(file: ResultFile, keep: Indices) -> dict[str, xr.Variable]:
+def _coordinates(path: Path, table: xr.Dataset) -> dict[str, Any]:
     """The parameters along the dimensions of a page."""
-    coords = {
-        name: xr.Variable(file[name].dims, file[name].read_floats(keep).astype(np.float64), about)
+    coords: dict[str, Any] = {
+        name: (table[name].dims, table[name].values.astype(np.float64), about)
         for name, about in (PARAMETERS | STATISTIC_COORDINATES).items()
-        if name in file.coordinates and not file[name].is_text and keep.keys() >= {*file[name].dims}
+        if name in table.coords and table[name].dtype.kind in "iuf"
     }
     if {"displacement_amplitude", "frequency"} <= coords.keys() and "amplitude" not in coords:
-        coords["amplitude"] = amplitude_of(coords["displacement_amplitude"], coords["frequency"])
-    if "waveform" in file.attrs and not any(name in STATISTICS for name in file.results):
+        amplitude = (table["displacement_amplitude"] * (2.0 * math.pi * table["frequency"]) ** 2).variable
+        coords["amplitude"] = (amplitude.dims, amplitude.values, PARAMETERS["amplitude"])
+    if "waveform" in table.attrs and not any(name in STATISTICS for name in table.data_vars):
         interface = () if "yield_coefficient" in coords else ("theta", "mu_s")
         for name in (*interface, "amplitude", "frequency"):
             if name not in coords:
-                raise InputError(f"{file.path}: {name}: not in the file, but the page needs it")
-    for name, coord in coords.items():
-        check_drawable(file.path, name, coord.values)
-        if np.isnan(coord.values).any():
-            raise InputError(f"{file.path}: {name}: values are missing")
+                raise InputError(f"{path}: {name}: not in the file, but the page needs it")
+    for name, (_, values, _) in coords.items():
+        if not (np.abs(values) < _MOST).all():
+            raise InputError(f"{path}: {name}: values are missing, or too large to draw")
     return coords
-
-
-def _read(variable: FileVariable, keep: Indices, kind: str) -> xr.Variable:
-    """Read a result at some places along each dimension, in the order of `keep`."""
-    beyond = [dim for dim in variable.dims if dim not in keep]
-    if beyond:
-        raise InputError(f"{variable.path}: {variable.name}: lies along {beyond[0]}, along which no displacement does")
-    dims = tuple(dim for dim in keep if dim in variable.dims)
-    values = np.empty([keep[dim].size for dim in dims], kind)
-    for chunk in grid_chunks({dim: variable.sizes[dim] for dim in dims}, CHUNK_CELLS):
-        inside = {
-            dim: np.flatnonzero((keep[dim] >= part.start) & (keep[dim] < part.stop)) for dim, part in chunk.items()
-        }
-        if not all(map(len, inside.values())):
-            continue
-        source = np.ix_(*(keep[dim][at] - chunk[dim].start for dim, at in inside.items()))
-        values[np.ix_(*inside.values())] = _read_chunk(variable, chunk)[source]
-    return xr.Variable(dims, values, _ABOUT[variable.name])
-
-
-def _read_chunk(variable: FileVariable, chunk: Mapping[str, slice]) -> NDArray[Any]:
-    """Read the part of a chunk along the chunk's dimensions, in their order."""
-    if variable.name in CODES:
-        values = variable.read_codes(chunk, CODES[variable.name])
-    else:
-        values = variable.read_floats(chunk)
-        check_drawable(variable.path, variable.name, values, float(np.finfo(np.float32).max))
-    return values.transpose([variable.dims.index(dim) for dim in chunk])

@@ -23,12 +23,12 @@ def scale_of(name: str) -> str:
     return "displacement" if about(name).get("units") == "m" else "probability"
 
 
-def label(name: str) -> str:
-    """Long name, symbol and unit of a dimension."""
+def label(name: str, log: bool = False) -> str:
+    """Long name, symbol and unit of a dimension, and its scale where it is no linear one."""
     units = unit(name) if name in PARAMETERS else ""
     symbol = SYMBOLS.get(name, "")
     parts = [about(name)["long_name"], "" if len(symbol) > 4 else symbol, units and f"({units})"]
-    return " ".join(filter(None, parts))
+    return " ".join(filter(None, parts)) + (", logarithmic scale" if log else "")
 
 
 def decades(excerpt: Excerpt) -> tuple[int, int]:
@@ -46,8 +46,10 @@ def decades(excerpt: Excerpt) -> tuple[int, int]:
 
 
 def figures(excerpt: Excerpt) -> dict[str, Any]:
-    """The map, and the three panels of a history."""
-    return {"map": _map(excerpt), **_panels(float(excerpt.table.attrs["g"]))}
+    """The map, and the panels of a history, as Bokeh's JSON, which `page.js` has Bokeh draw."""
+    from bokeh.embed import json_item
+
+    return {"map": json_item(_map(excerpt)), "panels": json_item(_panels())}
 
 
 def _map(excerpt: Excerpt) -> Any:
@@ -61,8 +63,8 @@ def _map(excerpt: Excerpt) -> Any:
         sizing_mode="stretch_width",
         x_axis_type="log" if excerpt.is_log(across) else "linear",
         y_axis_type="log" if excerpt.is_log(up) else "linear",
-        x_axis_label=label(across),
-        y_axis_label=label(up),
+        x_axis_label=label(across, excerpt.is_log(across)),
+        y_axis_label=label(up, excerpt.is_log(up)),
         x_range=Range1d(start=1, end=2, name="x_range"),
         y_range=Range1d(start=1, end=2, name="y_range"),
         tools="",
@@ -90,15 +92,17 @@ def _map(excerpt: Excerpt) -> Any:
             "x", "y", source=chosen, size=15, marker="circle", fill_color=None, line_color=colour, line_width=width
         )
     if is_acceleration(up):
-        _add_g(chart, float(excerpt.table.attrs["g"]), excerpt.is_log(up))
+        _add_g(chart, excerpt.is_log(up))
     return chart
 
 
 def _plain_ticks(axis: Any, log: bool) -> None:
-    from bokeh.models import PrintfTickFormatter
+    """Numbers at 1, 2 and 5 times each power of ten of a logarithmic axis, of which a part shows several."""
+    from bokeh.models import FixedTicker, PrintfTickFormatter
 
     axis.axis_label_text_font_style = "normal"
     if log:
+        axis.ticker = FixedTicker(ticks=[digit * 10.0**power for power in range(-9, 10) for digit in (1, 2, 5)])
         axis.formatter = PrintfTickFormatter(format="%g")
 
 
@@ -108,7 +112,7 @@ def _colours(scale: str, span: tuple[int, int]) -> tuple[Any, Any]:
     from bokeh.models.annotations import ColorBar
     from matplotlib.colors import to_hex
 
-    from slipsweep.charts.maps import COLOURS
+    from slipsweep.charts.style import COLOURS
 
     low, high = span
     # three bands a decade: their edges are contours of displacement
@@ -133,59 +137,55 @@ def _colours(scale: str, span: tuple[int, int]) -> tuple[Any, Any]:
     return mapper, bar
 
 
-def _add_g(chart: Any, g: float, log: bool) -> None:
-    """An axis in g on the right, beside that in m/s²."""
-    from bokeh.models import CustomJS, LinearAxis, LinearScale, LogAxis, LogScale, Range1d
+def _add_g(chart: Any, log: bool) -> None:
+    """An axis in g on the right, beside that in m/s²; `page.js` moves it along."""
+    from bokeh.models import LinearAxis, LinearScale, LogAxis, LogScale, Range1d
 
-    inside = Range1d(start=1.0 / g, end=2.0 / g)
-    chart.extra_y_ranges = {"g": inside}
+    chart.extra_y_ranges = {"g": Range1d(start=1, end=2, name=f"{chart.name}_g")}
     chart.extra_y_scales = {"g": LogScale() if log else LinearScale()}
     axis: Any = (LogAxis if log else LinearAxis)(y_range_name="g", axis_label="(g)")
     _plain_ticks(axis, log)
     chart.add_layout(axis, "right")
-    follow = CustomJS(
-        args={"inside": inside, "g": g}, code="inside.setv({start: cb_obj.start / g, end: cb_obj.end / g})"
-    )
-    for end in ("start", "end"):
-        chart.y_range.js_on_change(end, follow)
 
 
-def _panels(g: float) -> dict[str, Any]:
-    from bokeh.models import ColumnDataSource
+#: The panels of a history: axis, height in px, and what is drawn, with its words in the legend.
+_PANELS = {
+    "accelerations": ("acceleration (m/s²)", 200, {"ground": "base", "block": "block"}),
+    "velocity": ("velocity (m/s)", 150, {"v": ""}),
+    "displacement": ("displacement (mm)", 180, {"u": ""}),
+}
+
+
+def _panels() -> Any:
+    """The history of a cell, one panel under the other."""
+    from bokeh.layouts import column
+    from bokeh.models import ColumnDataSource, DataRange1d, Range1d
     from bokeh.plotting import figure
 
     history = ColumnDataSource({name: [0.0] for name in ("t", "ground", "block", "v", "u")}, name="history")
-    panels: dict[str, Any] = {}
-    shared: Any = None
-    for name, text, height, lines in (
-        ("accelerations", "acceleration (m/s²)", 200, {"ground": "plane", "block": "block"}),
-        ("velocity", "velocity (m/s)", 150, {"v": ""}),
-        ("displacement", "displacement (mm)", 180, {"u": ""}),
-    ):
+    times, panels = DataRange1d(range_padding=0), []
+    for name, (text, height, lines) in _PANELS.items():
         panel: Any = figure(
             name=name,
             sizing_mode="stretch_width",
             height=height,
+            x_range=times,
             x_axis_label="time (s)" if name == "displacement" else None,
             y_axis_label=text,
             tools="",
             toolbar_location=None,
             min_border_left=75,
             min_border_right=55,
-            **({"x_range": shared} if shared else {}),
         )
-        shared = panel.x_range
-        panel.x_range.range_padding = 0
         panel.axis.axis_label_text_font_style = "normal"
-        for column, legend in lines.items():
-            plane = column == "ground"
-            look = {"color": BLUE if plane else VERMILION, "line_dash": "dashed" if column == "block" else "solid"}
-            panel.line(
-                "t", column, source=history, line_width=1.8, **look, **({"legend_label": legend} if legend else {})
-            )
+        for one, legend in lines.items():
+            look: dict[str, Any] = {"color": BLUE if one == "ground" else VERMILION}
+            look |= {"line_dash": "dashed"} if one == "block" else {}
+            panel.line("t", one, source=history, line_width=1.8, **look, **({"legend_label": legend} if legend else {}))
         if name == "accelerations":
+            panel.y_range = Range1d(start=-1, end=1, name="accelerations_range")
             panel.legend.update(orientation="horizontal", padding=1, border_line_color=None)
             panel.add_layout(panel.legend[0], "above")
-            _add_g(panel, g, False)
-        panels[name] = panel
-    return panels
+            _add_g(panel, log=False)
+        panels.append(panel)
+    return column(*panels, sizing_mode="stretch_width")

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.explore.excerpt import Excerpt, Indices, evenly, thinned_lengths
-from slipsweep.grid.inputs import Inputs
 from slipsweep.model.options import MODELS
 from slipsweep.motion.waveforms import WAVEFORMS
-from slipsweep.studies.history import time_history
+from slipsweep.studies.datasets import simulate
 
 #: Points a cycle, and how many cycles at most.
 POINTS, CYCLES = 64, 3
@@ -64,17 +63,17 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     if motion.cycles > CYCLES and motion.ramp_out > 0.0:
         return None  # the first cycles alone have no ramp at their end
     inputs = {
-        name: variable
-        for name, variable in table.coords.items()
-        if name not in ("frequency", "displacement_amplitude", "structure_frequency")
+        str(name): coord.variable
+        for name, coord in table.coords.items()
+        if name not in ("frequency", "displacement_amplitude", "structure_frequency", "quantile", "threshold")
     }
-    depends = {dim for variable in inputs.values() for dim in variable.dims}
+    depends = {str(dim) for variable in inputs.values() for dim in variable.dims}
     sizes = {dim: size for dim, size in excerpt.sizes.items() if dim in depends}
     cycles = min(motion.cycles, CYCLES)
     motion, model = motion.but(cycles=cycles), MODELS.from_attributes(table.attrs)
     points = POINTS * cycles + 1
     most = most_bytes // (len(_COLUMNS) * (2 * points + 4))
-    # every position of the sliders has some, if there is room
+    # every position of the sliders has some, if they fit
     left = thinned_lengths(sizes, most, excerpt.map_dims, sizes.keys() - {*excerpt.map_dims})
     left = thinned_lengths(left, most, excerpt.map_dims)
     if math.prod(left.values()) > most:
@@ -89,8 +88,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
         given: dict[str, Any] = {
             name: variable.isel(cell, missing_dims="ignore").item() for name, variable in inputs.items()
         }
-        one = Inputs(frequency=1.0 / (2.0 * math.pi), **given)
-        history = time_history(one, times=phase, excitation=motion, model=model)
+        history = simulate(times=phase, excitation=motion, model=model, frequency=1.0 / (2.0 * math.pi), **given)
         columns = np.array([history[name].values for name in _COLUMNS])
         if np.isfinite(columns).all():
             largest = np.abs(columns).max(axis=1)

@@ -6,12 +6,12 @@
   const meta = JSON.parse(element("meta").textContent);
   const types = { f8: Float64Array, f4: Float32Array, i1: Int8Array, i2: Int16Array };
   const arrays = {};
-  for (const [name, told] of Object.entries(meta.arrays)) {
-    const packed = Uint8Array.from(atob(element("array-" + name).textContent.trim()), (c) => c.charCodeAt(0));
+  for (const [name, { data, ...about }] of Object.entries(meta.arrays)) {
+    const packed = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-    arrays[name] = { ...told, values: new types[told.dtype](await new Response(stream).arrayBuffer()) };
-    element("array-" + name).remove(); // the text is not needed twice
+    arrays[name] = { ...about, values: new types[about.dtype](await new Response(stream).arrayBuffer()) };
   }
+  element("meta").remove(); // the text is not needed twice
   const dims = meta.dims;
   const position = Object.fromEntries(dims.map((dim, i) => [dim.name, i]));
   const X = position[meta.map.x], Y = position[meta.map.y];
@@ -37,10 +37,10 @@
     const coord = arrays["coordinate_" + name];
     return coord ? coord.values[offset(coord.shape, coord.dims.map((dim) => index[position[dim]]))] : null;
   }
-  // Whether a result can be told for what is chosen: no dimension of it is hidden.
+  // Whether a result has one value for what is chosen: no dimension of it is hidden.
   const isShown = (dim) => position[dim] === X || position[dim] === Y || arrays[layer.name].dims.includes(dim);
   const own = (dim) => dim === "quantile" || dim === "threshold";
-  const isTold = (name) => name in arrays && arrays[name].dims.every((dim) => own(dim) || isShown(dim));
+  const isKnown = (name) => name in arrays && arrays[name].dims.every((dim) => own(dim) || isShown(dim));
 
   // Edges of the cells along an axis, half way between values, in the scale of the axis.
   function scaled(dim, x) { return dim.log ? Math.log10(x) : x; }
@@ -171,6 +171,7 @@
     const corner = { x: [x], y: [y], dw: [right - x], dh: [top - y] };
     figures.x_range.setv({ start: x, end: right });
     figures.y_range.setv({ start: y, end: top });
+    if (figures.map_g) figures.map_g.setv({ start: y / meta.g, end: top / meta.g });
     figures.colours.data = { image: [image], ...corner };
     figures.marks.data = { image: [overlay], ...corner };
     figures.held.data = held;
@@ -210,7 +211,7 @@
 
   // ------------------------------------------------------------------------------- readout
   function flagRows(index) {
-    if (!isTold("validity")) return arrays.validity || layer.name !== "permanent_displacement" ? [] : [["flags", "not in the file", "flags"]];
+    if (!isKnown("validity")) return arrays.validity || layer.name !== "permanent_displacement" ? [] : [["flags", "not in the file", "flags"]];
     const raised = meta.flags.filter((flag) => value("validity", index) & flag.mask);
     if (!raised.length) return [["flags", "none", "flags"]];
     return raised.map((flag) => [`${flag.kind}: ${meta.kinds[flag.kind]}`, `${flag.name}: ${flag.text}`, "flag"]);
@@ -218,8 +219,8 @@
   function rows(index) {
     const found = [Y, X].map((i) => [dims[i].title.replace(/ \(.*\)$/, ""), withUnit(dims[i].name, coordinate(dims[i].name, index)), dims[i].name]);
     if ("amplitude" in meta.coords) found.splice(1, 0, [known.amplitude.title.replace(/ \(.*\)$/, ""), withUnit("amplitude", coordinate("amplitude", index)), "amplitude"]);
-    for (const about of meta.layers) if (isTold(about.name)) found.push([about.title, layerText(about, index), about.name]);
-    if (isTold("sliding_mode")) found.push(["sliding mode", meta.modes[value("sliding_mode", index)], "mode"]);
+    for (const about of meta.layers) if (isKnown(about.name)) found.push([about.title, layerText(about, index), about.name]);
+    if (isKnown("sliding_mode")) found.push(["sliding mode", meta.modes[value("sliding_mode", index)], "mode"]);
     return [...found, ...flagRows(index)];
   }
   function readout(index, title) {
@@ -252,13 +253,13 @@
     }
     return Number.isNaN(arrays.history_scale.values[3 * cell]) ? -1 : cell;
   }
-  function nearest(index) { // the cell with a time history that is nearest in the map, or null
+  function nearest(index, fits = (cell) => place(cell) >= 0) { // the cell that is nearest in the map, or null; with a time history
     const across = (edgesOf, k) => (edgesOf[k] + edgesOf[k + 1]) / 2 / (edgesOf[edgesOf.length - 1] - edgesOf[0]);
     let best = null, least = Infinity;
     for (let j = 0; j < dims[Y].values.length; j++) {
       for (let i = 0; i < dims[X].values.length; i++) {
         const far = Math.hypot(across(edgesX, i) - across(edgesX, index[X]), across(edgesY, j) - across(edgesY, index[Y]));
-        if (far < least && place(cellAt(i, j)) >= 0) { best = cellAt(i, j); least = far; }
+        if (far < least && fits(cellAt(i, j))) { best = cellAt(i, j); least = far; }
       }
     }
     return best;
@@ -289,6 +290,9 @@
       v: row(1, 1 / omega), u: row(2, 1000 / omega ** 2),
     };
     figures.history.data = data;
+    const most = 1.05 * Math.max(...data.ground.map(Math.abs), ...data.block.map(Math.abs));
+    figures.accelerations_range.setv({ start: -most, end: most });
+    figures.accelerations_g.setv({ start: -most / meta.g, end: most / meta.g });
     const moved = clicked ? `The cell that was clicked (${described(map, clicked)}) has none; this is the nearest that has one. ` : "";
     note.textContent = `${moved}${described(map, chosen)}: the first ${store.cycles} of ${store.of} cycles.`;
     element("history-summary").textContent =
@@ -385,24 +389,28 @@
   }
   function shade() {
     for (const scale of ["displacement", "probability"]) {
-      for (const part of ["colours-", "bar-"]) {
-        const found = figures.document.get_model_by_name(part + scale);
-        if (found) found.visible = scale === layer.scale;
-      }
+      for (const part of ["colours-", "bar-"]) if (figures[part + scale]) figures[part + scale].visible = scale === layer.scale;
     }
   }
 
-  function start() {
-    // Bokeh builds its figures after the page has loaded
-    const model = window.Bokeh.documents[0];
-    const names = ["colours", "marks", "held", "chosen", "history", "x_range", "y_range", "map"];
-    if (!model || !model.is_idle || names.some((name) => !model.get_model_by_name(name))) { setTimeout(start, 20); return; }
-    figures = { document: model, ...Object.fromEntries(names.map((name) => [name, model.get_model_by_name(name)])) };
+  // A cell that slides, of which no flag says that its value is not to be relied on.
+  const isSound = (index) => value(layer.name, index) > 0 && !(arrays.validity && value("validity", index) & meta.unsound);
+
+  async function start() {
     element("history").hidden = !store;
+    await window.Bokeh.embed.embed_item(meta.figures.map, "figure-map");
+    await window.Bokeh.embed.embed_item(meta.figures.panels, "figure-panels");
+    const documents = window.Bokeh.documents;
+    while (!documents.every((one) => one.is_idle)) await new Promise((resolve) => { setTimeout(resolve, 20); });
+    const names = [
+      "map", "x_range", "y_range", "map_g", "colours", "marks", "held", "chosen", "history", "accelerations_range", "accelerations_g",
+      ...["displacement", "probability"].flatMap((scale) => ["colours-" + scale, "bar-" + scale]),
+    ];
+    figures = Object.fromEntries(names.map((name) => [name, documents.map((one) => one.get_model_by_name(name)).find(Boolean)]));
     controls();
     shade();
     draw();
-    const first = place(chosen) < 0 ? nearest(chosen) : null;
+    const first = nearest(chosen, (cell) => isSound(cell) && (!store || place(cell) >= 0)) || nearest(chosen, isSound) || nearest(chosen);
     if (first) chosen.splice(0, chosen.length, ...first);
     choose();
     let resizing; // the pixels of the marks are those of the screen

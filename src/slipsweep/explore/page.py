@@ -3,19 +3,18 @@
 Bokeh draws (its library, 1.3 MB, is put into the page), `page.js` beside this file moves the numbers: it looks
 up cells and scales them by the laws below, and computes no physics.  Everything it shows was computed by
 slipsweep and lies in the page as deflated little-endian arrays in base64.
+
+What comes from a file meets the page in its template alone, which escapes it: text as HTML, all else in one element
+of JSON.  The page's policy runs two scripts, known by their digests: Bokeh's library and `page.js`.
 """
 
 import base64
+import hashlib
 import importlib.resources
-import json
 import math
-import string
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
-from html import escape
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,7 @@ from slipsweep.model.variables import (
 #: Bytes of a page when no other number is asked for: what every mail server lets pass.
 PAGE_BYTES = 10_000_000
 
-#: Of the room beside Bokeh, the most that cells take; histories have the rest.
+#: Of the bytes that Bokeh leaves, the share that cells may take; histories have the rest.
 _CELLS_SHARE = 0.75
 
 #: Some thousands of histories: beyond them another one shows nothing new, and takes 0.8 ms to compute.
@@ -53,22 +52,18 @@ _LAWS = {"frequency": -2.0, "time_scale": 2.0}
 _BASE64 = 4 / 3
 
 
-@dataclass(frozen=True)
-class Array:
-    """An array in the page: what the page is told of it, and its bytes as text."""
+#: An array in the page: type, shape, what else is known of it, and its deflated bytes in base64.
+Array = dict[str, Any]
 
-    told: dict[str, Any]
-    text: str
 
-    @classmethod
-    def of(cls, values: NDArray[Any], **told: Any) -> "Array":
-        """Deflate an array."""
-        data = zlib.compress(np.ascontiguousarray(values).tobytes())
-        return cls({"dtype": values.dtype.str[1:], "shape": values.shape, **told}, base64.b64encode(data).decode())
+def packed(values: NDArray[Any], **about: Any) -> Array:
+    """Deflate an array."""
+    data = zlib.compress(np.ascontiguousarray(values).tobytes())
+    return {"dtype": values.dtype.str[1:], "shape": values.shape, **about, "data": base64.b64encode(data).decode()}
 
 
 def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
-    """What the page shows of its cells, with length 1 along dimensions by which nothing varies, and their inputs."""
+    """What the page shows of its cells, with length 1 along dimensions that it does not depend on, and their inputs."""
     arrays = {}
     for name in filter(excerpt.table.__contains__, SHOWN):
         variable = excerpt.table[name]
@@ -76,10 +71,10 @@ def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
         law = None
         if scale_of(name) == "displacement":
             values, law = _by_law(excerpt, values)
-        arrays[name] = Array.of(_squeezed(values), dims=variable.dims, law=law)
-    for name, coord in excerpt.table.coords.items():
-        if name not in coord.dims:
-            arrays[f"coordinate_{name}"] = Array.of(coord.values.astype("<f8"), dims=coord.dims)
+        arrays[name] = packed(values, dims=variable.dims, law=law)
+    for key, coord in excerpt.table.coords.items():
+        if key not in coord.dims:
+            arrays[f"coordinate_{key}"] = packed(coord.values.astype("<f8"), dims=coord.dims)
     return arrays
 
 
@@ -94,17 +89,6 @@ def _by_law(excerpt: Excerpt, values: NDArray[Any]) -> tuple[NDArray[Any], dict[
                 if np.allclose(first * factor, values, rtol=4e-7, atol=0.0, equal_nan=True):
                     return first, {"dim": dim, "power": _LAWS[dim]}
     return values, None
-
-
-def _squeezed(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the array with length 1 along dimensions it does not vary along, such as a mode along frequency."""
-    for axis in range(values.ndim):
-        first = values.take([0], axis)
-        if values.shape[axis] > 1 and np.array_equal(
-            np.broadcast_to(first, values.shape), values, values.dtype.kind == "f"
-        ):
-            values = first
-    return values
 
 
 # ------------------------------------------------------------------------------- the page
@@ -144,23 +128,22 @@ def write_page(
         Writing failed.
     """
     outputs.check_outputs([output], overwrite, reads=[path])
-    script = _bokeh().resources.Resources(mode="inline", components=["bokeh"]).render()
-    # the page without its arrays, and its figures and notes
-    overhead = len(script.encode()) + 150_000
+    script = _bokeh_script()
+    overhead = len(script.encode()) + 150_000  # figures and notes
     least = overhead + 50_000
     if size < least:
         raise InputError(f"--size = {size_text(size)}: must be {size_text(least)} at least, most of it Bokeh's library")
-    room = size - overhead
+    left = size - overhead
     # where frequencies follow from one another a cell takes next to nothing; if they do not, again with less
-    cells = room // 2
+    cells = left // 2
     while True:
         excerpt = read_excerpt(path, cells)
         arrays = cell_arrays(excerpt)
-        taken = sum(len(array.text) for array in arrays.values())
-        if taken <= _CELLS_SHARE * room:
+        taken = sum(len(array["data"]) for array in arrays.values())
+        if taken <= _CELLS_SHARE * left:
             break
-        cells = int(math.prod(excerpt.sizes.values()) * 0.95 * _CELLS_SHARE * room / taken)
-    histories = compute_histories(excerpt, int(min(room - taken, _HISTORIES_BYTES) / _BASE64))
+        cells = int(math.prod(excerpt.sizes.values()) * 0.95 * _CELLS_SHARE * left / taken)
+    histories = compute_histories(excerpt, int(min(left - taken, _HISTORIES_BYTES) / _BASE64))
     name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
     text = page(excerpt, arrays, histories, name, script)
     with outputs.complete_or_absent(output, overwrite) as temporary:
@@ -168,51 +151,53 @@ def write_page(
     return excerpt
 
 
-def page(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None, name: str, script: str) -> str:
-    """Return the page's HTML; `name` is that of the file, `script` Bokeh's library as HTML."""
-    from bokeh.embed import components
+def page(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None, name: str, bokeh: str) -> str:
+    """Return the page's HTML; `name` is that of the file, `bokeh` Bokeh's library."""
+    from jinja2 import Environment
+    from markupsafe import Markup
 
-    table = excerpt.table
-    drawn, divs = components(figures(excerpt))
+    attrs = excerpt.table.attrs
     if histories is not None:
         arrays = {
             **arrays,
-            "histories": Array.of(histories.values.astype("<i2")),
-            "history_scale": Array.of(histories.scale.astype("<f4")),
+            "histories": packed(histories.values.astype("<i2")),
+            "history_scale": packed(histories.scale.astype("<f4")),
         }
-    # "</" would end the script element
-    told = json.dumps(_told(excerpt, arrays, histories), ensure_ascii=False, allow_nan=False).replace("</", "<\\/")
-    blobs = "\n".join(
-        f'<script type="application/octet-stream" id="array-{key}">{array.text}</script>'
-        for key, array in arrays.items()
-    )
     files = importlib.resources.files("slipsweep.explore")
-    return string.Template((files / "page.html").read_text(encoding="utf-8")).substitute(
-        title=escape(str(table.attrs.get("title", name))),
-        file=escape(name),
-        caption=escape(caption(table)).replace("\n", "<br>"),
-        source=escape(f"{table.attrs.get('source', 'slipsweep')}; {table.attrs.get('references', '')}"),
-        notes="".join(f"<li>{note}</li>" for note in _notes(excerpt, histories)),
-        bokeh=script,
-        figures=drawn,
-        **divs,
-        blobs=blobs,
-        meta=told,
-        script=(files / "page.js").read_text(encoding="utf-8"),
+    script = (files / "page.js").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True)
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}  # Bokeh's have an order
+    template = environment.from_string((files / "page.html").read_text(encoding="utf-8"))
+    return template.render(
+        title=attrs.get("title", name),
+        file=name,
+        caption=caption(excerpt.table).split("\n"),
+        source=f"{attrs.get('source', 'slipsweep')}; {attrs.get('references', '')}",
+        notes=_notes(excerpt, histories),
+        thinned=_thinned(excerpt),
+        meta=_contents(excerpt, arrays, histories),
+        bokeh=Markup(bokeh),
+        script=Markup(script),
+        allowed=Markup(" ".join(map(_digest, (bokeh, script)))),
     )
 
 
-def _bokeh() -> ModuleType:
-    """Bokeh, which is not among what slipsweep always needs."""
+def _digest(script: str) -> str:
+    """What a content security policy knows an inline script by."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def _bokeh_script() -> str:
+    """Bokeh's library, which is not among what slipsweep always needs."""
     try:
-        import bokeh.resources
+        from bokeh.resources import Resources
     except ImportError:
         raise InputError('explore draws with Bokeh, which is not installed: pip install "slipsweep[explore]"') from None
-    return bokeh
+    return "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
 
 
-def _told(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None) -> dict[str, Any]:
-    """What the script is told beside the arrays."""
+def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None) -> dict[str, Any]:
+    """What `page.js` shows, and what it needs to know of it."""
     table = excerpt.table
     return {
         "dims": [
@@ -221,7 +206,7 @@ def _told(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | 
             | {"labels": excerpt.labels.get(dim, [])}
             for dim in excerpt.sizes
         ],
-        "coords": {key: _dimension(key) for key, coord in table.coords.items() if key not in coord.dims},
+        "coords": {key: _dimension(str(key)) for key, coord in table.coords.items() if key not in coord.dims},
         "map": {"y": excerpt.map_dims[0], "x": excerpt.map_dims[1]},
         "layers": [
             {
@@ -232,7 +217,8 @@ def _told(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | 
             }
             for name in (*excerpt.layers, *(["valueless_share"] if "valueless_share" in table else []))
         ],
-        "arrays": {key: array.told for key, array in arrays.items()},
+        "arrays": arrays,
+        "figures": figures(excerpt),
         "modes": {int(mode): mode.name.lower() for mode in SlidingMode},
         "flags": [
             {"mask": int(flag), "name": (flag.name or "").lower(), "kind": str(kind), "text": VALIDITY_TEXT[flag]}
@@ -241,6 +227,7 @@ def _told(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | 
         ],
         "kinds": {str(kind): text for kind, text in FLAG_KIND_TEXT.items()},
         "cautions": int(flags_of(FlagKind.CAUTION)),
+        "unsound": int(flags_of(FlagKind.CAUTION) | flags_of(FlagKind.NO_VALUE)),
         "g": float(table.attrs["g"]),
         "histories": None
         if histories is None
@@ -265,6 +252,18 @@ def _dimension(name: str) -> dict[str, Any]:
     }
 
 
+def _thinned(excerpt: Excerpt) -> list[tuple[str, str]]:
+    """Axes of which some values are left out, and those that are kept."""
+    return [
+        (
+            f"{dim}: {excerpt.sizes[dim]} of {length} values",
+            ", ".join(f"{value:.5g}" for value in excerpt.values(dim)) + (f" {unit(dim)}" if dim in PARAMETERS else ""),
+        )
+        for dim, length in excerpt.lengths.items()
+        if excerpt.sizes[dim] < length
+    ]
+
+
 def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
     """What the page leaves out, and how."""
     shown = {dim: excerpt.sizes[dim] for dim in excerpt.lengths}
@@ -276,13 +275,6 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
             f"Thinned: {math.prod(shown.values()):,} of the file's {math.prod(excerpt.lengths.values()):,} cells are "
             "in this page. Of each axis evenly spaced values are kept, with the first and last. Nothing is averaged."
         )
-        for dim, length in shown.items():
-            if length < excerpt.lengths[dim]:
-                kept = ", ".join(f"{value:.5g}" for value in excerpt.values(dim))
-                notes.append(
-                    f"<details><summary>{dim}: {length} of {excerpt.lengths[dim]} values</summary>{kept}"
-                    f"{' ' + unit(dim) if dim in PARAMETERS else ''}</details>"
-                )
     low, high = decades(excerpt)
     notes.append(
         "Each cell is drawn half way to its neighbours. Displacements are kept in single precision; those beyond "

@@ -25,7 +25,7 @@ from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.model.suggest import did_you_mean
-from slipsweep.model.variables import FLAG_KINDS, LIMIT_RESULTS, MOTION_FILES, RESULTS, VALIDITY_TEXT
+from slipsweep.model.variables import FLAG_KINDS, LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS, VALIDITY_TEXT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -199,9 +199,10 @@ class Table:
     def left(self) -> list[str]:
         """Coordinates along the rows; of a long table also those of one value."""
         rows = {*self.rows}
+        axes = [name for name in PARAMETERS if name in self.part.coords]
         return [
             str(name)
-            for name, one in self.part.coords.items()
+            for name, one in {name: self.part[name] for name in (*axes, *self.part.coords)}.items()
             if rows.issuperset(one.dims) and (one.dims or not self.columns) and name not in MOTION_FILES
         ]
 
@@ -382,22 +383,26 @@ def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write
 @contextmanager
 def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
     import pandas as pd
+    from xlsxwriter.exceptions import XlsxWriterException
 
     options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True}
-    with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
-        below: dict[str, int] = {}
+    below: dict[str, int] = {}
+    try:
+        with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
 
-        def write(table: Table, frame: pd.DataFrame, number: int) -> None:
-            for name in frame.select_dtypes("float32"):  # its shortest digits: those of a double would be 0.10000000149
-                frame[name] = frame[name].astype(str).astype(float)
-            start = below.get(table.name, 0)
-            frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=number == 0, index=False)
-            below[table.name] = start + len(frame) + (number == 0)
+            def write(table: Table, frame: pd.DataFrame, number: int) -> None:
+                for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
+                    frame[name] = frame[name].astype(str).astype(float)
+                start = below.get(table.name, 0)
+                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=number == 0, index=False)
+                below[table.name] = start + len(frame) + (number == 0)
 
-        yield write
-        about = pd.DataFrame(_about(tables, source))
-        about.to_excel(book, sheet_name="about", header=False, index=False)
-        book.sheets["about"].set_column(0, 1, 40)
+            yield write
+            about = pd.DataFrame(_about(tables, source))
+            about.to_excel(book, sheet_name="about", header=False, index=False)
+            book.sheets["about"].set_column(0, 1, 40)
+    except XlsxWriterException as error:
+        raise OSError(str(error)) from error
 
 
 def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
@@ -405,8 +410,8 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
     part = tables[0].part
     attrs = {str(name): str(value) for name, value in part.attrs.items()}
     flags = [("validity", "not in the table")]
-    if "validity" in part.data_vars:
-        tally = tally_in(part[["validity"]])
+    for flagged in [table.part for table in tables if "validity" in table.part.data_vars]:
+        tally = tally_in(flagged[["validity"]])
         flags = [
             (
                 f"{int(flag)} {(flag.name or '').lower()}",

@@ -20,8 +20,8 @@ At = float | str | Sequence[float | str]
 #: Numbers as near as this, of the largest on an axis, are the same: single precision keeps seven digits.
 _SAME = 1e-7
 
-#: Fewest digits that a text is taken to have: 5 stands for 5.00.
-_DIGITS = 3
+#: Fewest digits that a text is taken to have: 5 stands for 5.000.
+_DIGITS = 4
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,9 @@ from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import check_zarr, is_address, read_result
 from slipsweep.files.outputs import appear, check_outputs, writing
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, chunk_lengths, places
+from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, chunk_lengths, grid_chunks, places
 from slipsweep.grid.resources import size_text
-from slipsweep.grid.tally import Tally, tally_of
+from slipsweep.grid.tally import Tally
 
 #: A file or folder, or the address of a store.
 Place = Path | str
@@ -48,6 +48,9 @@ _BASE_MEMORY, _WORKER_MEMORY = 400_000_000, 250_000_000
 
 #: Chunks for each worker, so that all end at about the same time, and the least work of one, in cells of a sine.
 _CHUNKS_A_WORKER, _LEAST_WORK = 16, 500_000
+
+#: Cells of a finished result that are read at a time, to be counted.
+_READ_CELLS = 4_000_000
 
 #: Most cells of a chunk of a Zarr store within one of the run's, which is a shard of the store.
 _ZARR_CELLS = 500_000
@@ -154,6 +157,16 @@ def nbytes_of(path: Place) -> int:
     if path.is_dir():
         return sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
     return path.stat().st_size
+
+
+def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
+    """Count the results of a plan, read in chunks."""
+    tally = Tally()
+    for chunk in grid_chunks(plan.sizes, _READ_CELLS, plan.together):
+        part = table[list(plan.names)].isel(chunk, missing_dims="ignore")
+        tally.merge(plan.tally({name: part[name].values for name in plan.names}))
+    tally.cells = plan.cells
+    return tally
 
 
 def _complete(job: Job, path: Place) -> xr.Dataset | None:
@@ -344,8 +357,8 @@ class _Chunks:
         raise NotImplementedError
 
     def written(self, chunks: Any) -> Any:
-        """A dask array, for those who write chunks where they are computed; None if that cannot be."""
-        raise NotImplementedError
+        """A dask array of chunks that are written where they are computed; None if this process writes them."""
+        return None
 
     def write(self, number: int, arrays: Arrays) -> None:
         """Write a chunk."""
@@ -361,9 +374,6 @@ class _NetcdfChunks(_Chunks):
 
     def finished(self) -> set[int]:
         return {int(one.stem) for one in self.folder.glob("*.chunk")}
-
-    def written(self, chunks: Any) -> Any:
-        return None
 
     def write(self, number: int, arrays: Arrays) -> None:
         temporary = self.folder / f"{number:06}.tmp"
@@ -431,12 +441,14 @@ class _ZarrChunks(_Chunks):
                 files.rm(root, recursive=True)
 
     def make(self) -> None:
+        import dask.array as da
         import zarr
 
         check_zarr(self.path)
         table = self.job.described(self.job.plan.template(), "")
         for name, dtype in self.job.dtypes.items():
-            table[name] = table[name].astype(dtype).chunk()
+            one = table[name]
+            table[name] = (one.dims, da.zeros(one.shape, dtype, chunks=-1), one.attrs)  # not computed
         encoding = {name: self._encoding(table[name]) for name in self.job.dtypes}
         table.to_zarr(self.store, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
         group = zarr.open_group(self.store, mode="r+")
@@ -477,17 +489,19 @@ class _ZarrChunks(_Chunks):
     def written(self, chunks: Any) -> Any:
         import dask.array as da
 
-        about = _Region(self.store, self.cut, {name: one.dims for name, one in self._results.items()}, self.job.dtypes)
-        return da.map_blocks(_write_region, chunks, about=about, dtype=bool, meta=np.empty((0,) * chunks.ndim, bool))
+        return da.map_blocks(
+            _write_region, chunks, about=self.region, dtype=bool, meta=np.empty((0,) * chunks.ndim, bool)
+        )
 
     @property
-    def _results(self) -> dict[str, Any]:
-        return {str(name): one for name, one in self.job.plan.template().data_vars.items()}
+    def region(self) -> "_Region":
+        """What those who write chunks need to know."""
+        template = self.job.plan.template()
+        return _Region(self.store, self.cut, {name: template[name].dims for name in self.job.dtypes}, self.job.dtypes)
 
     def write(self, number: int, arrays: Arrays) -> None:
-        about = _Region(self.store, self.cut, {name: one.dims for name, one in self._results.items()}, self.job.dtypes)
         with writing(self.path):
-            about.write(self.indices[number], arrays)
+            self.region.write(self.indices[number], arrays)
 
     def finish(self, command: str, overwrite: bool) -> Tally:
         import zarr

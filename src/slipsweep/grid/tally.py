@@ -3,18 +3,12 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from slipsweep.grid.anyplan import AnyPlan
 
 #: Ratios are counted in this many classes of equal width in their logarithms, 0.1 % wide, between these.
 _CLASSES, _LEAST, _LARGEST = 32_000, 1e-7, 1e7
@@ -28,11 +22,10 @@ class Ratios:
 
     @classmethod
     def of(cls, values: NDArray[Any], others: NDArray[Any]) -> "Ratios":
-        """Count values over others, where both are positive."""
-        there = (values > 0.0) & (others > 0.0) & np.isfinite(values) & np.isfinite(others)
-        logs = np.log(values[there] / others[there])
-        ends = (math.log(_LEAST), math.log(_LARGEST))
-        return cls(np.histogram(np.clip(logs, *ends), _CLASSES, ends)[0])
+        """Count values over others, where neither is zero or missing; a negative one as the least."""
+        there = (values != 0.0) & (others != 0.0) & np.isfinite(values) & np.isfinite(others)
+        ratios = np.clip(np.divide(values[there], others[there], dtype=np.float64), _LEAST, _LARGEST)
+        return cls(np.histogram(np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST)))[0])
 
     @property
     def number(self) -> int:
@@ -105,10 +98,11 @@ class Tally:
         if "sliding_mode" in results:
             tally.modes = {mode: int(np.count_nonzero(results["sliding_mode"] == int(mode))) for mode in SlidingMode}
         if "validity" in results:
-            codes, validity = np.unique(results["validity"], return_counts=True), dict.fromkeys(Validity, 0)
-            for code, count in zip(*codes, strict=True):
-                for flag in Validity(int(code) & sum(Validity)):
-                    validity[flag] += int(count)
+            counts = np.bincount(results["validity"].astype(np.int16, copy=False).ravel().view(np.uint16))
+            validity = dict.fromkeys(Validity, 0)
+            for code in np.flatnonzero(counts).tolist():
+                for flag in Validity(code & sum(Validity)):
+                    validity[flag] += int(counts[code])
             tally.flags = validity
         if {"permanent_displacement", "newmark_displacement"} <= results.keys():
             tally.ratios = Ratios.of(results["permanent_displacement"], results["newmark_displacement"])
@@ -138,13 +132,3 @@ def _added(one: Mapping[Any, Any] | None, other: Mapping[Any, Any] | None) -> An
     if one is None or other is None:
         return dict(one or other or {}) or None
     return {name: one[name] + count for name, count in other.items()}
-
-
-def tally_of(table: "xr.Dataset", plan: "AnyPlan") -> Tally:
-    """Count the results of a plan, read in chunks."""
-    tally = Tally()
-    for chunk in grid_chunks(plan.sizes, CHUNK_CELLS, plan.together):
-        part = table[list(plan.names)].isel(chunk, missing_dims="ignore")
-        tally.merge(plan.tally({name: part[name].values for name in plan.names}))
-    tally.cells = plan.cells
-    return tally

@@ -221,7 +221,7 @@ STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = (
-    "theta", "mu_s", "amplitude", "displacement_amplitude", "frequency",
+    "theta", "mu_s", "phi", "amplitude", "displacement_amplitude", "frequency",
     "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu", "minimum_friction", "scale", "pgv",
     "arias_intensity", "time_scale",
 )  # fmt: skip

@@ -128,6 +128,8 @@ def _read_values(path: Path, lines: list[str], interval: float | None) -> Sample
         return (line.replace(",", ".") if is_decimal else line.replace(",", " ")).replace(";", " ").split()
 
     found = _numbers(path, body, values)
+    if found.size == 2 * len(body) and (np.diff(found[::2]) > 0.0).all() and len(body) > 1:
+        raise InputError(f"{path}: interval = {step:g}: the first of two columns is that of times; leave interval out")
     return Samples(_even(path, found, step), found, _unit_in(header))
 
 

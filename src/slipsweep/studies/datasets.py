@@ -210,9 +210,10 @@ def sweep(
 
 def friction_parameters(
     theta: Values,
-    mu_s: Values,
-    amplitude: Values,
+    mu_s: Values | None = None,
+    amplitude: Values | None = None,
     *,
+    phi: Values | None = None,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
@@ -227,6 +228,8 @@ def friction_parameters(
     ----------
     theta, mu_s, amplitude : float, array or DataArray
         Inclination (degrees), static friction coefficient and peak ground acceleration (m/s²), as in `sweep`.
+    phi : float, array or DataArray, optional
+        Friction angle, degrees, instead of `mu_s`.
     yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         Those that are known, as in `sweep`; each replaces its estimate.
     model : Mendez, Newmark or str
@@ -269,6 +272,7 @@ def friction_parameters(
     inputs = Inputs(
         theta=theta,
         mu_s=mu_s,
+        phi=phi,
         amplitude=amplitude,
         yield_acceleration=yield_acceleration,
         decay_rate=decay_rate,

@@ -44,7 +44,7 @@ def fragility(result: xr.Dataset, thresholds: Any = None, over: Any = None) -> x
     >>> friction = {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}}
     >>> result = slipsweep.sample(5, amplitude=[3.0, 5.0], frequency=2.0, uncertain=friction, thresholds=["50mm"])
     >>> fragility(result).exceedance_probability.round(2).values
-    array([[0.01],
+    array([[0.02],
            [1.  ]])
     """
     name = "exceedance_probability" if "exceedance_probability" in result else "permanent_displacement"

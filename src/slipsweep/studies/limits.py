@@ -155,7 +155,8 @@ def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
             part = motion.part(slab)
             solved = _solve_part(part, maximum_amplitude, steps)
             for name, values in results.items():
-                values[(*where, ...)][(*slab, ...)] = solved[name]
+                own: Any = values[(*where, ...)]  # type: ignore[arg-type]
+                own[(*slab, ...)] = solved[name]
             request.tell(math.prod(part.shape))
     return results
 

@@ -88,12 +88,11 @@ class Sampling:
     @property
     def independent(self) -> tuple[tuple[str, ...], ...]:
         """The parameters, those that are correlated with one another together, in the order of `distributions`."""
-        groups = [{name} for name in self.distributions]
-        for first, second, _ in self.correlation:
-            tied = [group for group in groups if {first, second} & group]
-            groups = [group for group in groups if group not in tied] + [set().union(*tied)]
-        ordered = [tuple(name for name in self.distributions if name in group) for group in groups]
-        return tuple(sorted(ordered, key=lambda group: [*self.distributions].index(group[0])))
+        from scipy.sparse.csgraph import connected_components
+
+        number, group = connected_components(self._matrix(), directed=False)
+        names = [*self.distributions]
+        return tuple(tuple(name for name, own in zip(names, group, strict=True) if own == k) for k in range(number))
 
     @property
     def sensitivity_runs(self) -> int:
@@ -262,16 +261,9 @@ def check_quantiles(key: str, given: Any) -> Floats:
 
 def check_thresholds(key: str, given: Any, g: float) -> Floats:
     """Displacements, m or with a unit, one at least, as an increasing coordinate."""
-    given = computed(given)
-    strings = isinstance(given, np.ndarray) and given.ndim and given.dtype.kind in "UO"
-    if isinstance(given, (list, tuple)) or strings:
-        given = check_list(key, given, "displacements")
-    if isinstance(given, (str, list)):
-        given = [
-            quantity(key, one, "displacement_amplitude", g) if isinstance(one, str) else one
-            for one in ([given] if isinstance(given, str) else given)
-        ]
-    return _increasing(key, given, "threshold")
+    entries = np.atleast_1d(np.asarray(computed(given), object)).tolist()
+    values = [quantity(key, one, "displacement_amplitude", g) if isinstance(one, str) else one for one in entries]
+    return _increasing(key, values, "threshold")
 
 
 def _increasing(key: str, given: Any, bound: str) -> Floats:

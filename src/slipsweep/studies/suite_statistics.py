@@ -24,9 +24,6 @@ REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
 #: The median, and one standard deviation of a normal distribution on either side of it.
 QUANTILES = (0.16, 0.5, 0.84)
 
-#: Most grid points whose statistics are printed.
-_MOST_LINES = 60
-
 
 def suite_statistics(
     result: xr.Dataset,
@@ -234,19 +231,19 @@ def suite_summary(result: xr.Dataset, displacement: Any = None) -> xr.Dataset:
     >>> result = slipsweep.sweep(5, 0.3, amplitude=[4.0, 6.0], excitation=suite)
     >>> print(*summary_lines(result, "50mm"), sep="\\n")
     permanent displacement (mm) over 4 motion:
-     PGA (g)  16 %  median  84 %  zero P(u > 50 mm)
-      0.4077  2.11    20.4  70.2  0.0%        25.0%
-      0.6116  37.1    77.8   235  0.0%        75.0%
+    PGA (g) 16 % median     84 % zero P(u > 50 mm)
+     0.4077  8.7   18.8     71.5 0.0%        25.0%
+     0.6116 89.3    188 1.34e+03 0.0%        75.0%
     """
     found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
     names = ["displacement_quantile", "zero_probability", "valueless_share"]
     return found[[*names, *([] if displacement is None else ["exceedance_probability"])]]
 
 
-def summary_lines(result: xr.Dataset, displacement: Any = None) -> list[str]:
+def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
     """Lines of text of `suite_summary`, a line for each grid point; parameters as `suite_summary`.
 
-    Of a large grid, only how many points it has: it is to be cut first.
+    Of more than `most` points one line that says how to have those of some.
     """
     import pandas as pd
 
@@ -255,8 +252,9 @@ def summary_lines(result: xr.Dataset, displacement: Any = None) -> list[str]:
     grid = {str(dim): size for dim, size in moved.sizes.items() if dim not in dims}
     points = int(np.prod([*grid.values()]))
     suite = grid_text({dim: moved.sizes[dim] for dim in dims})
-    if points > _MOST_LINES:
-        return [f"suite of {suite}, {points} grid points: choose values with --at NAME=VALUE for their statistics"]
+    if points > most:
+        how = "slipsweep info OUT.nc --at NAME=VALUE -d 50mm"
+        return [f"statistics over {suite} at {points} grid points: {how} prints those of some"]
     found = suite_summary(result, displacement)
     g = float(result.attrs.get("g", np.nan))
     columns: dict[str, Any] = {}

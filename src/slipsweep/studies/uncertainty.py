@@ -101,7 +101,9 @@ def plan_samples(
     InputError
         As `slipsweep.sample`.
     """
-    names = [*inputs.given]
+    # friction may be given, or drawn about, by its angle
+    by_angle = inputs.phi is not None
+    names = [name for name in inputs.given if not (by_angle and name == "mu_s")] + ["phi"] * by_angle
     if "structure_frequency" in names:
         raise InputError(
             "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
@@ -110,10 +112,11 @@ def plan_samples(
     _check_drawn(sampling, names, recorded, MODELS.of(model))
     sampling.check_given(names)
     known = {*names, *sampling.absolute}
-    needed = [*([] if "yield_coefficient" in known else ["theta", "mu_s"]), *([] if recorded else ["frequency"])]
-    if "phi" in known:
-        needed.remove("mu_s")
-    for name in needed:
+    friction = "phi" if "phi" in known else "mu_s"
+    if {"mu_s", "phi"} <= known:
+        raise InputError("phi, mu_s: must not both be given or drawn; mu_s = tan(phi)")
+    interface = () if "yield_coefficient" in known else ("theta", friction)
+    for name in (*interface, *(() if recorded else ("frequency",))):
         if name not in known:
             raise InputError(f"{name}: must be given, or drawn")
     studies = _studies(sampling, recorded)
@@ -124,7 +127,7 @@ def plan_samples(
     plan = plan_sweep(
         inputs.but(stand_ins), excitation=excitation, model=model, solver=solver, variables=["permanent_displacement"]
     )
-    dropped = {*stand_ins}
+    dropped = {*stand_ins, *(["mu_s"] if "phi" in sampling.distributions else [])}
     if "displacement_amplitude" in plan.coords and {"displacement_amplitude", "frequency"} & dropped:
         dropped.add("amplitude")  # A = ω²d of the stand-ins is nobody's amplitude
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
@@ -227,6 +230,8 @@ class SamplePlan:
             for name, variable in inputs_of(problem, coords).items()
             if name != clock and not (name == "amplitude" and self.by_displacement)
         }
+        if {"phi"} <= coords.keys() & drawn.keys():
+            own["phi"] = coords["phi"]
         everything = own | ({clock: coords[clock]} if clock in coords else {})
         # A = ω²d, and (f + offset)/f, depend on the frequency itself: no scaling law along its dimensions then
         unscaled = self.by_displacement or self.timed or (clock in drawn and drawn[clock].kind == "offset")
@@ -385,6 +390,8 @@ class SamplePlan:
         if self.clock in drawn:
             by_offset = drawn[self.clock].kind == "offset"
             relative = 1.0 + rows[self.clock] / frequency if by_offset else rows[self.clock]
+        if "phi" in arrays:
+            arrays["mu_s"] = np.tan(np.radians(arrays.pop("phi")))
         if self.by_displacement:
             omega = 2.0 * math.pi * relative * frequency
             arrays["amplitude"] = omega * omega * arrays.pop("displacement_amplitude")
