@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.coefficients import APPROXIMATIONS
 from slipsweep.jit import elementary
-from slipsweep.jit.cache import Kernel
+from slipsweep.jit.compiling import Kernel
 from slipsweep.kernels.sine import newmark
 
 HALF_PI = 0.5 * math.pi

@@ -9,9 +9,9 @@ import pytest
 
 import slipsweep
 from slipsweep import RunError
-from slipsweep.grid import engine
+from slipsweep.grid import solvers
 from slipsweep.kernels import events
-from slipsweep.kernels.grid import Results
+from slipsweep.kernels.block import UNSOLVED
 
 
 @numba.njit(error_model="numpy")
@@ -46,22 +46,19 @@ def test_a_root_that_is_not_found_is_nan() -> None:
     assert math.isnan(found(math.nan, 1.0, 0.0, 1.0))
 
 
-class Failing:
+def failing(*arguments: Any) -> None:
     """A kernel that does not solve cell 4."""
-
-    def expect(self) -> None:
-        pass
-
-    def __call__(self, grid: Any, *arguments: Any) -> None:
-        next(one for one in arguments if isinstance(one, Results)).unsolved[0] = 4
+    results = arguments[-1]
+    results[:] = 0.0
+    results[solvers.ROWS["validity"], 4:5] = UNSOLVED
 
 
 @pytest.mark.parametrize("options", [{"excitation": slipsweep.Triangle(ramp_in=1)}, {"solver": "step"}])
 def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "WAVE_KERNEL", Failing())
-    monkeypatch.setattr(engine, "STEP_KERNEL", Failing())
+    monkeypatch.setattr(solvers, "solve_waves", failing)
+    monkeypatch.setattr(solvers, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,
@@ -74,7 +71,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
 
 
 def test_a_cell_of_a_record_that_is_not_solved_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "RECORD_KERNEL", Failing())
+    monkeypatch.setattr(solvers, "solve_record", failing)
     record = slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)
     axes: dict[str, Any] = {"theta": [0.0, 5.0], "mu_s": 0.3, "scale": [1.0, 2.0, 3.0], "polarity": -1}
     with pytest.raises(RunError, match=r"theta = 5.0, mu_s = 0.3, scale = 2.0, .*polarity = -1.0: an event"):
