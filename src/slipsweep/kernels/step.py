@@ -12,7 +12,7 @@ simpson     start, middle, end     4      Runge-Kutta 4 for a rate free of V
 ==========  =====================  =====  ==================================
 
 `advance` is one step, `acceleration` is Ü while the block slides (option `rise`), `walk` goes step by step, `cut_step`
-finds the events in one, `pulse` is t1 to t5 and Eq. 12, `slide_continuously` is Eq. 4 throughout.  Any friction law
+finds the events in one, `pulse` is t1 to t5 and Eq. 12, `follow` is Eq. 4 throughout.  Any friction law
 will do: of `block.law` only μ(Üg) is used.  docs/numerics.md#step-solver
 """
 
@@ -28,14 +28,13 @@ from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
 from slipsweep.kernels.grid import Cells, solve_each
-from slipsweep.kernels.pulse import Pulse, beginning, first_pulse, motion_of, validity_before
+from slipsweep.kernels.pulse import Pulse, beginning, motion_of, validity_before
+from slipsweep.kernels.series import series_of, yield_governs
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
 from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
-from slipsweep.motion.steps import Steps
-
-RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
+from slipsweep.motion.steps import RECTANGLE, TRAPEZOID, Steps
 
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
 HELD, FOLLOWED = 3, 4
@@ -105,7 +104,7 @@ def advance(
     `start`, `middle` and `end` are Üg − Ü there.  V is largest or least where it changes its sign.
     """
     c0, c1, c2 = rate_polynomial(rule, start, middle, end)
-    taken, velocity = 1.0, state.velocity + mean_rate(c0, c1, c2, 1.0) * h
+    taken, velocity = 1.0, state.velocity + mean_rate(c0, c1, c2, 1.0) * h  # V += (Üg − Ü) h
     turn, extreme = 1.0, velocity
     if physics.opposite(c0, c0 + c1 + c2):
         turn = 2.0 / (math.sqrt((c1 / c0) * (c1 / c0) - 4.0 * (c2 / c0)) - c1 / c0)
@@ -119,8 +118,9 @@ def advance(
     h *= taken
     displacement = state.displacement + (state.velocity + (0.5 * c0 + taken * (c1 / 6.0 + taken * c2 / 12.0)) * h) * h
     peak, least = max(state.peak, velocity, extreme), min(state.least, least)
-    sliding = state.sliding and not stops
-    return taken, State(velocity, displacement, held, peak, least, sliding, state.began, state.grows)
+    return taken, State(
+        velocity, displacement, held, peak, least, state.sliding and not stops, state.began, state.grows
+    )
 
 
 @inlined
@@ -142,16 +142,17 @@ def eq4_rate(block: Block, x: float) -> float:
 
 
 @scalar
+def tabulate(block: Block, w: np.ndarray, rates: np.ndarray) -> None:
+    """Write the rates by Eq. 4 at values of w, many at a time (SIMD)."""
+    for j in range(w.size):
+        rates[j] = eq4_rate(block, block.amplitude * w[j])
+
+
+@scalar
 def point_at(block: Block, pieces: np.ndarray, p: int, tau: float) -> Point:
     """The instant τ on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
     x = math.copysign(base_acceleration(pieces, p, block.amplitude, tau), pieces[p, TOP])
     return Point(tau, x, eq4_rate(block, x))
-
-
-@inlined
-def bends(start: Point, middle: Point, end: Point, limit: float) -> bool:
-    """Whether Eq. 4 bends too much for one step: friction may decay in a layer that is thinner than steps."""
-    return abs(start.rate - 2.0 * middle.rate + end.rate) > limit and end.tau - start.tau > LEAST_STEP
 
 
 @inlined
@@ -254,7 +255,7 @@ def is_whole(how: int, start: Point, middle: Point, end: Point, longest: float, 
     """Whether a step is taken as it is: nothing happens in it that a look at its three instants could show."""
     if not state.sliding or end.tau - start.tau > longest:
         return False
-    if how == HELD or bends(start, middle, end, limit):
+    if how == HELD or abs(start.rate - 2.0 * middle.rate + end.rate) > limit:
         return how == HELD
     first, half, last = beyond(start, state), beyond(middle, state), beyond(end, state)
     return how != physics.MONOTONE or not (turns(first, half, last) or first < 0.0 < last)
@@ -275,8 +276,11 @@ def cut_step(
         longest = min(2.0 * size, longest_step(per_cycle, phase_at(pieces, p, start.tau), state))
         cut = end if start.tau + longest >= end.tau else point_at(block, pieces, p, start.tau + longest)
         middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
-        while how != HELD and bends(start, middle, cut, limit):
+        bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
+        while how != HELD and bend > limit and cut.tau - start.tau > LEAST_STEP:
+            # friction may decay in a layer that is thinner than steps
             cut, middle = middle, point_at(block, pieces, p, 0.5 * (start.tau + middle.tau))
+            bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
         if how == physics.MONOTONE:
             cut = next_event(block, pieces, p, start, cut, state)
             middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
@@ -297,8 +301,7 @@ def walk(
     h, shift, limit = (pieces[p, FINISH] - begin) / count, pieces[p, START] - begin, 0.0
     i = min(max(int((tau - begin) / h), 0), count - 1)
     if how != HELD:
-        for j in range(2 * i, 2 * count + 1):
-            rates[j] = eq4_rate(block, amplitude * w[at + j])
+        tabulate(block, w[at + 2 * i : at + 2 * count + 1], rates[2 * i :])
         # a second difference of (32/N)² of what friction takes off Üg at most
         limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * block.g * physics.friction(block, 0.0)
     first = i if begin == 0.0 else i - count
@@ -320,12 +323,6 @@ def walk(
 
 
 @scalar
-def rise(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, state: State) -> State:
-    """From τ on piece p, on which Üg > 0 does not fall, to its end."""
-    return walk(block, pieces, steps, p, tau, pieces[p, FINISH], block.rise, state)
-
-
-@scalar
 def hold(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, until: float, state: State) -> State:
     """From τ on piece p with b held, to `until` or to the stop."""
     return walk(block, pieces, steps, p, tau, until, HELD, state)
@@ -336,8 +333,7 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
     """A pulse of the paper: t1 to t5 in interval k of Üg > 0, and Eq. 12 up to the `following` one (see `train`)."""
     pieces, end, validity = wave.pieces, wave.interval[k, 1], 0
     p, tau = beginning(block, wave, k)
-    x = max(block.amplitude * pieces[p, FIRST], block.yield_acceleration)
-    b = physics.starting_acceleration(block, x)
+    b = physics.starting_acceleration(block, max(block.amplitude * pieces[p, FIRST], block.yield_acceleration))
     state = State(velocity, 0.0, b, velocity, velocity, velocity > 0.0, -math.inf, 0.0)
     for q in range(p, end):
         begin = tau if q == p else pieces[q, BEGIN]
@@ -349,11 +345,10 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
             elif top.base >= block.yield_acceleration and top.rate > 0.0:
                 grows = offset_at(pieces, q, block.amplitude, physics.starting_acceleration(block, top.base)) - begin
                 state = begun(block, top.base, pieces[q, START], grows, state)
-        if not rises and state.sliding and state.held <= 0.0:
-            validity = physics.KD_NOT_POSITIVE
         if rises:
-            state = rise(block, pieces, steps, q, begin, state)
+            state = walk(block, pieces, steps, q, begin, pieces[q, FINISH], block.rise, state)
         else:
+            validity = physics.KD_NOT_POSITIVE if state.sliding and state.held <= 0.0 else validity
             state = hold(block, pieces, steps, q, begin, pieces[q, FINISH], state)
     if state.sliding and state.held <= 0.0:
         return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
@@ -380,21 +375,6 @@ _train = train_of(pulse)
 
 
 @scalar
-def yield_governs(block: Block, wave: Wave) -> bool:
-    """Whether Eq. 4 stays at or below Üy on all rises; not said of Newmark's block, which knows no Eq. 4."""
-    largest = -math.inf if block.rise != physics.NEWMARK else math.inf
-    for i in range(wave.rises.shape[0]):
-        low, high = block.amplitude * wave.rises[i, 0], block.amplitude * wave.rises[i, 1]
-        low, before, now = max(low, block.yield_acceleration), math.inf, -math.inf
-        for j in range(33 if high > block.yield_acceleration else 0):
-            eq4 = physics.response(block, low + (high - low) * (j / 32.0))
-            if before < now > eq4:  # the vertex of the parabola through three
-                largest = max(largest, now + (eq4 - before) * (eq4 - before) / (8.0 * (2.0 * now - before - eq4)))
-            largest, before, now = max(largest, eq4), now, eq4
-    return largest <= block.yield_acceleration
-
-
-@scalar
 def follow(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, last: int, until: float) -> State:
     """Eq. 4 throughout, from rest at τ on piece p to `until` on piece `last`."""
     state = State(0.0, 0.0, 0.0, 0.0, 0.0, True, -math.inf, 0.0)
@@ -404,56 +384,7 @@ def follow(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, l
     return state
 
 
-@scalar
-def mirrored_gain(block: Block, wave: Wave, steps: Steps) -> float:
-    """Gain of V over the repeated cycle, whose halves mirror each other: what both sides share, twice.
-
-    The rest cancels.  In V it would leave its rounding, and on a plane nearly level that is more than the gain.
-    """
-    gain, drifts = 0.0, np.empty(3)
-    for p in range(wave.cycle[wave.lead], wave.cycle[wave.lead + 1]):
-        h = (wave.pieces[p, FINISH] - wave.pieces[p, BEGIN]) / steps.counts[p]
-        for i in range(steps.counts[p] if wave.pieces[p, TOP] > 0.0 else 0):
-            for j in range(3):
-                x = block.amplitude * steps.w[steps.at[p] + 2 * i + j]
-                drifts[j] = eq.drift(x, physics.friction(block, x), block.mu_s, block.tan_theta)
-            c0, c1, c2 = rate_polynomial(steps.rule, drifts[0], drifts[1], drifts[2])
-            gain += 2.0 * mean_rate(c0, c1, c2, 1.0) * h
-    return gain
-
-
-@scalar
-def slide_continuously(block: Block, wave: Wave, steps: Steps) -> Pulse:
-    """Continuous sliding from the first Üg ≥ Üy on, as one pulse: Eq. 4 throughout, and repeated cycles as a series."""
-    pieces = wave.pieces
-    velocity, displacement, peak, gain, moved, most, known = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1
-    k = first_pulse(block, wave, 0)
-    p, tau = beginning(block, wave, k) if k < wave.height.size else (pieces.shape[0], 0.0)
-    for c in range(wave.shape.size):
-        first, last = wave.cycle[c], wave.cycle[c + 1] - 1
-        if last < p:
-            continue
-        repeats = float(wave.repeats if wave.repeats > 0 and c == wave.lead else 1)
-        begin, end = pieces[first, BEGIN], pieces[last, FINISH]
-        if first <= p:
-            before = follow(block, pieces, steps, first, begin, p, tau)
-            after = follow(block, pieces, steps, p, tau, last, end)
-            velocity, displacement, peak = after.velocity, after.displacement, after.peak
-            rest = pieces[last, END] - phase_at(pieces, p, tau)
-            gain, moved = before.velocity + velocity, before.displacement + before.velocity * rest + displacement
-            most = max(before.peak, before.velocity + peak)
-            repeats -= 1.0
-        elif wave.shape[c] != known:
-            whole = follow(block, pieces, steps, first, begin, last, end)
-            gain, moved, most = whole.velocity, whole.displacement, whole.peak
-        known = wave.shape[c]
-        if steps.mirrored and c == wave.lead:
-            gain = mirrored_gain(block, wave, steps)
-        if repeats > 0.0:
-            peak = max(peak, velocity + most + max(0.0, (repeats - 1.0) * gain))
-            displacement += repeats * (moved + math.pi * (2.0 * velocity + gain * (repeats - 1.0)))
-            velocity += repeats * gain
-    return Pulse(velocity, displacement, peak, 0.0, 0.0, 0.0, 0)
+_slide_continuously = series_of(follow)
 
 
 @scalar
@@ -463,7 +394,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps
     validity, unknown = validity_before(block, wave), math.nan if block.sliding_mode < 0 else 0.0
     found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
     if block.sliding_mode == eq.CONTINUOUS:
-        found = slide_continuously(block, wave, steps)
+        found = _slide_continuously(block, wave, steps)
     elif block.sliding_mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
         validity |= physics.YIELD_GOVERNS if yield_governs(block, wave) else 0
         found = _train(block, options, wave, steps, steps.known)
@@ -472,8 +403,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps
 
 @scalar
 def _solve(cell: Cell, common: tuple[Options, Wave, Steps]) -> Motion:
-    options, wave, steps = common
-    return solve_cell(exponential(), cell, options, wave, steps)
+    return solve_cell(exponential(), cell, *common)
 
 
 @kernel
