@@ -193,7 +193,7 @@ def test_order_of_every_waveform(waveform: str, rule: str) -> None:
     slow = [
         f"{c}: {b:.1e} to {a:.1e}"
         for c, b, a in zip(cases, before, after, strict=True)
-        if a > max(b / times**0.75, rounding)
+        if a > max(b / times**0.6, rounding)
     ]
     assert not slow, "below first order"
     seen = after > rounding
