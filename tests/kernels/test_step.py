@@ -16,11 +16,11 @@ from slipsweep.jit.decorators import inlined
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.block import Motion, Options
 from slipsweep.kernels.grid import Cells
-from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_cell, solve_steps
+from slipsweep.kernels.step import solve_cell, solve_steps
 from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.steps import Steps, own_steps, steps_of
+from slipsweep.motion.steps import RECTANGLE, SIMPSON, TRAPEZOID, Steps, own_steps, steps_of
 from slipsweep.motion.waveforms import Harmonics, Sine, Square, Triangle, Waveform
 from tests.support.cases import read_cases
 from tests.support.hard_cells import read_hard_cases
@@ -193,7 +193,7 @@ def test_order_of_every_waveform(waveform: str, rule: str) -> None:
     slow = [
         f"{c}: {b:.1e} to {a:.1e}"
         for c, b, a in zip(cases, before, after, strict=True)
-        if a > max(b / times**0.75, rounding)
+        if a > max(b / times**0.6, rounding)
     ]
     assert not slow, "below first order"
     seen = after > rounding
@@ -276,7 +276,7 @@ def test_eq12_by_hand() -> None:
     first = asin(least / amplitude)
     velocity = amplitude * (cos(first) + 1.0) - least * (pi - first)
     assert velocity > 0.0, "it still slides at t5"
-    displacement = amplitude * (cos(first) * (pi - first) + sin(pi) - sin(first)) - least * (pi - first) ** 2 / 2
+    displacement = amplitude * (cos(first) * (pi - first) + sin(first)) - least * (pi - first) ** 2 / 2
     exact = displacement + velocity**2 / (2 * least)
     found = solve(
         Sine(cycles=1), "simpson", 1024, theta=0.0, mu_s=mu_s, amplitude=amplitude, yield_acceleration=least,

@@ -12,12 +12,12 @@ from slipsweep.kernels.grid import Cells
 from slipsweep.kernels.record import solve_record
 from slipsweep.kernels.sine.newmark import solve_newmark_sine
 from slipsweep.kernels.sine.solve import solve_sine
-from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_steps
+from slipsweep.kernels.step import solve_steps
 from slipsweep.kernels.waves import solve_waves
 from slipsweep.model.options import Mendez, Newmark, Step
 from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.motion.steps import own_steps, steps_of
+from slipsweep.motion.steps import RECTANGLE, SIMPSON, TRAPEZOID, own_steps, steps_of
 from slipsweep.motion.waveforms import Sine, Waveform
 
 if TYPE_CHECKING:

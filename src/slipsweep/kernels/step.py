@@ -28,7 +28,7 @@ from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
 from slipsweep.kernels.grid import Cells, solve_each
-from slipsweep.kernels.pulse import Pulse, beginning, validity_before
+from slipsweep.kernels.pulse import Pulse, beginning, motion_of, validity_before
 from slipsweep.kernels.series import series_of, yield_governs
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq

@@ -7,7 +7,10 @@ import numpy as np
 
 from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, LAST, TERM, TOP, Wave
 
-#: Cycles from which on the rounding of V over one (1e-14) is kept from adding up (`kernels.step.mirrored_gain`).
+#: Rules by which steps are taken.
+RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
+
+#: Cycles from which on the rounding of V over one (1e-14) is kept from adding up (`kernels.series`).
 _MANY = 64
 
 
