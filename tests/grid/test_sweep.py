@@ -15,6 +15,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.inputs import Inputs
+from slipsweep.kernels.grid import Cells
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -39,17 +40,18 @@ PUBLIC = ("friction_parameters", "limit_amplitude", "simulate", "sweep")
 def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Cells of each call of a motion kernel."""
     solved: list[int] = []
+    solver_of = engine.solver_of
 
-    def counting(kernel: Any) -> Any:
-        def call(grid: Any, first: int, last: int, *rest: Any) -> Any:
-            solved.append(last - first)
-            return kernel(grid, first, last, *rest)
+    def counting(*arguments: Any) -> Any:
+        solve, cost = solver_of(*arguments)
 
-        call.expect = kernel.expect  # type: ignore[attr-defined]
-        return call
+        def call(cells: Cells, results: Any) -> None:
+            solved.append(results.shape[1])
+            solve(cells, results)
 
-    for name in ("SINE_KERNEL", "NEWMARK_SINE_KERNEL", "STEP_KERNEL"):
-        monkeypatch.setattr(engine, name, counting(getattr(engine, name)))
+        return call, cost
+
+    monkeypatch.setattr(engine, "solver_of", counting)
     return solved
 
 

@@ -16,9 +16,9 @@ from scipy.integrate import solve_ivp
 import slipsweep
 from slipsweep import InputError, Record, sweep
 from slipsweep.kernels.block import MONOTONE, Cell, block_of
-from slipsweep.kernels.cycle.eq4 import eq4_integrals
-from slipsweep.kernels.cycle.legs import STATE_SIZE
+from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.linear import held_stop
+from slipsweep.model.friction import exponential
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.pieces import BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START
 from tests.support.cases import choices
@@ -53,8 +53,8 @@ def shaking() -> Record:
 
 @njit
 def _followed(cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray) -> tuple[float, float]:
-    block = block_of(Cell(*cell), MONOTONE, G)
-    return eq4_integrals(block, pieces, 0, pieces[0, BEGIN], pieces[0, FINISH], np.empty(STATE_SIZE))
+    block = block_of(exponential(), Cell(*cell), MONOTONE, G)
+    return eq4_integrals(block, pieces, 0, pieces[0, BEGIN], pieces[0, FINISH])
 
 
 def _follow(decay: float, x: float, change: float) -> tuple[float, float]:
