@@ -50,7 +50,8 @@ def environment(tmp_path: Path, **others: str) -> dict[str, str]:
 
 
 def run(code: str, env: dict[str, str], *arguments: str) -> str:
-    done = subprocess.run([sys.executable, "-c", code, *arguments], env=env, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert not done.stderr
     return done.stdout.strip()

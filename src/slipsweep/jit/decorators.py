@@ -30,8 +30,8 @@ inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
 
 
-#: The same for functions of a friction law, which kernels are given as values: one that is registered is no object
-#: at a place in memory, and numba keeps a kernel on disk that is given it.
+#: The same for functions that are passed as values, those of a friction law and those that solve a cell: numba keeps a
+#: kernel on disk only if such a function is none that was compiled before.
 registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
     error_model="numpy", fastmath={"contract", "arcp"}
 )

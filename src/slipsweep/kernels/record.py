@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, scalar, uncounted
+from slipsweep.jit.decorators import inlined, registered, scalar, uncounted
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
@@ -262,7 +262,7 @@ def respond(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
     return Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous)
 
 
-@scalar
+@registered
 def _solve(cell: Cell, problem: Problem) -> Motion:
     return respond(exponential(), cell, problem)
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, registered, scalar
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.events import root_of
@@ -401,7 +401,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps
     return motion_of(block, validity, found)
 
 
-@scalar
+@registered
 def _solve(cell: Cell, common: tuple[Options, Wave, Steps]) -> Motion:
     return solve_cell(exponential(), cell, *common)
 

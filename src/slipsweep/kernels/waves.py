@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import scalar, uncounted
+from slipsweep.jit.decorators import registered, scalar, uncounted
 from slipsweep.kernels.block import (
     YIELD_GOVERNS,
     Cell,
@@ -51,7 +51,7 @@ def solve_exactly(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
     return motion_of(block, validity, found)
 
 
-@scalar
+@registered
 def _solve(cell: Cell, problem: Problem) -> Motion:
     return solve_exactly(exponential(), cell, problem)
 
