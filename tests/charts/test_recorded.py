@@ -195,19 +195,6 @@ def test_what_is_refused_of_recorded_motions(result: xr.Dataset) -> None:
             result.slipsweep.chart(kind, **options)
 
 
-def test_the_book_of_a_suite(result: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From a file, as from a dataset."""
-    monkeypatch.chdir(tmp_path)
-    text = (SWEEPS / "suite.toml").read_text().replace("data/suite", str(SWEEPS / "data" / "suite"))
-    Path("suite.toml").write_text(text.replace("num = 15", "num = 4").replace("num = 5", "num = 2"))
-    assert main(["run", "suite.toml", "-q"]) == 0
-    assert main(["chart", "suite.nc", "-o", "suite.pdf"]) == 0
-    assert Path("suite.pdf").read_bytes().count(b"/Type /Page ") == 5
-    assert main(["chart", "suite.nc"]) == 0
-    kinds = ("fragility", "histogram", "intensity", "motions")
-    assert sorted(path.name for path in tmp_path.glob("*.png")) == [f"suite-{kind}.png" for kind in kinds]
-
-
 def test_a_single_record() -> None:
     record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
     result = slipsweep.sweep(5.0, [0.3, 0.4], excitation=record, scale=[1.0, 1.5, 2.0], polarity="both")
@@ -220,7 +207,7 @@ def test_a_single_record() -> None:
 # --------------------------------------------------------------------- drawn as a whole
 
 
-def test_limits_of_a_suite(suite: slipsweep.Suite, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_limits_of_a_suite(suite: slipsweep.Suite) -> None:
     """Some motions do not reach the displacement: their limits are above all others."""
     limits = slipsweep.limit_amplitude(0.05, 5.0, [0.3, 0.4], excitation=suite, maximum_amplitude=7.2, model="newmark")
     missing = limits.limit_amplitude.isnull().sum("motion").values
@@ -235,18 +222,6 @@ def test_limits_of_a_suite(suite: slipsweep.Suite, tmp_path: Path, capsys: pytes
     axes = Figure().subplots()
     assert limits.isel(mu_s=0).slipsweep.chart(ax=axes) is axes
     assert [text.get_text() for text in axes.get_xticklabels()] == list(suite.labels)
-    # and in the table of the command line
-    (tmp_path / "a.toml").write_text(
-        f'[excitation]\nrecords = "{SWEEPS}/data/suite/*.AT2"\n[model]\nfriction = "newmark"\n'
-        "[axes.theta]\nvalues = [5]\n[axes.mu_s]\nvalues = [0.3, 0.4]\n[axes.amplitude]\nvalues = [1]\n"
-    )
-    assert main(["limit", str(tmp_path / "a.toml"), "-d", "5cm", "--maximum-amplitude", "7.2"]) == 0
-    told = capsys.readouterr().out
-    low, middle = (f"{ordered[0, 3:5].mean():.6g}", f"{ordered[1, 3:5].mean():.6g}")
-    assert low in told
-    assert middle in told
-    assert f"of 8, {missing[-1]} of them not reached" in told
-    assert all(label in told for label in suite.labels)
 
 
 def test_every_half_wave_of_a_history_has_its_mode() -> None:
@@ -258,23 +233,12 @@ def test_every_half_wave_of_a_history_has_its_mode() -> None:
     assert np.count_nonzero(modes == 1) == history.stick_slip_pulses
     assert np.count_nonzero(modes == 2) == history.continuous_pulses
     assert min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
-    for name in ("half_wave_start", "half_wave_end"):
-        at = np.asarray(np.interp(history[name], 2.0 * record.times, -2.5 * record.acceleration))
-        np.testing.assert_allclose(at[1:-1], 0.0, atol=1e-12)
-    within = [
-        history.ground_acceleration.sel(time=slice(*ends)).max()
-        for ends in zip(history.half_wave_start, history.half_wave_end, strict=True)
-    ]
-    np.testing.assert_allclose(history.half_wave_peak, within, rtol=1e-12)
     figure = history.slipsweep.chart("history")
     for name, mode in (("stuck", 0), ("stick_slip", 1), ("continuous", 2)):
         (boxes,) = labelled(figure, name)
         spans = np.array([path.get_extents().intervalx for path in boxes.get_paths()])
         np.testing.assert_allclose(spans[:, 0], history.half_wave_start[modes == mode], rtol=1e-12)
         np.testing.assert_allclose(spans[:, 1], history.half_wave_end[modes == mode], rtol=1e-12)
-    newmark = slipsweep.simulate(5.0, 0.35, model="newmark", **given)
-    assert set(newmark.half_wave_mode.values) == {0, 1}
-    assert np.count_nonzero(newmark.half_wave_mode == 1) == newmark.stick_slip_pulses
 
 
 def test_the_command_line_draws_what_the_accessor_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -318,3 +282,35 @@ def test_a_chart_in_axes_of_another_figure() -> None:
     figure.draw_without_rendering()
     boxes = [axes.get_tightbbox() for axes in (left, right)]
     assert boxes[0].x1 <= boxes[1].x0  # nothing of one lies in the other
+
+
+# ----------------------------------------------------------------------- uncertain inputs
+
+
+def test_statistics_are_drawn_as_they_are() -> None:
+    """Probabilities, quantiles and Sobol indices of a sample, over the amplitude and at one point."""
+    uncertain = {
+        "mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4},
+        "amplitude": {"kind": "factor", "distribution": "lognorm", "s": 0.3},
+    }
+    found = slipsweep.sample(
+        5, amplitude=[3.0, 4.5, 6.0], frequency=[1.0, 2.0], uncertain=uncertain, samples=256, sensitivity=True
+    )
+    at = found.sel(frequency=2.0)
+    figure = found.slipsweep.chart("fragility", at={"frequency": "2000mHz"})
+    for line, threshold in zip(figure.axes[0].lines, found.threshold, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), at.exceedance_probability.sel(threshold=threshold))
+    assert "uncertain: μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)" in caption(figure)
+    bands = found.slipsweep.chart("quantiles", at={"frequency": 2})
+    (median,) = (line for line in bands.axes[0].lines if line.get_label() == "median")
+    np.testing.assert_allclose(median.get_ydata(), at.displacement_quantile.sel(quantile=0.5) * 1000.0)
+    lines = {line.get_label(): line for line in found.slipsweep.chart("sensitivity", at={"frequency": 2}).axes[0].lines}
+    for symbol, name in (("A", "amplitude"), ("μs", "mu_s")):
+        np.testing.assert_array_equal(lines[symbol].get_ydata(), at.total_index.sel(input=name))
+    bars = found.slipsweep.chart("sensitivity", at={"frequency": 2, "amplitude": 6.0}).axes[0]
+    order = [text.get_text() for text in bars.get_yticklabels()]
+    totals = [patch.get_width() for patch in bars.patches][: len(order)]
+    point = at.sel(amplitude=6.0).total_index
+    names = {"A": "amplitude", "μs": "mu_s"}
+    np.testing.assert_allclose(totals, [point.sel(input=names[symbol]).item() for symbol in order])
+    assert totals == sorted(totals)

@@ -89,9 +89,6 @@ def axes_of(meta: dict[str, Any]) -> dict[str, list[float]]:
     return {dim["name"]: dim["values"] for dim in meta["dims"]}
 
 
-# ------------------------------------------------------------------------------- thinning
-
-
 # -------------------------------------------------------------------- what is in the page
 
 

@@ -10,7 +10,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from slipsweep.files.results import ResultFile
+from slipsweep.files.opening import read_result
 from slipsweep.model.variables import Validity
 from tests.support.commands import command
 
@@ -245,8 +245,8 @@ def test_nco_reads_every_variable(files: Path, name: str) -> None:
 def test_cdo_reads_every_variable(files: Path, name: str) -> None:
     """CDO knows three dimensions beside time; of larger grids NCO cuts slices for it."""
     cdo, ncks, ncwa = program("cdo"), program("ncks"), program("ncwa")
-    with ResultFile(files / f"{name}.nc") as file:
-        coordinates = {*file.coordinates}
+    with read_result(files / f"{name}.nc") as table:
+        coordinates = {*table.coords}
     with netCDF4.Dataset(files / f"{name}.nc") as file:
         widest = max((variable.dimensions for variable in file.variables.values()), key=len)
         cut = list(widest)[:-3]

@@ -1,5 +1,7 @@
 """Time histories of slides that last long after the shaking: few points, and all of the slide."""
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -101,3 +103,22 @@ def test_velocity_has_no_gaps_where_pieces_meet(shaken: str, model: Any) -> None
     velocity = slipsweep.simulate(excitation=excitation, **given, times=np.unique(about.clip(0))).relative_velocity
     assert np.abs(np.diff(velocity)[np.diff(velocity.time) < 1e-12]).max() < 1e-10
     assert velocity.max() > 0.01
+
+
+ENDLESS = """
+import os, signal, threading, time
+import slipsweep
+block = {"theta": 5, "mu_s": 0.38, "amplitude": 9.5, "frequency": 1.8, "yield_acceleration": 0.59, "decay_rate": 2.7}
+slipsweep.simulate(**block, times=[1.0])
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+began = time.monotonic()
+try:
+    slipsweep.simulate(**block, excitation=slipsweep.Sine(cycles=1_000_000_000), times=[1.0, 1e8])
+except KeyboardInterrupt:
+    print("heard", time.monotonic() - began < 20.0)
+"""
+
+
+def test_a_history_of_many_cycles_hears_ctrl_c() -> None:
+    done = subprocess.run([sys.executable, "-c", ENDLESS], capture_output=True, text=True, timeout=300, check=False)
+    assert (done.stdout, done.stderr) == ("heard True\n", "")

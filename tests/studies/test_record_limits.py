@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from slipsweep import InputError, Mendez, Record, limit_amplitude, read_record, sweep
+from slipsweep import InputError, Mendez, Record, limit_amplitude, sweep
 from slipsweep.model.variables import RECORD_COUNTS, LimitStatus
-from tests.support.commands import command
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 
@@ -98,29 +96,3 @@ def test_no_limit_and_what_is_refused(shaking: Record) -> None:
         limit_amplitude(0.1, 5.0, 0.4)
     with pytest.raises(InputError, match="has no acceleration to scale"):
         limit_amplitude(0.1, 5.0, 0.4, excitation=Record.sampled([0.0, 0.0, 0.0], 0.1))
-
-
-def test_on_the_command_line(tmp_path: Path) -> None:
-    text = (
-        f'[excitation]\nrecord = "{SYNTHETIC}"\npolarity = "both"\n'
-        "[axes.theta]\nvalues = [0, 5]\n[axes.mu_s]\nvalues = [0.4]\n[axes.time_scale]\nvalues = [1, 2]\n"
-        "[axes.scale]\nvalues = [1, 2]\n"
-    )
-    (tmp_path / "a.toml").write_text(text)
-    done = command(tmp_path, "limit", "a.toml", "-d", "5cm", "-d", "20cm", "-o", "l.nc", "-o", "l.png")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "16 limits (2 theta x 1 mu_s x 2 time_scale x 2 polarity x 2 displacement)" in done.stdout
-    record = read_record(SYNTHETIC)
-    expected = limit_amplitude(
-        [0.05, 0.2], [0.0, 5.0], [0.4], excitation=record, polarity="both", time_scale=[1.0, 2.0]
-    )
-    with xr.open_dataset(tmp_path / "l.nc", mask_and_scale=False) as found:
-        for name in expected.data_vars:
-            np.testing.assert_array_equal(found[name], expected[name], err_msg=str(name))
-        np.testing.assert_array_equal(found.record_acceleration, record.acceleration)
-    # of a result as of its sweep file
-    assert command(tmp_path, "run", "a.toml", "-q").returncode == 0
-    again = command(tmp_path, "limit", "a.nc", "-d", "5cm", "-d", "20cm", "-o", "m.nc", "-q")
-    assert (again.returncode, again.stderr) == (0, "")
-    with xr.open_dataset(tmp_path / "l.nc") as one, xr.open_dataset(tmp_path / "m.nc") as other:
-        xr.testing.assert_equal(one, other)

@@ -168,7 +168,7 @@ def _summarize(table: "xr.Dataset") -> None:
 
 
 def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":
-    """The motion of the plane that the options name."""
+    """The motion of the base that the options name."""
     if record is None:
         for name in reading:
             raise InputError(f"{option_name(name)}: only with --record, the file of a recorded motion")

@@ -46,24 +46,10 @@ Indices = dict[str, NDArray[np.intp]]
 def thinned_lengths(
     lengths: Mapping[str, int], cells: int, map_dims: Sequence[str] = (), whole: Collection[str] = ()
 ) -> dict[str, int]:
-    """Cut the axes of a grid down to a number of cells.
+    """Lengths of the axes of a grid cut down to a number of cells, the longest cut first.
 
-    Parameters
-    ----------
-    lengths : mapping of str to int
-        Dimensions and their lengths.
-    cells : int
-        The most cells that may remain, at least 1.
-    map_dims : sequence of str
-        Dimensions of the map: four of their values count as one of another dimension, since a map
-        needs more of them than a slider.
-    whole : collection of str
-        Dimensions that are not cut.
-
-    Returns
-    -------
-    dict of str to int
-        The lengths, the longest cut first; a dimension of the map keeps two values.
+    Four values of a dimension of the map count as one of another, since a map needs more of them than a slider; it
+    keeps two values.  Dimensions in `whole` are not cut.
     """
     left = dict(lengths)
     least = {dim: n if dim in whole else min(n, 2) if dim in map_dims else 1 for dim, n in lengths.items()}
@@ -86,18 +72,9 @@ def evenly(length: int, kept: int) -> NDArray[np.intp]:
 class Excerpt:
     """What a page shows of a result.
 
-    Attributes
-    ----------
-    table : xr.Dataset
-        Coordinates (increasing along each dimension) and the results in `SHOWN`.
-    map_dims : tuple of str
-        Dimensions up and across the map.
-    lengths : dict of str to int
-        Lengths of the dimensions in the file.
-    sizes : dict of str to int
-        Lengths of all dimensions of the page.
-    labels : dict of str to list of str
-        Names along dimensions that have no numbers: cases and motions.
+    `table` has the coordinates, which increase along each dimension, and the results in `SHOWN`; `map_dims` are the
+    dimensions up and across the map; `lengths` are those of the file, `sizes` those of the page; `labels` are names
+    along dimensions that have no numbers: cases and motions.
     """
 
     table: xr.Dataset

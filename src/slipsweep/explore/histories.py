@@ -22,18 +22,10 @@ _COLUMNS = ("block_acceleration", "relative_velocity", "relative_displacement")
 class Histories:
     """Time histories of some cells, over phase: what they are at ω = 1 rad/s.
 
-    Attributes
-    ----------
-    keep : dict of str to ndarray
-        Dimensions that histories depend on, and the indices of the excerpt that have them.
-    phase, ground : ndarray
-        Phase (rad), and ground acceleration over its amplitude.
-    values : ndarray of int16, shape (..., quantity, point)
-        Block acceleration, relative velocity and displacement, in units of `scale`.
-    scale : ndarray of float32, shape (..., quantity)
-        NaN where the cell has no history.
-    cycles : int
-        Cycles shown.
+    `keep` has the dimensions that histories depend on, and the indices of the excerpt that have them.  `phase` (rad)
+    has the points of `cycles` cycles, `ground` the ground acceleration over its amplitude.  `values`, of shape
+    (..., quantity, point), are block acceleration, relative velocity and displacement in units of `scale`, of shape
+    (..., quantity), which is NaN where a cell has no history.
     """
 
     keep: Indices

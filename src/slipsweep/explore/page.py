@@ -91,39 +91,13 @@ def _by_law(excerpt: Excerpt, values: NDArray[Any]) -> tuple[NDArray[Any], dict[
     return values, None
 
 
-# ------------------------------------------------------------------------------- the page
-
-
-def write_page(
-    path: Path,
-    output: Path,
-    *,
-    size: int = PAGE_BYTES,
-    overwrite: bool = False,
-) -> Excerpt:
-    """Write the page of a result; complete or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        A file that slipsweep wrote.
-    output : Path
-        The page.
-    size : int
-        The most bytes that the page may have.
-    overwrite : bool
-        Replace `output` if it exists.
-
-    Returns
-    -------
-    Excerpt
-        What the page shows.
+def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: bool = False) -> Excerpt:
+    """Write the page of a result, of at most `size` bytes, complete or not at all; return what it shows.
 
     Raises
     ------
     InputError
-        The file cannot be read or drawn, `size` is too small, Bokeh is not installed, or the
-        output exists.
+        The file cannot be read or drawn, `size` is too small, Bokeh is not installed, or the output exists.
     RunError
         Writing failed.
     """

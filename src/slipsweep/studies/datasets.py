@@ -329,7 +329,7 @@ def simulate(
     Dataset
         Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²),
         `friction_coefficient` (what Eq. 1 gives for the two; not with `yield_coefficient`), `relative_velocity` (m/s)
-        and `relative_displacement` (m); and the results of `sweep` for the case.  Where the plane's acceleration
+        and `relative_displacement` (m); and the results of `sweep` for the case.  Where the base's acceleration
         jumps, as at the end of a record, the values are those after the jump.  NaN where
         the case has no value (`validity`).
 
@@ -583,7 +583,7 @@ def sample(
           depend on the frequency (of a record: the time scale) and have no such dimension (but with
           `displacement_amplitude`).  Under a record there is no `mode_share`.
         - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the
-          variance of the displacement that an input makes alone, and with all that depends on it.
+          variance of the displacement that an input makes by itself, and with all that depends on it.
           `first_order_interval` and `total_interval` are their 95 % intervals (dimension `bound`), by a bootstrap.
           Inputs that are correlated count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
           `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).  They lack the

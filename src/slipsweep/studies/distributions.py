@@ -53,7 +53,7 @@ class Distribution:
             return np.asarray(self.frozen.ppf(uniform), np.float64) * self.unit
 
     def applied(self, base: Any, draws: Floats) -> Floats:
-        """The parameter's values: draws alone, or with the values they are relative to."""
+        """The parameter's values: draws, or draws with the values they are relative to."""
         if self.kind == "absolute":
             return draws
         with np.errstate(over="ignore"):

@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 256
 
-#: Cost of a limit beside the scan of its block, in cells of the cycle solver.
+#: Cost of a limit in addition to the scan of its block, in cells of the cycle solver.
 _COST = 100.0
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
@@ -167,7 +167,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     displacement = arrays.pop("displacement")
     amplitudes = _scanned_amplitudes(problem, arrays, maximum_amplitude, steps)
     hides = limit_scans.UNDER_RECORD if isinstance(problem.excitation, Record) else limit_scans.UNDER_WAVEFORM
-    # the dimensions of the grid are kept here, as blocks that differ in their frequency alone are solved once
+    # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
     every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
     lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
     names = tuple({"permanent_displacement", "validity", *(change.result for change in hides.changes)})

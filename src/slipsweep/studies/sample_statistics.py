@@ -18,7 +18,7 @@ from slipsweep.studies.sampling import Sampling
 
 Floats = NDArray[np.float64]
 
-#: Results of a grid point, and their dimensions beside those of the grid.
+#: Results of a grid point, and their dimensions in addition to those of the grid.
 RESULTS: dict[str, tuple[str, ...]] = {
     "displacement_quantile": ("quantile",),
     "mean_displacement": (),

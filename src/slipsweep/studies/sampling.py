@@ -113,7 +113,7 @@ class Sampling:
         """Numbers from 0 to 1 that fill a cube of so many dimensions: (dimension, sample)."""
         from scipy.stats import qmc
 
-        # a generator of its own: the numbers depend on the seed alone
+        # a generator of its own: the numbers depend only on the seed
         generator = np.random.default_rng(self.seed)
         if self.method == "random":
             uniform = generator.random((self.samples, dimensions))
@@ -156,9 +156,7 @@ class Sampling:
             if one.kind != "absolute" and name not in given and not estimated:
                 raise InputError(f'{self.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
         if "yield_acceleration" in self.distributions and "yield_coefficient" in {*given, *self.distributions}:
-            raise InputError(
-                f"{self.key('yield_acceleration')}: not allowed beside yield_coefficient, which replaces it"
-            )
+            raise InputError(f"{self.key('yield_acceleration')}: not allowed with yield_coefficient, which replaces it")
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -221,7 +219,7 @@ def check_sampling(
     }
     for other in ("displacement_amplitude", "scale"):
         if {"amplitude", other} <= distributions.keys():
-            raise InputError(f"{keys or 'uncertain.'}{other}: not allowed beside amplitude")
+            raise InputError(f"{keys or 'uncertain.'}{other}: not allowed with amplitude")
 
     method = check_choice(f"{keys}method", method, METHODS)
     samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)

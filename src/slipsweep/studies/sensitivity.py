@@ -21,7 +21,7 @@ from slipsweep.studies.sampling import Sampling
 
 Floats = NDArray[np.float64]
 
-#: Results of a grid point, and their dimensions beside those of the grid.
+#: Results of a grid point, and their dimensions in addition to those of the grid.
 RESULTS: dict[str, tuple[str, ...]] = {
     "first_order_index": ("input",),
     # in this order: CDO reads no variable whose last dimension but one has texts
@@ -41,7 +41,7 @@ _PARTS = 1024
 #: Displacements that differ by less, relative to the largest, differ by rounding.
 _SAME = 1e-12
 
-#: Cost of the indices of a grid point beside its runs, in cells of the cycle solver.
+#: Cost of the indices of a grid point in addition to its runs, in cells of the cycle solver.
 WORK = 30_000
 
 

@@ -75,7 +75,7 @@ def suite_statistics(
 
     Notes
     -----
-    A share of zero displacements beside the distribution of the others follows Bray and Travasarou [1]_.
+    A share of zero displacements and the distribution of the others follows Bray and Travasarou [1]_.
 
     References
     ----------

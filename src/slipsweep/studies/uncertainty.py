@@ -63,16 +63,16 @@ class Study:
     runs : int
         How many there are of each.
     results : mapping of str to tuple of str
-        Results, and their dimensions beside those of the grid.
+        Results, and their dimensions in addition to those of the grid.
     reduce : callable
         ``reduce(sampling, solved, frequency)`` gives the results of grid points: see
         `sample_statistics.statistics_of_samples`.
     by_frequency : collection of str
         Results that depend on the frequency even where the runs do not.
     work : float
-        Cost of a grid point beside its runs, in cells of the cycle solver.
+        Cost of a grid point in addition to its runs, in cells of the cycle solver.
     memory : int
-        Bytes beside draws and displacements.
+        Bytes in addition to draws and displacements.
     """
 
     draws: Mapping[str, Floats]
@@ -326,7 +326,7 @@ class SamplePlan:
         return xr.Dataset(results, coords | self._statistic_coords(), self.attrs)
 
     def _statistic_coords(self) -> dict[str, xr.Variable]:
-        """Coordinates of the dimensions that the results have beside those of the grid."""
+        """Coordinates of the dimensions that the results have in addition to those of the grid."""
         values: dict[str, NDArray[Any]] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,
