@@ -112,5 +112,6 @@ def test_old_versions_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / "slipsweep").chmod(0o700)
     folder = compiling.cache_folder()
     compiling.cache_folder.cache_clear()
-    assert folder is not None and folder.exists()
+    assert folder is not None
+    assert folder.exists()
     assert len(list((tmp_path / "slipsweep").iterdir())) == 4
