@@ -20,25 +20,19 @@ COLUMN = {name: at for at, name in enumerate(HISTORY)}
 
 
 class Forward:
-    """A block of known inclination and static friction, on motions and with parameters that are tried.
+    """A block of known inclination and static friction on one motion, for parameters that are tried."""
 
-    Attributes
-    ----------
-    runs : int
-        Solutions so far.
-    """
-
-    def __init__(self, theta: float, mu_s: float, model: Mendez) -> None:
+    def __init__(self, theta: float, mu_s: float, model: Mendez, record: Record) -> None:
         self.theta, self.mu_s, self.model = theta, mu_s, model
-        self.runs = 0
         self._cell = np.array([math.tan(math.radians(theta)), mu_s, 1.0, math.nan, math.nan, math.nan, math.nan])
+        self._options = Problem(model, record, Cycle()).options(True)
+        self._wave = wave_of_record(record, 1.0)
 
-    def __call__(self, record: Record, parameters: Floats, times: Floats) -> Floats:
-        """Columns of `HISTORY` at the times, for Üy, λ and Δμ."""
-        self.runs += 1
+    def __call__(self, parameters: Floats, times: Floats, scale: float = 1.0) -> Floats:
+        """Columns of `HISTORY` at the times, for Üy, λ and Δμ and the motion times `scale`."""
         cell = self._cell.copy()
+        cell[2] = scale
         cell[3:6] = parameters
         history = np.empty((times.size, len(COLUMN)))
-        options = Problem(self.model, record, Cycle()).options(True)
-        record_history(np.repeat(cell, TILE), options, wave_of_record(record, 1.0), times, history)
+        record_history(np.repeat(cell, TILE), self._options, self._wave, times, history)
         return history
