@@ -20,7 +20,7 @@ from slipsweep.model.options import Mendez
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies.forward import COLUMN, Forward
-from slipsweep.studies.table_motion import TableMotion, noise_of, table_motion
+from slipsweep.studies.table_motion import TableMotion, converter_noise, noise_of, table_motion
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -117,7 +117,9 @@ class Observation:
         self.use: dict[str, Mask] = {name: inside & np.isfinite(test.channels[name]) for name in test.responses}
         self.weights = {name: weights_of(test.channels[name]) for name in test.responses}
         self.least_noise = {
-            name: _LEAST_NOISE * max(float(np.nanmax(np.abs(test.channels[name]))), 1e-12) for name in test.responses
+            name: max(_LEAST_NOISE * float(np.nanmax(np.abs(values))), converter_noise(values), 1e-15)
+            for name, values in test.channels.items()
+            if name != TABLE
         }
         self.noise = {
             name: self.given_noise.get(name, max(noise_of(test.channels[name]), least))

@@ -33,6 +33,9 @@ _MOVES, _KINK_SAMPLES = 5.0, 12
 #: Linear interpolation of the spline is wrong by this part of the noise at most, between these numbers of points.
 _INTERPOLATION, _FEWEST_POINTS, _MOST_POINTS = 0.05, 4, 32
 
+#: Multiple of the standard deviation of a converter's errors that is taken for their noise.
+_CONVERTER = 1.6
+
 #: Third differences of white noise have 20 times its variance; those of a motion that the sampling resolves are small.
 _VARIANCE = 20.0
 
@@ -61,6 +64,12 @@ def noise_of(values: Floats) -> float:
     """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
     differences = np.diff(values[np.isfinite(values)], 3) / _VARIANCE**0.5
     return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
+
+
+def converter_noise(values: Floats) -> float:
+    """The least noise of digitised values: errors of a converter repeat from cycle to cycle and average out less."""
+    steps = np.diff(np.unique(values[np.isfinite(values)]))
+    return _CONVERTER * float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
 
 
 @dataclass(frozen=True)
@@ -103,10 +112,11 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     design = BSpline.design_matrix(times, coarse, _DEGREE)
     root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
     shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
+    noise = max(best.noise, converter_noise(acceleration))
     smooth, places = _averaged(best, alternatives, fine)
     # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right
     smooth = smooth - np.gradient(fine) ** 2 / 12.0 * best.spline(fine, nu=2)
-    return TableMotion(fine, smooth, np.column_stack([best.noise * shapes, places]), best.noise)
+    return TableMotion(fine, smooth, np.column_stack([noise * shapes, places]), noise)
 
 
 def _knots(times: Floats, spacing: int) -> Floats:
