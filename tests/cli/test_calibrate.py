@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import slipsweep
 from slipsweep import cli
 from tests.support.shaking import coulomb
 
@@ -27,6 +28,7 @@ def test_friction_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> No
     with xr.open_dataset("friction.nc") as found:
         assert found.sizes["slide"] == 8
         assert found.friction_ratio.dims == ("instant",)
+    slipsweep.open_result("friction.nc").slipsweep.chart("friction").savefig("again.png")
 
 
 def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ from slipsweep.studies.findings import Reported, report
 from slipsweep.studies.forward import COLUMN
 from slipsweep.studies.friction import (
     BOUND,
+    SOURCE,
     Coefficients,
     check_contact,
     coefficients_of,
@@ -303,6 +304,7 @@ def _with_estimates(
     dataset = dataset.drop_vars("removed")
     dataset.attrs = {
         "title": "Calibration of a sliding block from tests on a shaking table",
+        **SOURCE,
         **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(test.name for test in tests)}),
         **MODELS.attributes(first.model),
         "removed": "; ".join(removed),

@@ -18,9 +18,10 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_single, shown
-from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, SLIDES
+from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import TABLE, ShakingTest, removed_text
 from slipsweep.studies.table_motion import noise_of
 
@@ -44,6 +45,9 @@ _AT_ENDS, _FIRST = 3, 6
 #: samples lies below that part of the static coefficient.
 _LEVEL, _LOW_SHARE, _LOW = 0.05, 0.05, 0.8
 
+
+#: Attributes by which results are known as ours.
+SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 #: The ends of intervals of results.
 BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "probability below an end of an interval"})
@@ -275,6 +279,7 @@ def friction_dataset(
         },
         {
             "title": "Friction measured on a shaking table (Eq. 1, and by statics)",
+            **SOURCE,
             **test.attrs,
             "g": g,
             "constant_friction": coefficients.sentence,
