@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 SYMBOL = ("Üy", "λ", "Δμ")
 
 #: A parameter is not determined if half its interval is more than this part of it; of Δμ, of μs + Δμ.
-_UNDETERMINED = (0.5, 0.5, 0.25)
+_UNDETERMINED = (0.5, 0.5, 0.3)
 
 #: Correlation from which two parameters are said to be inseparable if one has a larger relative error.
 _CORRELATED, _LOOSE = 0.95, 0.2
@@ -189,7 +189,8 @@ def _undetermined(found: Estimate, known: NDArray[np.bool_]) -> list[str]:
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
     ranges = "; ".join(f"{SYMBOL[at]} {_range(found.intervals[at], at)}" for at in range(3) if not known[at])
     said = [f"{listed} {'is' if len(names) == 1 else 'are'} not determined by {tests}: {ranges}."]
-    yields, crosses = "held" in found.readings, bool({"crossed", "crossing"} & found.readings)
+    yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
+    crosses = bool({"crossed", "crossing"} & found.readings)
     if yields and crosses:
         said.append(
             "Two readings fit equally well: Üy holds the block, and λ and Δμ are nearly free; or Eq. 4 crosses the "
