@@ -1,8 +1,8 @@
 """The solvers held to each other: ``python -m benchmarks.agreement`` writes agreement.md.
 
 Draws cells as tests/support/agreement.py does, under all options and waveforms, and solves each in every way
-that there is; records as tests/support/made_up_records.py does; and many more cells under plain waves, in lanes and
-from event to event, as tests/support/plain_waves.py does.  ``.ci/include-report`` puts the table into
+that there is; records as tests/support/made_up_records.py does; and many more cells under plain waves, in batches and
+from event to event, as tests/support/sine_cells.py does.  ``.ci/include-report`` puts the table into
 docs/waveforms.md.  Nothing is timed; it ends with an error where two ways disagree.
 """
 
@@ -15,7 +15,7 @@ from statistics import median
 from benchmarks.machine import arguments, measured_on, number, table
 from tests.support.agreement import FLOORS, Comparison, compare, group_of
 from tests.support.made_up_records import SEEN, difference, made
-from tests.support.plain_waves import drawn, times_bound
+from tests.support.sine_cells import drawn, times_bound
 
 #: Cells drawn, and in a group; and for each group made-up records, and cells under a plain wave.
 CELLS, SIZE, RECORDS, PLAIN = 10_000, 32, 4, 5_000
@@ -57,16 +57,16 @@ def main() -> None:
     regimes: dict[str, list[Comparison]] = defaultdict(list)
     modes: Counter[int] = Counter()
     wrong: list[str] = []
-    in_lanes: list[float] = []
+    in_batches: list[float] = []
     for first in range(0, cells, SIZE):
         number_of_group = first // SIZE
         group = group_of(seed + number_of_group, min(SIZE, cells - first))
         plain = drawn(seed + number_of_group, PLAIN)
         times = times_bound(plain)
-        in_lanes.append(float(times.max()))
+        in_batches.append(float(times.max()))
         if not times.max() <= 1.0:
             wrong.append(plain.cell(int(times.argmax())))
-            print(f"lanes: {wrong[-1]}", flush=True)
+            print(f"batches: {wrong[-1]}", flush=True)
         for comparison in chain(compare(group), compare_records(seed + RECORDS * number_of_group)):
             kinds[comparison.kind].append(comparison)
             if comparison.kind.startswith("step"):
@@ -85,11 +85,11 @@ def main() -> None:
         f"{modes[-1]:,} without a value. {measured_on(('numpy', 'numba'))} Written by `python -m benchmarks.agreement"
         f" --cells {cells} --seed {seed}`."
     )
-    lanes = (
-        f"{PLAIN * len(in_lanes):,} cells under plain waves, solved in lanes and from event to event, differ by "
-        f"{number(max(in_lanes), 2)} of their bound at most."
+    batches = (
+        f"{PLAIN * len(in_batches):,} cells under a sine, solved in batches and from event to event, differ by "
+        f"{number(max(in_batches), 2)} of their bound at most."
     )
-    page = f"{head}\n\n{by_kind}\n{by_regime}\n{lanes}\n"
+    page = f"{head}\n\n{by_kind}\n{by_regime}\n{batches}\n"
     (given.folder / "agreement.md").write_text(page, encoding="utf-8")
     if wrong:
         raise SystemExit(f"{len(wrong)} disagreements")

@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import slipsweep
 from slipsweep import cli
+from tests.support.shaking import coulomb
 
 ROOT = Path(__file__).parents[2]
 TEST = str(ROOT / "sweeps" / "data" / "shaking_test.csv")
@@ -26,6 +28,7 @@ def test_friction_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> No
     with xr.open_dataset("friction.nc") as found:
         assert found.sizes["slide"] == 8
         assert found.friction_ratio.dims == ("instant",)
+    slipsweep.open_result("friction.nc").slipsweep.chart("friction").savefig("again.png")
 
 
 def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[str]) -> None:
@@ -41,9 +44,29 @@ def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> N
     with xr.open_dataset("calibration.nc") as found:
         assert abs(found.yield_acceleration - 1.8) < 3.5 * found.yield_acceleration_error
         assert found.sizes["cycle"] == 8
-        assert found.attrs["model_table"] == Path("model.toml").read_text()
-        assert found.attrs["model_table"] in printed
+        assert "constant_friction" in found.attrs
+    assert Path("model.toml").read_text() in printed
+    assert "[uncertainty.decay_rate]" in Path("model.toml").read_text()
     assert Path("calibration.svg").read_text().count("misfit") == 3
+
+
+def test_constant_friction_is_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
+    names = {"time": "time (s)", "ground_acceleration": "table acceleration (m/s2)"}
+    names |= {"block_acceleration": "block acceleration (m/s2)"}
+    coulomb(0.25).to_dataframe().reset_index()[list(names)].rename(columns=names).to_csv("coulomb.csv", index=False)
+    for command in (("friction", "coulomb.csv"), ("calibrate", "coulomb.csv", "--no-cycles", "-o", "model.toml")):
+        assert cli.main([*command, "--theta", "6", "--mu-s", "0.38"]) == 0
+        assert capsys.readouterr().out.startswith("This is a block of constant friction: by statics 0.25")
+    assert 'friction = "newmark"' in Path("model.toml").read_text()
+
+
+def test_several_tests(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["calibrate", TEST, TEST, *BLOCK, "-o", "both.nc"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("cycle  starts, s") == 2
+    with xr.open_dataset("both.nc") as found:
+        assert found.sizes["test"] == 2
+        assert found.misfit_relative_velocity.dims == ("test",)
 
 
 @pytest.mark.parametrize(

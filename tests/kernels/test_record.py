@@ -118,7 +118,7 @@ def test_a_record_is_a_wave_of_straight_pieces() -> None:
         [6.0, 7.5, 2.0, 2.0, 0.0, 0.0],
         [7.5, 8.0, 2.0, 0.0, 1.0, 0.0],
     ]
-    assert (wave.stretch.tolist(), wave.height.tolist()) == ([[0, 1], [4, 7]], [3.0, 2.0])
+    assert (wave.interval.tolist(), wave.height.tolist()) == ([[0, 1], [4, 7]], [3.0, 2.0])
     assert (wave.highest, wave.lowest) == (3.0, -1.0)
     turned = wave_of_record(record, -1.0)
     assert (turned.stretch.tolist(), turned.height.tolist(), turned.highest) == ([[1, 4]], [1.0], 1.0)

@@ -1,4 +1,4 @@
-"""Eq. 1 on tests made by `simulate`: the friction that went in, the slides, and sensors that are not as they should."""
+"""Eq. 1 and statics on synthetic tests: the friction that went in, the slides, sensors at fault, files."""
 
 import math
 from pathlib import Path
@@ -10,7 +10,9 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import InputError
-from tests.support.shaking import CONTINUOUS, STICK_SLIP, exact, measured
+from slipsweep.model import equations
+from slipsweep.studies.friction import eq1_friction
+from tests.support.shaking import CONTINUOUS, STICK_SLIP, coulomb, exact, measured
 
 GIVEN = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}
 
@@ -33,6 +35,37 @@ def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:
     np.testing.assert_allclose(found.friction_coefficient.values[1:-1][sliding], law[sliding], rtol=1e-10)
     np.testing.assert_allclose(found.least_friction, (0.38 + 0.09) * np.exp(-2.7 * 3.55 / 9.81), rtol=1e-3)
     np.testing.assert_allclose(found.friction_ratio, found.friction_coefficient / 0.38, rtol=1e-15)
+
+
+def test_eq1_is_that_of_the_equations() -> None:
+    values = eq1_friction(np.array([-2.0, 3.0]), np.array([-1.0, 2.5]), 8.0, 0.4, 9.81)
+    for i, (table, block) in enumerate(((-2.0, -1.0), (3.0, 2.5))):
+        expected = equations.mobilised_friction(table, block, 0.4, math.tan(math.radians(8.0)), 9.81)
+        assert values[i] == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("kinetic", [0.38, 0.25])
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.02])
+def test_coulombs_friction_is_level_by_statics_where_eq1_falls(kinetic: float, noise: float) -> None:
+    found = slipsweep.measured_friction(coulomb(kinetic, noise), 6.0, 0.38)
+    assert found.sizes["slide"] == 6
+    assert found.least_friction.max() < 0.15
+    assert found.attrs["constant_friction"].startswith(
+        f"This is a block of constant friction: by statics {kinetic:.2g}"
+    )
+    np.testing.assert_allclose(found.slide_free_body_friction, kinetic, atol=0.01)
+    assert found.kinetic_friction.item() == pytest.approx(kinetic, abs=0.004)
+    assert found.static_friction.item() == pytest.approx(0.38, abs=0.03)
+    for name, true in (("static", 0.38), ("kinetic", kinetic)):
+        low, high = found[f"{name}_friction_interval"].values
+        assert low - 1e-3 <= true <= high + 1e-3, name
+    at_rest = found.free_body_friction.values[:40]
+    np.testing.assert_allclose(at_rest.mean(), math.tan(math.radians(6.0)), atol=0.005)
+
+
+def test_a_decaying_interface_is_not_called_constant(stick_slip: xr.Dataset) -> None:
+    assert friction(stick_slip).attrs["constant_friction"] == ""
+    assert friction(measured(stick_slip)).attrs["constant_friction"] == ""
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
@@ -65,7 +98,7 @@ def test_a_slide_that_the_record_ends_in_has_no_stop(stick_slip: xr.Dataset) -> 
     assert math.isnan(found.slide_stop.item())
 
 
-def test_the_threshold_is_told(stick_slip: xr.Dataset) -> None:
+def test_the_threshold_is_reported(stick_slip: xr.Dataset) -> None:
     noisy = friction(measured(stick_slip))
     # r has the noise of both: 2 % of 3.55 and of the block's peak acceleration
     sigma = 0.02 * np.hypot(3.55, float(abs(stick_slip.block_acceleration).max()))
@@ -83,7 +116,7 @@ def test_unequal_sampling(stick_slip: xr.Dataset) -> None:
     assert found.sizes["slide"] == 5
 
 
-def test_offset_and_drift_are_taken_off_when_asked_and_told(stick_slip: xr.Dataset) -> None:
+def test_offset_and_drift_are_taken_off_where_named(stick_slip: xr.Dataset) -> None:
     drifting = stick_slip.copy(deep=True)
     drifting.block_acceleration.values[:] += 0.4 + 0.1 * stick_slip.time.values
     asked = friction(drifting, drift="block_acceleration", rest=(0.0, 0.495))

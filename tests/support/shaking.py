@@ -72,3 +72,27 @@ def measured(
         noisy = values + noise * peak * generator.standard_normal(values.size)
         test[name].values[:] = noisy if bits is None else digitised(noisy, bits, 1.25 * peak)
     return test.drop_vars([name for name in RESPONSES if name not in responses])
+
+
+def coulomb(kinetic: float, noise: float = 0.01, seed: int = 0) -> xr.Dataset:
+    """A test of a block of constant friction, static 0.38, on 6 degrees: six cycles of 2 Hz and 0.55 g.
+
+    Integrated in steps of 1/8000 s, independently of the solvers.
+    """
+    rate, fine, shaken, peak = 200, 40, 3.0, 0.55 * 9.81
+    times = np.arange(round((shaken + 1.0) * rate * fine)) / (rate * fine)
+    moving = (times > 0.25) & (times < 0.25 + shaken)
+    table = np.where(moving, peak * np.sin(4.0 * np.pi * (times - 0.25)), 0.0)
+    onset, held = (9.81 * np.tan(np.arctan(friction) - np.radians(6.0)) for friction in (0.38, kinetic))
+    block, velocity, speed, slides = table.copy(), np.zeros(times.size), 0.0, False
+    for i, value in enumerate(table):
+        slides = slides or value > onset
+        if slides:
+            speed += (value - held) / (rate * fine)
+            slides = speed > 0.0 or value > held
+            speed = max(speed, 0.0)
+            block[i] = held if slides else value
+        velocity[i] = speed
+    values = (table, block, velocity, np.cumsum(velocity) / (rate * fine))
+    channels = {name: ("time", one[::fine]) for name, one in zip(CHANNELS, values, strict=True)}
+    return measured(xr.Dataset(channels, {"time": ("time", times[::fine])}), seed, noise, bits=None)

@@ -1,6 +1,6 @@
-"""Figures of tests on a shaking table: friction measured (the paper's Fig. 7), measured against computed motion."""
+"""Figures of tests on a shaking table: measured friction (the paper's Fig. 7), measured against computed motion."""
 
-import json
+import textwrap
 
 import numpy as np
 import xarray as xr
@@ -9,51 +9,52 @@ from matplotlib.figure import Figure
 
 from slipsweep.charts.sheet import new_panels
 from slipsweep.charts.style import BLUE, VERMILION
-from slipsweep.model.variables import HISTORY
 
 _GREY = "0.45"
 
-_LABELS = {
-    "block_acceleration": "acceleration of\nthe block (m/s²)",
-    "relative_velocity": "relative\nvelocity (m/s)",
-    "relative_displacement": "relative\ndisplacement (mm)",
+#: Of each channel of the block: label, factor to the unit drawn, and this unit.
+_CHANNELS = {
+    "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "m/s²"),
+    "relative_velocity": ("relative\nvelocity (m/s)", 1.0, "m/s"),
+    "relative_displacement": ("relative\ndisplacement (mm)", 1000.0, "mm"),
 }
 
 
 def friction(table: xr.Dataset, axes: Axes | None = None) -> Figure:
-    """Draw measured friction in the manner of the paper's Fig. 7.
+    """Draw measured friction in the manner of the paper's Fig. 7, with the friction by statics.
 
     Parameters
     ----------
     table : xr.Dataset
-        What `slipsweep.studies.friction.friction_table` returns.
+        What `slipsweep.measured_friction` returns.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Panels over time: accelerations of table and block; μ(t)/μs.  Slides are shaded, from onset to stop.
+        Panels over time: accelerations of table and block; friction by Eq. 1 and by statics.  Slides are shaded, from
+        onset to stop.
     """
-    figure, panels = new_panels(axes, 2, 1, (7.0, 4.5), sharey=False)
-    accelerations, ratio = panels.ravel()
+    figure, panels = new_panels(axes, 2, 1, (7.0, 4.8), sharey=False)
+    accelerations, coefficient = panels.ravel()
     time = table["time"].values
     accelerations.plot(time, table["ground_acceleration"].values, color=BLUE, label="table")
     accelerations.plot(time, table["block_acceleration"].values, color=VERMILION, linewidth=1.0, label="block")
     accelerations.set_ylabel("acceleration\n(m/s²)")
     accelerations.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
-    ratio.plot(time, table["friction_ratio"].values, color=VERMILION, linewidth=1.0)
-    ratio.axhline(1.0, color=_GREY, linewidth=0.8, linestyle="--")
-    ratio.set_ylabel("friction coefficient\nμ(t) / μs")
-    ratio.set_xlabel("time (s)")
+    _friction_lines(table, coefficient)
+    coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
+    coefficient.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False)
+    coefficient.set_xlabel("time (s)")
     stops = np.where(np.isnan(table["slide_stop"].values), time[-1], table["slide_stop"].values)
-    for panel in (accelerations, ratio):
+    for panel in (accelerations, coefficient):
         for onset, stop in zip(table["slide_onset"].values, stops, strict=True):
             panel.axvspan(onset, stop, color="0.92", zorder=0)
-    _finish(figure, (accelerations, ratio))
-    figure.supxlabel(
+    _finish(figure, [accelerations, coefficient])
+    caption = (
         f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}; shaded: slides, relative acceleration "
-        f"beyond {table.attrs['threshold']:.3g} m/s²",
-        fontsize="small",
+        f"beyond {table.attrs['threshold']:.3g} m/s²"
     )
+    _caption(figure, caption, table.attrs["constant_friction"])
     return figure
 
 
@@ -63,46 +64,65 @@ def calibration(table: xr.Dataset, axes: Axes | None = None) -> Figure:
     Parameters
     ----------
     table : xr.Dataset
-        What `slipsweep.studies.calibration.calibration_table` returns.
+        What `slipsweep.calibrate` returns.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Panels over time: the table's acceleration, then each channel of the block, measured or not, with its misfit;
-        parameters with their intervals in a caption.
+        Panels over time, a column for each test: the table's acceleration, each channel of the block, measured or not,
+        with its misfit, and the friction by Eq. 1 and by statics; parameters with their intervals in a caption.
     """
-    figure, grid = new_panels(axes, 4, 1, (7.0, 7.5), sharey=False)
-    panels = tuple(grid.ravel())
-    time, measured = table["time"].values, json.loads(table.attrs["channels"])
-    ground = panels[0]
+    tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
+    rows = 5 if "free_body_friction" in table else 4
+    figure, grid = new_panels(axes, rows, len(tests), (7.0 if len(tests) == 1 else 5.0 * len(tests), 9.0), sharey=False)
+    grid = np.asarray(grid).reshape(rows, len(tests))
+    for test, panels in zip(tests, grid.T, strict=True):
+        shown = test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values})
+        _test(shown, list(panels))
+    for panels in grid[:, 1:]:
+        for panel in panels:
+            panel.set_ylabel("")
+    _finish(figure, list(grid.ravel()))
+    _caption(figure, _parameters(table), table.attrs["constant_friction"])
+    return figure
+
+
+def _test(table: xr.Dataset, panels: list[Axes]) -> None:
+    """One test of a calibration."""
+    time, ground = table["time"].values, panels[0]
     ground.plot(time, table["measured_ground_acceleration"].values, ".", color=_GREY, markersize=2, label="measured")
     ground.plot(time, table["computed_ground_acceleration"].values, color=BLUE, label="smooth")
     ground.set_ylabel("acceleration of\nthe table (m/s²)")
     ground.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
-    for panel, (name, label) in zip(panels[1:], _LABELS.items(), strict=True):
-        factor = 1000.0 if name == "relative_displacement" else 1.0
-        if name in measured:
+    for panel, (name, (label, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
+        measured = f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull())
+        if measured:
             values = factor * table[f"measured_{name}"].values
             panel.plot(time, values, ".", color=_GREY, markersize=2, label="measured")
         panel.plot(time, factor * table[f"computed_{name}"].values, color=VERMILION, linewidth=1.2, label="computed")
         panel.set_ylabel(label)
-        if name in measured:
-            unit = "mm" if name == "relative_displacement" else HISTORY[name]["units"].replace(" s-2", "/s²")
-            unit = unit.replace(" s-1", "/s")
-            misfit = factor * table[f"misfit_{name}"].item()
-            share = table[f"relative_misfit_{name}"].item()
-            text = f"misfit {misfit:.2g} {unit} ({share:.1%} of the largest)"
-        else:
-            text = "not measured"
+        text = "not measured"
+        if measured:
+            misfit, share = factor * table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
+            text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
         panel.set_title(text, fontsize="small", loc="left")
     panels[1].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+    if len(panels) > 4:
+        _friction_lines(table, panels[4])
+        panels[4].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
     panels[-1].set_xlabel("time (s)")
-    _finish(figure, panels)
-    figure.supxlabel(_caption(table), fontsize="small")
-    return figure
 
 
-def _caption(table: xr.Dataset) -> str:
+def _friction_lines(table: xr.Dataset, panel: Axes) -> None:
+    """Friction by Eq. 1 and by statics; told apart in grey by their widths and dashes."""
+    time = table["time"].values
+    panel.plot(time, table["free_body_friction"].values, color=BLUE, linewidth=1.6, label="by statics")
+    eq1 = table["friction_coefficient"].values
+    panel.plot(time, eq1, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 1.5)), label="μ(t) by Eq. 1")
+    panel.set_ylabel("friction\ncoefficient")
+
+
+def _parameters(table: xr.Dataset) -> str:
     """The parameters with their 95 % intervals."""
     parts = []
     for name, sign, unit in (
@@ -111,13 +131,21 @@ def _caption(table: xr.Dataset) -> str:
         ("delta_mu", "Δμ", ""),
     ):
         low, high = table[f"{name}_interval"].values
-        between = f" ({low:.3g} to {high:.3g})" if np.isfinite(low) else " (not determined)"
-        parts.append(f"{sign} = {table[name].item():.4g}{unit}{between}")
+        ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
+        known = bool(table[f"{name}_error"].notnull())
+        value = f"= {table[name].item():.4g}{unit} ({ends})" if known else f"not determined ({ends}{unit})"
+        parts.append(f"{sign} {value}")
     given = f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}"
     return f"{', '.join(parts)}; 95 % intervals\n{given}"
 
 
-def _finish(figure: Figure, panels: tuple[Axes, ...]) -> None:
+def _caption(figure: Figure, text: str, constant: str) -> None:
+    """The caption; a block of constant friction is named first."""
+    first = textwrap.fill(constant, 90) + "\n" if constant else ""
+    figure.supxlabel(first + text, fontsize="small")
+
+
+def _finish(figure: Figure, panels: list[Axes]) -> None:
     for axes in panels:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         axes.margins(x=0)

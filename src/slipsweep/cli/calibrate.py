@@ -34,7 +34,7 @@ FRICTION_EXAMPLE = examples(
 
 EXAMPLE = examples(
     "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
-    "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
+    "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
 )
 
 #: The group of options that say what of the measurement is used, and how.
@@ -46,6 +46,13 @@ Test = Annotated[
         metavar="TEST.csv",
         help="Columns time (s), table acceleration (g), block acceleration (m/s2), "
         "relative velocity (m/s), relative displacement (mm).",
+    ),
+]
+Tests = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="TEST.csv...",
+        help="One test or several of one interface, with columns as for friction; of the block one column at least.",
     ),
 ]
 Offset = Annotated[
@@ -74,14 +81,14 @@ def friction(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the friction coefficient over a test, and its slides."""
+    """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
     angle = quantity("--theta", theta, "theta", g)
     least = None if threshold is None else quantity("--threshold", threshold, "amplitude", g)
-    paths = _checked(output, overwrite, test, (".nc", *FIGURES))
+    paths = _checked(output, overwrite, [test], (".nc", *FIGURES))
     from slipsweep.motion.shaking import read_test
-    from slipsweep.studies.friction import friction_table
+    from slipsweep.studies.friction import friction_dataset
 
-    table = friction_table(
+    table = friction_dataset(
         read_test(test),
         angle,
         mu_s,
@@ -100,15 +107,25 @@ def friction(
     _write(paths, table, figure, overwrite)
     if quiet:
         return
+    if table.attrs["constant_friction"]:
+        typer.echo(table.attrs["constant_friction"])
     typer.echo(f"threshold  {table.attrs['threshold']:.4g} m/s2: {table.attrs['threshold_from']}")
     typer.echo(f"removed    {table.attrs['removed']}")
-    slides = [table[name].values for name in ("slide_onset", "slide_peak", "slide_stop", "onset_acceleration")]
-    typer.echo(f"{slides[0].size} slides" + (", s and m/s2:" if slides[0].size else ""))
-    if slides[0].size:
-        typer.echo("    onset     peak     stop  table at onset  block at most  least friction")
-    for row in zip(*slides, table["peak_block_acceleration"].values, table["least_friction"].values, strict=True):
-        onset, peak, stop, began, most, least = row
-        typer.echo(f"{onset:9.4g}{peak:9.4g}{stop:9.4g}{began:16.4g}{most:15.4g}{least:16.4g}")
+    _echo_coefficients(table)
+    columns = {
+        "slide_onset": ("onset", 9),
+        "slide_peak": ("peak", 9),
+        "slide_stop": ("stop", 9),
+        "onset_acceleration": ("table at onset", 16),
+        "peak_block_acceleration": ("block at most", 15),
+        "least_friction": ("least of Eq. 1", 16),
+        "slide_free_body_friction": ("by statics", 12),
+    }
+    typer.echo(f"{table.sizes['slide']} slides" + (", s and m/s2:" if table.sizes["slide"] else ""))
+    if table.sizes["slide"]:
+        typer.echo("".join(f"{text:>{width}}" for text, width in columns.values()))
+    for row in zip(*(table[name].values for name in columns), strict=True):
+        typer.echo("".join(f"{value:{width}.4g}" for value, (_, width) in zip(row, columns.values(), strict=True)))
     for path in paths:
         typer.echo(path)
 
@@ -116,7 +133,7 @@ def friction(
 @chooses(model=MODELS)
 def calibrate(
     *,
-    test: Test,
+    tests: Tests,
     theta: Theta,
     mu_s: MuS,
     offset: Offset = None,
@@ -130,14 +147,21 @@ def calibrate(
     model: Model,
     quiet: Quiet = False,
 ) -> None:
-    """Estimate yield acceleration, λ and Δμ from a test."""
+    """Estimate yield acceleration, λ and Δμ from one or several tests."""
     angle = quantity("--theta", theta, "theta", model.g)
-    paths = _checked(output, overwrite, test, (".nc", ".toml", *FIGURES))
+    paths = _checked(output, overwrite, tests, (".nc", ".toml", *FIGURES))
     from slipsweep.motion.shaking import read_test
-    from slipsweep.studies.calibration import calibration_table
+    from slipsweep.studies.calibration import calibration_dataset
 
-    table = calibration_table(
-        read_test(test), angle, mu_s, model=model, offset=_named(offset), drift=_named(drift), cycles=cycles
+    table = calibration_dataset(
+        [read_test(test) for test in tests],
+        angle,
+        mu_s,
+        model=model,
+        offset=_named(offset),
+        drift=_named(drift),
+        noise=None,
+        cycles=cycles,
     )
 
     def figure() -> "Figure":
@@ -165,19 +189,20 @@ def _times(text: str) -> list[float]:
         raise InputError(f"--rest {text}: must be two times, s, as FROM:TO") from None
 
 
-def _checked(output: list[Path] | None, overwrite: bool, test: Path, allowed: tuple[str, ...]) -> list[Path]:
+def _checked(output: list[Path] | None, overwrite: bool, tests: list[Path], allowed: tuple[str, ...]) -> list[Path]:
     """The outputs, refused before anything is computed."""
     from slipsweep.files import outputs
 
     paths = output or []
     for path in paths:
         check_ending(path, allowed)
-    outputs.check_outputs(paths, overwrite, reads=[test])
+    outputs.check_outputs(paths, overwrite, reads=tests)
     return paths
 
 
 def _write(paths: list[Path], table: "xr.Dataset", figure: Callable[[], "Figure"], overwrite: bool) -> None:
     from slipsweep.files import netcdf, outputs
+    from slipsweep.studies.findings import sweep_file_text
 
     for path in paths:
         if path.suffix == ".nc":
@@ -193,45 +218,67 @@ def _write(paths: list[Path], table: "xr.Dataset", figure: Callable[[], "Figure"
             write_figure(figure(), path, overwrite)
             continue
         with outputs.complete_or_absent(path, overwrite) as temporary:
-            temporary.write_text(table.attrs["model_table"], encoding="utf-8")
+            text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
+            temporary.write_text(text, encoding="utf-8")
+
+
+def _echo_coefficients(table: "xr.Dataset") -> None:
+    """Static and kinetic friction by statics, where the block was seen to slide."""
+    for kind in ("static", "kinetic"):
+        if f"{kind}_friction" in table and table[f"{kind}_friction"].notnull():
+            low, high = table[f"{kind}_friction_interval"].values
+            value = table[f"{kind}_friction"].item()
+            typer.echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
 
 
 def _summarize(table: "xr.Dataset") -> None:
     import numpy as np
 
+    from slipsweep.studies.findings import sweep_file_text
+
+    constant = table.attrs["constant_friction"]
+    if constant:
+        typer.echo(constant)
+    _echo_coefficients(table)
     typer.echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
     for name in ("yield_acceleration", "decay_rate", "delta_mu"):
         low, high = table[f"{name}_interval"].values
-        interval = f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "not determined"
         unit = " m/s2" if name == "yield_acceleration" else ""
+        interval = f"{low:.4g} to {high:.4g}{unit}" if np.isfinite(high) else f"{low:.4g}{unit} or more"
         error = table[f"{name}_error"].item()
-        shown = f"{error:.2g}" if np.isfinite(error) else "-"
-        typer.echo(f"{name:<24}{table[name].item():>10.4g}{shown:>10}   {interval}{unit}")
+        value = f"{table[name].item():>10.4g}{error:>10.2g}" if np.isfinite(error) else f"{'not determined':>20}"
+        typer.echo(f"{name:<24}{value}   {interval}")
     matrix = table["correlation"].values
-    pairs = (
+    typer.echo("correlation")
+    for text, i, j in (
         ("yield_acceleration, decay_rate", 0, 1),
         ("yield_acceleration, delta_mu", 0, 2),
         ("decay_rate, delta_mu", 1, 2),
-    )
-    typer.echo("correlation")
-    for text, i, j in pairs:
+    ):
         typer.echo(f"  {text:<32}" + (f"{matrix[i, j]:7.3f}" if np.isfinite(matrix[i, j]) else "      -"))
     typer.echo("misfit, root mean square, and in parts of the largest value")
     for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
         if f"misfit_{name}" in table:
             unit = table[f"misfit_{name}"].attrs["units"]
-            misfit, share = table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
-            typer.echo(f"  {name:<32}{misfit:7.2g} {unit}  {share:.1%}")
+            misfits, shares = (np.atleast_1d(table[f"{kind}misfit_{name}"].values) for kind in ("", "relative_"))
+            text = ", ".join(f"{misfit:.2g} {unit}  {share:.1%}" for misfit, share in zip(misfits, shares, strict=True))
+            typer.echo(f"  {name:<32}{text}")
     typer.echo(f"removed: {table.attrs['removed']}")
     if "cycle_start" in table:
-        typer.echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
-        columns = [table[f"cycle_{name}"].values for name in ("start", "yield_acceleration", "decay_rate", "delta_mu")]
-        columns.append(table["cycle_attenuation_coefficient"].values)
-        for number, (start, *values) in enumerate(zip(*columns, strict=True), 1):
+        for part in [table] if "test" not in table.dims else [table.isel(test=i) for i in range(table.sizes["test"])]:
+            _echo_cycles(part)
+    for finding in table.attrs["findings"].splitlines():
+        if finding != constant:
+            typer.echo(f"note: {finding}")
+    typer.echo(f"\n{sweep_file_text(table.attrs['model_table'], table.attrs['uncertainty_table'])}")
+
+
+def _echo_cycles(table: "xr.Dataset") -> None:
+    import numpy as np
+
+    typer.echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
+    names = ("start", "yield_acceleration", "decay_rate", "delta_mu", "attenuation_coefficient")
+    for number, (start, *values) in enumerate(zip(*(table[f"cycle_{name}"].values for name in names), strict=True), 1):
+        if np.isfinite(start):
             cells = [f"{value:.3g}" if np.isfinite(value) else "-" for value in values]
             typer.echo(f"{number:5d} {start:10.4g} {cells[0]:>12} {cells[1]:>7} {cells[2]:>7} {cells[3]:>7}")
-    for finding in table.attrs["findings"].splitlines():
-        typer.echo(f"note: {finding}")
-    typer.echo(f"\n{table.attrs['model_table']}")
-    if table.attrs["uncertainty_table"]:
-        typer.echo(table.attrs["uncertainty_table"])

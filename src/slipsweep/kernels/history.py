@@ -303,12 +303,3 @@ def wave_history(
     elif block.sliding_mode == eq.STICK_SLIP:
         stick_slip_history(block, options, wave, workspace, phases, found)
     fill_friction(block, found)
-
-
-@kernel
-def eq1_friction(
-    base: np.ndarray, block: np.ndarray, mu_s: float, tan_theta: float, g: float, friction: np.ndarray
-) -> None:
-    """Fill the friction that Eq. 1 gives for recorded accelerations of base and block."""
-    for at in range(base.size):
-        friction[at] = eq.mobilised_friction(base[at], block[at], mu_s, tan_theta, g)

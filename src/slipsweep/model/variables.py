@@ -418,6 +418,7 @@ HALF_WAVES: dict[str, dict[str, Any]] = {
 MEASURED_FRICTION: dict[str, dict[str, Any]] = {
     "friction_coefficient": _described("1", "friction coefficient by Eq. 1"),
     "friction_ratio": _described("1", "friction coefficient by Eq. 1 over the static one"),
+    "free_body_friction": _described("1", "friction coefficient by statics; at rest the mobilised one"),
 }
 
 #: The slides that a test shows.
@@ -429,6 +430,7 @@ SLIDES: dict[str, dict[str, Any]] = {
     "peak_acceleration": _described("m s-2", "largest acceleration of the table within a slide"),
     "peak_block_acceleration": _described("m s-2", "largest acceleration of the block within a slide"),
     "least_friction": _described("1", "least friction coefficient by Eq. 1 within a slide"),
+    "slide_free_body_friction": _described("1", "median friction coefficient by statics within a slide"),
 }
 
 #: Results of `calibrate` that have no other name here.

@@ -1,8 +1,7 @@
-"""Calibration: Üy, λ and Δμ from a test on a shaking table, for the whole of it and cycle by cycle."""
+"""Calibration: Üy, λ and Δμ from one or several tests on a shaking table, together and cycle by cycle."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,243 +9,156 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.inputs import Inputs
-from slipsweep.grid.plans import plan_sweep
 from slipsweep.model.options import MODELS, Mendez
 from slipsweep.model.parameters import check_finite, check_single, shown
+from slipsweep.model.variables import CALIBRATION, CALIBRATION_SERIES, HISTORY, MEASURED_FRICTION, PARAMETERS
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
-from slipsweep.studies.calibration_tables import LARGE, Cycle, intervals_of, table_of
-from slipsweep.studies.findings import findings, misfits
-from slipsweep.studies.fitting import SOUGHT, Fit, Line, Solution, Whitening
-from slipsweep.studies.forward import COLUMN, Forward
-from slipsweep.studies.friction import noise_of, onset_acceleration, slides_of, threshold_of
-from slipsweep.studies.table_motion import TableMotion, table_motion
+from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
+from slipsweep.studies.findings import Reported, report
+from slipsweep.studies.forward import COLUMN
+from slipsweep.studies.friction import (
+    BOUND,
+    SOURCE,
+    Coefficients,
+    check_contact,
+    coefficients_of,
+    eq1_friction,
+    free_body_friction,
+    slides_of,
+    threshold_of,
+)
+from slipsweep.studies.likelihood import SOUGHT, Line, Linear, Observation
+from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
 
-#: Starts that are tried beside those that Eq. 1 gives: parts of the table's peak, λ, and parts of μs.
-_START_ONSETS, _START_DECAYS, _START_EXCESS = (0.05, 0.15, 0.3, 0.5, 0.7), (1.0, 2.5, 5.0), (0.05, 0.25, 0.5)
-
-#: Samples in turn, and standard deviations of the noise, by which a block slips upslope.
+#: Consecutive samples, and standard deviations of the noise, by which a block slips upslope.
 _UPSLOPE_SAMPLES, _UPSLOPE_NOISE = 4, 5.0
 
-#: Rises of the sum of squares up to which a yield acceleration is as good as the best, and another reading of a test.
-_SAME, _SAME_SQUARE = 1.0, 6.0
-
-#: Starts that are followed in search of another reading, the part of Üy they have, and of the acceleration at the peak.
-_OTHERS, _LOW, _TOPS = 3, 0.3, (1.0, 1.1, 1.25, 1.5)
-
-#: Part of the largest acceleration that a pulse has at least to be a cycle.
-_A_CYCLE = 0.1
-
-#: Fewest samples of a cycle that is fitted by itself.
-_FEWEST_IN_A_CYCLE = 12
+#: Part of the largest acceleration that a pulse has at least to be a cycle, and fewest samples of one.
+_A_CYCLE, _FEWEST_IN_A_CYCLE = 0.1, 12
 
 
-def calibration_table(
-    test: ShakingTest,
+def calibration_dataset(
+    tests: Sequence[ShakingTest],
     theta: Any,
     mu_s: Any,
     *,
-    model: Any = "mendez",
-    offset: Any = (),
-    drift: Any = (),
-    noise: Mapping[str, float] | None = None,
-    cycles: bool = True,
+    model: Any,
+    offset: Any,
+    drift: Any,
+    noise: Mapping[str, float] | None,
+    cycles: bool,
 ) -> xr.Dataset:
-    """Calibration of a test; arguments, results and errors of `slipsweep.calibrate`."""
+    """Calibration of tests of one interface; arguments, results and errors of `slipsweep.calibrate`."""
     theta, mu_s = check_single("theta", theta), check_single("mu_s", mu_s)
     chosen = MODELS.of(model)
     if not isinstance(chosen, Mendez):
         raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
+    if not tests:
+        raise InputError("test = []: must be one test at least")
+
+    def observed(**more: Any) -> list[Observation]:
+        return [_observation(test, theta, mu_s, chosen, offset, more.get("drift", drift), noise) for test in tests]
+
+    observations = observed()
+    found = estimate(observations)
+    episodes = [[] if "continuous" in found.readings else _upslope(test) for test in tests]
+    if any(episodes):
+        for one, times in zip(observations, episodes, strict=True):
+            _leave_out(one, times)
+        found = estimate(observations)
+    said = report(found, episodes, coefficients := [_coefficients(one) for one in observations])
+    if said.misfits and not said.constant:
+        said.findings[1:1] = _drifts(observed, tests, drift)
+    parts = [
+        _test_dataset(one, linear, found, cycles) for one, linear in zip(found.observations, found.linears, strict=True)
+    ]
+    whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
+    return _with_estimates(whole, found, said, coefficients, tests)
+
+
+def _observation(
+    test: ShakingTest,
+    theta: float,
+    mu_s: float,
+    model: Mendez,
+    offset: Any,
+    drift: Any,
+    noise: Mapping[str, float] | None,
+) -> Observation:
+    """A test with what is given of its sensors, checked."""
     if not test.responses:
         raise InputError(
             f"{test.name}: nothing of the block was measured: must have one at least of {', '.join(RESPONSES)}"
         )
-    given_noise = _noise_given(noise, test)
-    _check_contact(test, theta, chosen.g)
-    offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
-    motion, table_lines = _with_table_lines(table_motion(test.times, test.channels[TABLE]), test, offsets, drifts)
-    fit = Fit(
-        test,
-        motion,
-        Forward(theta, mu_s, chosen),
-        _samples(test),
-        lines=_lines(test, offsets, drifts),
-        table_lines=table_lines,
-        given_noise=given_noise,
-    )
-    starts = _starts(fit)
-    solution = fit.solve(starts)
-    fit = solution.fit
-    summary = _summary(fit, solution)
-    episodes: list[tuple[float, float]] = []
-    if summary["continuous_pulses"].item() == 0:
-        # continuous sliding goes both ways; stick-slip goes one
-        episodes = _upslope(test)
-    if episodes:
-        fit = _without(fit, episodes)
-        solution = fit.solve([solution.parameters, *starts])
-        fit = solution.fit
-        summary = _summary(fit, solution)
-    if not np.isfinite(solution.errors[1:]).any():
-        solution = _with_friction(fit, solution)
-        fit = solution.fit
-    profile = solution.profile()
-    if (better := profile.better(solution.parameters)) is not None:
-        # the search was caught where Üy does not matter, beside where it does
-        other = replace(fit, use=_kept(fit), noise={}, given_noise=dict(fit.noise)).solve([better], near=True)
-        if other.cost() < solution.cost() and np.isfinite(other.errors[1:]).all():
-            solution, fit = other, other.fit
-            profile = solution.profile()
-    if not np.isfinite(solution.errors[0]):
-        # all Üy up to there give the same motion: the largest is where the block was seen to slide
-        same = profile.onsets[profile.above <= _SAME]
-        solution = replace(solution, parameters=np.array([same.max(), *solution.parameters[1:]]))
-    summary = _summary(fit, solution)
-    own = _cycles(fit, solution) if cycles else []
-    intervals = intervals_of(solution, profile)
-    notes = findings(fit, solution, summary, intervals, episodes, _drifting(fit, solution, starts))
-    return table_of(fit, solution, intervals, summary, own, notes)
-
-
-def _drifting(fit: Fit, solution: Solution, starts: Sequence[Floats]) -> list[str]:
-    """Channels of which a drift, that was not asked for, would explain a misfit."""
-    known = {one.name for one in fit.lines}
-    found = []
-    for name in fit.test.responses if misfits(fit, solution) else ():
-        if f"drift of {name}" in known:
-            continue
-        lines = [*fit.lines, *(one for one in _lines(fit.test, (), [name]) if one.name not in known)]
-        other = Fit(fit.test, fit.motion, fit.forward, _kept(fit), lines, fit.table_lines, scans=False).solve(starts)
-        if not misfits(other.fit, other):
-            found.append(name)
-    return found
-
-
-def _with_friction(fit: Fit, solution: Solution) -> Solution:
-    """Another solution, in which friction plays a part, if it fits as well: a large Üy is but one reading."""
-    forward, g = fit.forward, fit.forward.model.g
-    held, peak = float(solution.parameters[0]), float(fit.motion.acceleration.max())
-    tan_theta = math.tan(math.radians(forward.theta))
-    # Eq. 7: a smaller Üy would have the block slide continuously
-    least = peak * (1.0 - tan_theta * (forward.mu_s - tan_theta)) - g * forward.mu_s
-    onset = max(_LOW * held, least + _LOW * (held - least))
-    starts = []
-    for decay in _START_DECAYS:
-        for top in _TOPS:
-            # Eq. 4 at the peak has the block's acceleration there a little above what was held throughout
-            behind = peak - min(top * held, peak)
-            friction = (g * forward.mu_s + peak * tan_theta * (forward.mu_s - tan_theta) - behind) / (
-                g + peak * tan_theta
-            )
-            excess = friction * math.exp(decay * peak / g) - forward.mu_s
-            if excess >= 0.0:
-                starts.append(np.array([onset, decay, excess]))
-    whiten = Whitening.of(fit.effects(solution.shapes))
-    effects = fit.effects(solution.shapes)
-
-    def square(start: Floats) -> float:
-        return float(np.sum(whiten(fit.residuals(start, solution.wrong, effects)) ** 2))
-
-    best = solution
-    for start in sorted(starts, key=square)[:_OTHERS]:
-        other = Fit(
-            fit.test, fit.motion, forward, _kept(fit), fit.lines, fit.table_lines, given_noise=dict(fit.noise),
-            scans=False,
-        ).solve([start])  # fmt: skip
-        alive = bool(np.isfinite(other.errors[1:]).all())
-        if alive and other.cost() < best.cost() + (_SAME_SQUARE if best is solution else 0.0):
-            best = other
-    return best
-
-
-def _kept(fit: Fit) -> dict[str, NDArray[np.bool_]]:
-    """The samples that a fit uses, with those beside jumps, which are others for another solution."""
-    use = dict(fit.use)
-    if "block_acceleration" in use:
-        use["block_acceleration"] = _samples(fit.test)["block_acceleration"]
-    return use
-
-
-# -------------------------------------------------------------------------------- what is asked
-
-
-def _noise_given(noise: Mapping[str, float] | None, test: ShakingTest) -> dict[str, float]:
-    if noise is None:
-        return {}
-    if not isinstance(noise, Mapping):
+    if noise is not None and not isinstance(noise, Mapping):
         raise InputError(f"noise = {shown(noise)}: must be a mapping of channels to standard deviations")
-    check_channels("noise", list(noise), test.responses)
-    found = {name: check_finite(f"noise.{name}", value) for name, value in noise.items()}
-    for name, value in found.items():
+    check_channels("noise", list(noise or ()), test.responses)
+    known = {name: check_finite(f"noise.{name}", value) for name, value in (noise or {}).items()}
+    for name, value in known.items():
         if value <= 0.0:
             raise InputError(f"noise.{name} = {shown(value)}: must be a finite number > 0")
-    return found
-
-
-def _check_contact(test: ShakingTest, theta: float, g: float) -> None:
-    table, tan_theta = test.channels[TABLE], math.tan(math.radians(theta))
-    if g + float(table.min()) * tan_theta <= 0.0:
-        raise InputError(
-            f"{test.name}: {TABLE} = {table.min():.4g} m/s2: the block would lift off (g + Üg tan θ must be > 0); are "
-            "its units right?"
-        )
-    if not float(table.max()) > 0.0:
+    check_contact(test, theta, model.g)
+    if not float(test.channels[TABLE].max()) > 0.0:
         raise InputError(f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope")
+    offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
+    return Observation(test, theta, mu_s, model, offsets, drifts, known)
 
 
-def _samples(test: ShakingTest) -> dict[str, NDArray[np.bool_]]:
-    """Samples that are there; not the last, at which a record ends."""
-    inside = np.arange(test.times.size) < test.times.size - 1
-    return {name: inside & np.isfinite(test.channels[name]) for name in test.responses}
+def _drifts(observed: Any, tests: Sequence[ShakingTest], drift: Any) -> list[str]:
+    """Channels of which an offset and a drift, that were not given, would explain a misfit."""
+    said = []
+    for name in tests[0].responses:
+        if all(name in test.responses for test in tests) and name not in drift:
+            other = estimate(observed(drift=[*([drift] if isinstance(drift, str) else drift), name]))
+            if not report(other, [], []).misfits:
+                said.append(
+                    f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
+                    f"drift = {name!r}."
+                )
+    return said
 
 
-def _with_table_lines(
-    motion: TableMotion, test: ShakingTest, offsets: Sequence[str], drifts: Sequence[str]
-) -> tuple[TableMotion, tuple[str, ...]]:
-    """The table's motion with its own offset and drift among what may be wrong."""
-    peak = float(np.abs(test.channels[TABLE]).max())
-    span = test.times[-1] - test.times[0]
-    names = []
-    if TABLE in offsets or TABLE in drifts:
-        motion = motion.with_line(-np.ones(motion.times.size), LARGE * peak)
-        names.append(f"offset of {TABLE}")
-    if TABLE in drifts:
-        motion = motion.with_line(-(motion.times - test.times[0]) / span, LARGE * peak)
-        names.append(f"drift of {TABLE}")
-    return motion, tuple(names)
+# ------------------------------------------------------------------------------ upslope slips
 
 
-def _lines(test: ShakingTest, offsets: Sequence[str], drifts: Sequence[str]) -> list[Line]:
-    """Offsets and drifts of the block's sensors."""
-    since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
-    lines = []
-    for name in test.responses:
-        size = LARGE * float(np.nanmax(np.abs(test.channels[name])))
-        if name in offsets or name in drifts:
-            lines.append(Line(f"offset of {name}", {name: np.ones(since.size)}, size))
-        if name in drifts:
-            lines.append(Line(f"drift of {name}", {name: since}, size))
-    return lines
+def _upslope(test: ShakingTest) -> list[tuple[float, float]]:
+    """From when to when the block slips upslope, which stick-slip does not have."""
+    times = test.times
+    velocity = test.channels.get("relative_velocity")
+    if velocity is None and "relative_displacement" in test.channels:
+        velocity = np.gradient(test.channels["relative_displacement"], times)
+    if velocity is None:
+        return []
+    noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+    wrong = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(int)))
+    episodes: list[tuple[float, float]] = []
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        if after - first < _UPSLOPE_SAMPLES:
+            continue
+        begin, end = float(times[max(first - 4, 0)]), float(times[min(after + 3, times.size - 1)])
+        if episodes and begin <= episodes[-1][1]:
+            episodes[-1] = episodes[-1][0], end
+        else:
+            episodes.append((begin, end))
+    return episodes
 
 
-# ------------------------------------------------------------------------------------- starts
+def _leave_out(observation: Observation, episodes: Sequence[tuple[float, float]]) -> None:
+    """Leave out the samples of upslope slips, after each of which the displacement may have stepped."""
+    times = observation.test.times
+    for begin, end in episodes:
+        for name, use in observation.use.items():
+            observation.use[name] = use & ~((times >= begin) & (times <= end))
+        if "relative_displacement" in observation.use:
+            size = 3.0 * float(np.nanmax(np.abs(observation.test.channels["relative_displacement"])))
+            step = {"relative_displacement": size * (times > end).astype(np.float64)}
+            observation.lines.append(Line(f"upslope slip at {begin:.4g} s of relative_displacement", step, size))
 
 
-def _starts(fit: Fit) -> list[Floats]:
-    """Where to look from: what Eq. 1 gives on the accelerations, and a coarse grid."""
-    test, peak, mu_s = fit.test, float(fit.test.channels[TABLE].max()), fit.forward.mu_s
-    starts = [
-        np.array([onset * peak, decay, excess * mu_s])
-        for onset in _START_ONSETS
-        for decay in _START_DECAYS
-        for excess in _START_EXCESS
-    ]
-    block = _block_acceleration(test)
-    if block is not None:
-        starts += _regressed(fit, block)
-    return starts
+# ------------------------------------------------------------------------------------ results
 
 
 def _block_acceleration(test: ShakingTest) -> Floats | None:
@@ -258,169 +170,147 @@ def _block_acceleration(test: ShakingTest) -> Floats | None:
     return None
 
 
-def _regressed(fit: Fit, block: Floats) -> list[Floats]:
-    """Onsets, and a straight line through ln μ over |Üg|/g while the block slides and Üg rises."""
-    test, forward = fit.test, fit.forward
-    smooth = np.interp(test.times, fit.motion.times, fit.motion.acceleration)
-    threshold = threshold_of(replace(test, channels={TABLE: smooth, "block_acceleration": block}))[0]
-    slides = slides_of(test.times, smooth, block, threshold)
-    if not slides:
-        return []
-    onsets = [onset_acceleration(test.times, smooth, block, one, threshold) for one in slides]
-    onset = max(float(np.median(onsets)), 0.02 * float(smooth.max()))
-    tan_theta, g = math.tan(math.radians(forward.theta)), forward.model.g
-    friction = forward.mu_s - tan_theta - (np.abs(smooth) - np.abs(block) - g * tan_theta) / (g + smooth * tan_theta)
-    rising = (np.gradient(smooth, test.times) > 0.0) & (smooth > onset) & (friction > 0.02 * forward.mu_s)
-    sliding = np.zeros(test.times.size, dtype=bool)
-    for one in slides:
-        sliding[one.part] = True
-    starts = []
-    # near the onset the yield value may govern, and Eq. 4 only above
-    for above in (onset, 0.5 * (onset + float(smooth.max()))):
-        use = rising & sliding & (smooth > above) & np.isfinite(friction)
-        if use.sum() < 4:
-            continue
-        slope, start = np.polyfit(smooth[use] / g, np.log(friction[use]), 1)
-        found = np.array([onset, -slope, math.exp(start) - forward.mu_s])
-        starts.append(np.maximum(found, [onset, 0.05, 1e-3]))
-    return starts
+def _coefficients(one: Observation) -> Coefficients | None:
+    """Friction by statics; None where neither the block's acceleration nor its velocity is measured."""
+    test, block = one.test, _block_acceleration(one.test)
+    if block is None:
+        return None
+    smooth = np.interp(test.times, one.motion.times, one.motion.acceleration)
+    known = ShakingTest(test.times, {TABLE: smooth, "block_acceleration": block}, test.name)
+    slides = slides_of(test.times, smooth, block, threshold_of(known)[0])
+    eq1 = eq1_friction(smooth, block, one.theta, one.mu_s, one.model.g)
+    return coefficients_of(smooth, block, eq1, slides, one.mu_s, one.theta, one.model.g)
 
 
-# ------------------------------------------------------------------------------ upslope slips
+def _test_dataset(one: Observation, linear: Linear, found: Estimate, cycles: bool) -> xr.Dataset:
+    """What belongs to one test: measured and computed series, misfits, cycles, what was removed."""
+    test = one.test
+    history = linear.forward(found.parameters, test.times)
+    added, removed = _removed(one, linear, found.parameters)
+    data: dict[str, Any] = {}
+    for name, values in test.channels.items():
+        data[f"measured_{name}"] = (("time",), values - added[name], CALIBRATION_SERIES[f"measured_{name}"])
+    for name in HISTORY:
+        data[f"computed_{name}"] = (("time",), history[:, COLUMN[name]], CALIBRATION_SERIES[f"computed_{name}"])
+    block = _block_acceleration(test)
+    if block is not None:
+        free = free_body_friction(block - added.get("block_acceleration", 0.0), one.theta, one.model.g)
+        eq1 = eq1_friction(data[f"measured_{TABLE}"][1], block, one.theta, one.mu_s, one.model.g)
+        data["friction_coefficient"] = (("time",), eq1, MEASURED_FRICTION["friction_coefficient"])
+        data["free_body_friction"] = (("time",), free, MEASURED_FRICTION["free_body_friction"])
+    for name, use in one.use.items():
+        counted = use & ~one.jumps_left_out if name == "block_acceleration" else use
+        rest = (test.channels[name] - added[name] - history[:, COLUMN[name]])[counted]
+        misfit = float(np.sqrt(np.mean(rest**2)))
+        span = max(float(np.nanmax(np.abs(history[:, COLUMN[name]]))), 1e-300)
+        about = HISTORY[name]
+        long_name = f"root mean square of measured less computed {about['long_name']}"
+        data[f"misfit_{name}"] = ((), misfit, {**about, "long_name": long_name})
+        data[f"relative_misfit_{name}"] = ((), misfit / span, {"units": "1", "long_name": f"{long_name}, over largest"})
+    for name in ("permanent_displacement", "validity"):
+        data[name] = found.summary(one)[name].variable
+    data["removed"] = ((), "; ".join(removed) or "nothing", {"long_name": "offsets, drifts and steps taken off"})
+    dataset = xr.Dataset(data, {"time": ("time", test.times, {"units": "s", "long_name": "time"})}, dict(test.attrs))
+    return dataset.merge(_cycles(one, linear, found)) if cycles else dataset
 
 
-def _upslope(test: ShakingTest) -> list[tuple[float, float]]:
-    """From when to when the block slips upslope, which stick-slip does not have."""
-    times, wrong = test.times, np.zeros(test.times.size, dtype=bool)
-    if "relative_velocity" in test.channels:
-        velocity = test.channels["relative_velocity"]
-        wrong |= velocity < -_UPSLOPE_NOISE * max(noise_of(velocity), 1e-3 * float(np.nanmax(np.abs(velocity))))
-    elif "block_acceleration" in test.channels:
-        table, block = test.channels[TABLE], test.channels["block_acceleration"]
-        for one in slides_of(times, table, block, threshold_of(test)[0]):
-            part = slice(one.onset, one.onset + _UPSLOPE_SAMPLES)
-            wrong[one.part] |= bool(np.nanmean((table - block)[part]) < 0.0 and np.mean(table[part]) < 0.0)
-    else:
-        displacement = test.channels["relative_displacement"]
-        back = np.full(times.size, 0.0)
-        back[:-10] = displacement[10:] - displacement[:-10]
-        wrong |= back < -1.5 * _UPSLOPE_NOISE * max(
-            noise_of(displacement), 1e-3 * float(np.nanmax(np.abs(displacement)))
-        )
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(int)))
-    episodes: list[tuple[float, float]] = []
-    for first, after in zip(edges[::2], edges[1::2], strict=True):
-        if after - first < _UPSLOPE_SAMPLES:
-            continue
-        begin, end = float(times[max(first - 3, 0)]), float(times[min(after + 3, times.size - 1)])
-        if episodes and begin <= episodes[-1][1]:
-            episodes[-1] = episodes[-1][0], end
-        else:
-            episodes.append((begin, end))
-    return episodes
+def _removed(one: Observation, linear: Linear, parameters: Floats) -> tuple[dict[str, Floats], list[str]]:
+    """What offsets, drifts and steps add to each channel, and each in words with its standard error."""
+    values, spread = linear.nuisances(parameters)
+    added = {name: np.zeros(one.test.times.size) for name in one.test.channels}
+    texts = []
+    first = one.wrong.size - len(one.table_lines)
+    for at, line in enumerate([*one.table_lines, *one.lines], first):
+        for name, part in line.parts.items():
+            added[name] = added[name] + values[at] * part
+            over = " over the whole test" if line.name.startswith("drift") else ""
+            texts.append(
+                f"{line.name}: {values[at] * line.deviation:.4g} ± {spread[at] * line.deviation:.2g} "
+                f"{HISTORY[name]['units']}{over}"
+            )
+    return added, texts
 
 
-def _without(fit: Fit, episodes: Sequence[tuple[float, float]]) -> Fit:
-    """The fit without the samples of upslope slips, after each of which the displacement may have stepped."""
-    times, use = fit.test.times, _samples(fit.test)
-    lines = list(fit.lines)
-    for begin, end in episodes:
-        for name in use:
-            use[name] = use[name] & ~((times >= begin) & (times <= end))
-        if "relative_displacement" in use:
-            size = LARGE * float(np.nanmax(np.abs(fit.test.channels["relative_displacement"])))
-            step = {"relative_displacement": (times > end).astype(float)}
-            lines.append(Line(f"upslope slip at {begin:.4g} s", step, size))
-    return Fit(fit.test, fit.motion, fit.forward, use, lines, fit.table_lines, given_noise=fit.given_noise)
-
-
-# ------------------------------------------------------------------------------------- cycles
-
-
-def _windows(motion: TableMotion, onset: float) -> list[tuple[float, float, float]]:
-    """Cycles of the table's motion in which it exceeds Üy: begin (a rise through zero), end, and peak."""
-    above = np.concatenate([[False], motion.acceleration > 0.0, [False]])
+def _cycles(one: Observation, linear: Linear, found: Estimate) -> xr.Dataset:
+    """Each cycle by itself: estimates, standard errors and Kd."""
+    peak, onset = one.peak, float(found.parameters[0])
+    above = np.concatenate([[False], one.motion.acceleration > 0.0, [False]])
     edges = np.flatnonzero(np.diff(above.astype(int)))
     pulses = [
-        (float(motion.times[first]), float(motion.acceleration[first:after].max()))
+        (float(one.motion.times[first]), float(one.motion.acceleration[first:after].max()))
         for first, after in zip(edges[::2], edges[1::2], strict=True)
     ]
-    least = max(onset, _A_CYCLE * float(motion.acceleration.max()))
-    pulses = [(begin, peak) for begin, peak in pulses if peak > least]
-    ends = [begin for begin, _ in pulses[1:]] + [float(motion.times[-1])]
-    return [(begin, end, peak) for (begin, peak), end in zip(pulses, ends, strict=True)]
-
-
-def _cycles(fit: Fit, solution: Solution) -> list[Cycle]:
-    """Each cycle by itself, from where the whole test's block stands as it begins."""
-    test, times = fit.test, fit.test.times
-    limit = _limit(fit, solution.parameters)
-    whole = fit.computed(solution.parameters, solution.wrong)
-    found = []
-    for begin, end, peak in _windows(fit.motion, float(solution.parameters[0])):
-        inside = (times >= begin) & (times < end)
-        since = np.where(inside, times - begin, 0.0)
-        use = {name: fit.use[name] & inside for name in fit.use}
-        first = int(np.argmax(inside))
-        continuous = peak > limit
-        nothing = np.full(3, np.nan)
-        if sum(int(one.sum()) for one in use.values()) < _FEWEST_IN_A_CYCLE or not inside.any():
-            found.append(Cycle(begin, peak, continuous, nothing, nothing, math.nan))
-            continue
-        lines = list(fit.lines)
-        # what the cycles before have left: a displacement, and a velocity where the block is not at rest
-        size = {name: LARGE * float(np.nanmax(np.abs(test.channels[name]))) for name in test.responses}
-        if "relative_displacement" in use:
-            lines.append(Line("start", {"relative_displacement": np.ones(times.size)}, size["relative_displacement"]))
-        if whole[first, COLUMN["relative_velocity"]] != 0.0:
-            parts = {"relative_velocity": np.ones(times.size), "relative_displacement": since}
-            parts = {name: part for name, part in parts.items() if name in use}
-            most = max(size.get("relative_velocity", 0.0), size.get("relative_displacement", 0.0))
-            if parts:
-                lines.append(Line("initial velocity", parts, most))
-        unknown = [at for at in range(3) if not np.isfinite(solution.errors[at])]
-        fixed = tuple({*unknown, 0} if continuous else unknown)
-        own = Fit(
-            test, fit.motion, fit.forward, use, lines, fit.table_lines, fixed, given_noise=dict(fit.noise), scans=False
+    pulses = [(begin, top) for begin, top in pulses if top > max(onset, _A_CYCLE * peak)]
+    ends = [begin for begin, _ in pulses[1:]] + [float(one.motion.times[-1])]
+    continuous = "continuous" in found.readings
+    rows = []
+    for (begin, top), end in zip(pulses, ends, strict=True):
+        inside = (one.test.times >= begin) & (one.test.times < end)
+        values, errors = np.full(3, np.nan), np.full(3, np.nan)
+        if inside.sum() >= _FEWEST_IN_A_CYCLE:
+            values, errors = cycle_estimate(linear, found, begin, end, free=(1, 2) if continuous else (0, 1, 2))
+        history = linear.forward(np.where(np.isfinite(values), values, found.parameters), one.test.times)
+        slides = inside & (history[:, COLUMN[TABLE]] > 0.0)
+        held = float(history[slides, COLUMN["block_acceleration"]].max()) if slides.any() else math.nan
+        rows.append(
+            (begin, top, 2 if continuous else 1, math.nan if continuous else held / one.model.g, values, errors)
         )
-        part = own.solve([solution.parameters], solution.shapes)
-        estimate, errors = part.parameters.copy(), part.errors
-        lost = np.array([at in fixed or not np.isfinite(errors[at]) for at in range(3)])
-        block = fit.computed(part.parameters, solution.wrong)
-        slides = inside & (block[:, COLUMN[TABLE]] > 0.0)
-        top = float(block[slides, COLUMN["block_acceleration"]].max()) if slides.any() else math.nan
-        attenuation = math.nan if continuous else top / fit.forward.model.g
-        found.append(
-            Cycle(
-                begin,
-                peak,
-                continuous,
-                np.where(lost, np.nan, estimate),
-                np.where(lost, np.nan, errors),
-                attenuation,
-            )
-        )
-    return found
-
-
-def _limit(fit: Fit, parameters: Floats) -> float:
-    """Üg,lim by Eq. 7."""
-    from slipsweep.grid.plans import plan_friction_parameters
-
-    inputs = Inputs(
-        theta=fit.forward.theta, mu_s=fit.forward.mu_s, amplitude=1.0, yield_acceleration=float(parameters[0]),
-        decay_rate=float(parameters[1]), delta_mu=float(parameters[2]),
-    )  # fmt: skip
-    plan = plan_friction_parameters(inputs, model=fit.forward.model)
-    return float(plan.solve()["limiting_acceleration"].item())
-
-
-def _summary(fit: Fit, solution: Solution) -> xr.Dataset:
-    """The results of a sweep for what was found."""
-    given = dict(zip(SOUGHT, map(float, solution.parameters), strict=True))
-    plan = plan_sweep(
-        Inputs(theta=fit.forward.theta, mu_s=fit.forward.mu_s, **given),
-        excitation=fit.motion.record(solution.wrong),
-        model=fit.forward.model,
+    data: dict[str, Any] = {
+        "cycle_start": [row[0] for row in rows],
+        "cycle_peak_acceleration": [row[1] for row in rows],
+        "cycle_sliding_mode": np.array([row[2] for row in rows], np.int8),
+        "cycle_attenuation_coefficient": [row[3] for row in rows],
+    }
+    for at, name in enumerate(SOUGHT):
+        data[f"cycle_{name}"] = [row[4][at] for row in rows]
+        data[f"cycle_{name}_error"] = [row[5][at] for row in rows]
+    number = ("cycle", np.arange(1, len(rows) + 1), {"units": "1", "long_name": "number of the cycle"})
+    return xr.Dataset(
+        {name: (("cycle",), np.asarray(values), CALIBRATION[name]) for name, values in data.items()}, {"cycle": number}
     )
-    return plan.solve()
+
+
+def _with_estimates(
+    dataset: xr.Dataset,
+    found: Estimate,
+    said: Reported,
+    coefficients: Sequence[Coefficients | None],
+    tests: Sequence[ShakingTest],
+) -> xr.Dataset:
+    """What belongs to all tests together: parameters, intervals, correlation, sentences and tables."""
+    first = found.observations[0]
+    data: dict[str, Any] = {}
+    for at, name in enumerate(SOUGHT):
+        about = PARAMETERS[name]
+        data[name] = ((), found.parameters[at], about)
+        error = said.errors[at]
+        data[f"{name}_error"] = ((), error, {**about, "long_name": f"standard error of the {about['long_name']}"})
+        interval = {**about, "long_name": f"95 % interval of the {about['long_name']}"}
+        data[f"{name}_interval"] = (("bound",), found.intervals[at], interval)
+    data["correlation"] = (("parameter", "other_parameter"), said.correlation, CALIBRATION["correlation"])
+    for one in coefficients[:1]:
+        data |= one.variables() if one is not None else {}
+    place = np.arange(3, dtype=np.int8)
+    names = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
+    coords = {
+        "parameter": (("parameter",), place, {"long_name": "parameter", **names}),
+        "other_parameter": (("other_parameter",), place, {"long_name": "other parameter", **names}),
+        "bound": BOUND,
+        "theta": ((), first.theta, PARAMETERS["theta"]),
+        "mu_s": ((), first.mu_s, PARAMETERS["mu_s"]),
+    }
+    dataset = dataset.assign(data).assign_coords(coords)
+    removed = dict.fromkeys(np.atleast_1d(dataset["removed"].values).tolist())
+    dataset = dataset.drop_vars("removed")
+    dataset.attrs = {
+        "title": "Calibration of a sliding block from tests on a shaking table",
+        **SOURCE,
+        **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(test.name for test in tests)}),
+        **MODELS.attributes(first.model),
+        "removed": "; ".join(removed),
+        "constant_friction": said.constant,
+        "findings": "\n".join(said.findings),
+        "model_table": said.model_table,
+        "uncertainty_table": said.uncertainty_table,
+    }
+    return dataset

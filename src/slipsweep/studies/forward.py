@@ -22,23 +22,17 @@ COLUMN = {name: at for at, name in enumerate(HISTORY)}
 
 
 class Forward:
-    """A block of known inclination and static friction, on motions and with parameters that are tried.
+    """A block of known inclination and static friction on one motion, for parameters that are tried."""
 
-    Attributes
-    ----------
-    runs : int
-        Solutions so far.
-    """
-
-    def __init__(self, theta: float, mu_s: float, model: Mendez) -> None:
+    def __init__(self, theta: float, mu_s: float, model: Mendez, record: Record) -> None:
         self.theta, self.mu_s, self.model = theta, mu_s, model
-        self.runs = 0
+        self._options = options_of(Problem(model, record, Cycle()), wants_peak=True)
+        self._wave = wave_of_record(record, 1.0)
+        self._workspace = workspace_of(self._wave, keeps_log=True)
 
-    def __call__(self, record: Record, parameters: Floats, times: Floats) -> Floats:
-        """Columns of `HISTORY` at the times, for Üy, λ and Δμ."""
-        self.runs += 1
-        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, 1.0, *map(float, parameters), math.nan)
-        table, wave = np.empty((len(COLUMN), times.size)), wave_of_record(record, 1.0)
-        options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
-        record_history(cell, options, wave, workspace_of(wave, keeps_log=True), times, History(*table))
+    def __call__(self, parameters: Floats, times: Floats, scale: float = 1.0) -> Floats:
+        """Columns of `HISTORY` at the times, for Üy, λ and Δμ and the motion times `scale`."""
+        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, scale, *map(float, parameters), math.nan)
+        table = np.empty((len(COLUMN), times.size))
+        record_history(cell, self._options, self._wave, self._workspace, times, History(*table))
         return table.T

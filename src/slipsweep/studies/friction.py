@@ -1,9 +1,12 @@
-"""The friction that a test measured: Eq. 1 on recorded accelerations, and the slides in them.
+"""The friction that a test measured: Eq. 1 and statics on recorded accelerations, and the slides in them.
 
 The block slides where its acceleration is not the table's.  A slide is looked for in the relative acceleration
-r = Üg − Ü: it begins where |r| exceeds a threshold at two samples in turn, and goes on until the relative velocity,
+r = Üg − Ü: it begins where |r| exceeds a threshold at two consecutive samples, and goes on until the relative velocity,
 the integral of r from there on, comes back to zero or r stays below the threshold.  The threshold stands above
 the noise of r, which is estimated from r itself.
+
+Eq. 1 is the paper's μ(t).  It calls friction whatever the table's acceleration exceeds the block's by.  The friction
+that acts on a block of horizontal acceleration Ü is, by statics, tan(θ + arctan(Ü/g)).
 """
 
 from collections.abc import Sequence
@@ -13,12 +16,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
+from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.kernels.history import eq1_friction
 from slipsweep.model.parameters import check_finite, check_single, shown
-from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, SLIDES
+from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import TABLE, ShakingTest, removed_text
+from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +38,19 @@ LEAST_THRESHOLD = 0.005
 #: of r is back at zero; and that end one whatever the integral, which an offset of a sensor takes along.
 _BEGINS, _ENDS, _ENDS_ANYWAY = 2, 4, 20
 
-#: Third differences of white noise have 20 times its variance; those of a motion that the sampling resolves are small.
-_DIFFERENCES, _VARIANCE = 3, 20.0
+#: Samples at either end of a slide that are not taken for its friction, and those that show how it begins.
+_AT_ENDS, _FIRST = 3, 6
+
+#: Friction is level if it scatters by this part of itself at most beyond the noise, and Eq. 1 falls if this part of its
+#: samples lies below that part of the static coefficient.
+_LEVEL, _LOW_SHARE, _LOW = 0.05, 0.05, 0.8
+
+
+#: Attributes by which results are known as ours.
+SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
+
+#: The ends of intervals of results.
+BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "probability below an end of an interval"})
 
 
 @dataclass(frozen=True)
@@ -49,13 +65,6 @@ class Slide:
     def part(self) -> slice:
         """Its samples."""
         return slice(self.onset, None if self.stop is None else self.stop + 1)
-
-
-def noise_of(values: Floats) -> float:
-    """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
-    finite = values[np.isfinite(values)]
-    differences = np.diff(finite, _DIFFERENCES) / _VARIANCE**0.5
-    return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
 
 def threshold_of(test: ShakingTest, threshold: Any = None) -> tuple[float, str]:
@@ -112,15 +121,109 @@ def _stop(
 ) -> int | None:
     """Where a slide that begins at the first sample stops; None if the record ends before."""
     steps = 0.5 * (relative[1:] + relative[:-1]) * np.diff(times)
-    velocity = np.abs(np.concatenate([[0.0], np.cumsum(steps)]))
+    signed = np.concatenate([[0.0], np.cumsum(steps)])
+    velocity = np.abs(signed)
     # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise adds up to
     slow = velocity <= 0.1 * np.maximum.accumulate(velocity) + threshold * (times[1] - times[0])
-    stops = np.flatnonzero((quiet & slow) | long)
+    turned = signed * np.sign(signed[min(_BEGINS, signed.size - 1)]) < 0.0  # as a slide the other way begins
+    stops = np.flatnonzero((quiet & slow) | long | turned)
     stops = stops[stops > 0]
     return int(stops[0]) if stops.size else None
 
 
-def friction_table(
+def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
+    """The friction coefficient that acts on a block of horizontal acceleration Ü: tan(θ + arctan(Ü/g)).
+
+    At rest it is the mobilised friction.
+    """
+    return np.asarray(np.tan(np.radians(theta) + np.arctan(block / g)))
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Static and kinetic friction of downslope slides by statics, with 95 % intervals.
+
+    `constant`: level while the block slides, where Eq. 1 falls.
+    """
+
+    static: float
+    static_interval: tuple[float, float]
+    kinetic: float
+    kinetic_interval: tuple[float, float]
+    constant: bool
+
+    @property
+    def sentence(self) -> str:
+        """What must be said of a block of constant friction; "" of others."""
+        if not self.constant:
+            return ""
+        return (
+            f"This is a block of constant friction: by statics {self.kinetic:.3g} while it slides, though Eq. 1 falls. "
+            "Newmark's model is the right one for it."
+        )
+
+    def variables(self) -> dict[str, xr.Variable]:
+        """The coefficients and their intervals, along `bound`."""
+        found = {}
+        for kind, value, ends in (
+            ("static", self.static, self.static_interval),
+            ("kinetic", self.kinetic, self.kinetic_interval),
+        ):
+            about = {"units": "1", "long_name": f"{kind} friction coefficient by statics"}
+            found[f"{kind}_friction"] = xr.Variable((), value, about)
+            interval = {"units": "1", "long_name": f"95 % interval of the {about['long_name']}"}
+            found[f"{kind}_friction_interval"] = xr.Variable(("bound",), np.array(ends), interval)
+        return found
+
+
+def coefficients_of(
+    table: Floats,
+    block: Floats,
+    eq1: Floats,
+    slides: Sequence[Slide],
+    mu_s: float,
+    theta: float,
+    g: float,
+) -> Coefficients:
+    """Friction coefficients from the slides that begin downslope."""
+    threshold = max(NOISE_IN_THRESHOLD * noise_of(table - block), LEAST_THRESHOLD * float(np.abs(table).max()))
+    free = free_body_friction(block, theta, g)
+    levels, inside, starts, between = [], [], [], []
+    for one in slides:
+        part = slice(one.onset + _AT_ENDS, (table.size if one.stop is None else one.stop + 1) - _AT_ENDS)
+        values = free[part]
+        if np.isfinite(values).sum() < 3 or not np.nanmean((table - block)[one.onset : one.onset + _AT_ENDS]) > 0.0:
+            continue
+        levels.append(float(np.nanmean(values)))
+        inside.append(np.column_stack([values, eq1[part]]))
+        first = one.onset + int(np.argmax(np.nan_to_num(table - block)[one.part] > threshold))
+        begin, before = float(np.nanmean(block[first : first + _FIRST])), float(table[max(first - 1, 0)])
+        jumps = before - begin > threshold  # else it would have been seen to slide at the sample before
+        starts.append(0.5 * (before + float(table[first])) if jumps else begin)
+        between.append(0.5 * (float(table[first]) - before) if jumps else 0.0)
+    if not levels:
+        return Coefficients(np.nan, (np.nan, np.nan), np.nan, (np.nan, np.nan), False)
+    slope = 1.0 / g / np.cos(np.radians(theta)) ** 2  # of friction by the block's acceleration, near enough
+    noise = noise_of(block) * slope
+    every = np.concatenate(inside)
+    kinetic, kinetic_ends = _mean(np.array(levels), noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
+    static, static_ends = _mean(free_body_friction(np.array(starts), theta, g), noise, float(np.mean(between)) * slope)
+    scatter = float(np.nanmean((every[:, 0] - kinetic) ** 2)) - noise**2
+    level = kinetic > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic
+    falls = float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
+    return Coefficients(static, static_ends, kinetic, kinetic_ends, level and falls)
+
+
+def _mean(values: Floats, noise: float, systematic: float) -> tuple[float, tuple[float, float]]:
+    """Mean of a value a slide and its 95 % interval: their scatter, or the noise, and what does not average out."""
+    number = values.size
+    scatter = float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
+    half = max(scatter, 1.96 * noise) / number**0.5 + systematic
+    mean = float(np.mean(values))
+    return mean, (mean - half, mean + half)
+
+
+def friction_dataset(
     test: ShakingTest,
     theta: Any,
     mu_s: Any,
@@ -139,52 +242,69 @@ def friction_table(
         )
     theta, mu_s, g = (check_single(name, value) for name, value in (("theta", theta), ("mu_s", mu_s), ("g", g)))
     test, removed = test.corrected(offset, drift, rest)
+    check_contact(test, theta, g)
     table, block = test.channels[TABLE], test.channels["block_acceleration"]
-    tan_theta = float(np.tan(np.radians(theta)))
-    lowest = int(np.argmin(table))
-    if g + table[lowest] * tan_theta <= 0.0:
-        raise InputError(
-            f"{test.name}: {TABLE} = {table[lowest]:.4g} m/s2 at {test.times[lowest]:.6g} s: the block would lift off "
-            f"(g + Üg tan θ must be > 0); are its units right?"
-        )
-    friction = np.empty_like(table)
-    eq1_friction(table, block, mu_s, tan_theta, g, friction)
+    friction = eq1_friction(table, block, theta, mu_s, g)
     limit, why = threshold_of(test, threshold)
     slides = slides_of(test.times, table, block, limit)
-    stops = [None if one.stop is None else test.times[one.stop] for one in slides]
+    free = free_body_friction(block, theta, g)
+    coefficients = coefficients_of(table, block, friction, slides, mu_s, theta, g)
     found = {
         "slide_onset": [test.times[one.onset] for one in slides],
         "slide_peak": [test.times[one.peak] for one in slides],
-        "slide_stop": [np.nan if stop is None else stop for stop in stops],
+        "slide_stop": [np.nan if one.stop is None else test.times[one.stop] for one in slides],
         "onset_acceleration": [onset_acceleration(test.times, table, block, one, limit) for one in slides],
         "peak_acceleration": [table[one.peak] for one in slides],
         "peak_block_acceleration": [np.nanmax(block[one.part]) for one in slides],
         "least_friction": [np.nanmin(friction[one.part]) for one in slides],
+        "slide_free_body_friction": [np.nanmedian(free[one.part]) for one in slides],
     }
     series = {
         TABLE: table,
         "block_acceleration": block,
         "friction_coefficient": friction,
         "friction_ratio": friction / mu_s,
+        "free_body_friction": free,
     }
     about = HISTORY | MEASURED_FRICTION
     return xr.Dataset(
-        {name: xr.Variable(("time",), values, about[name]) for name, values in series.items()}
-        | {name: xr.Variable(("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()},
+        {name: (("time",), values, about[name]) for name, values in series.items()}
+        | {name: (("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()}
+        | coefficients.variables(),
         {
-            "time": xr.Variable(("time",), test.times, {"units": "s", "long_name": "time"}),
-            "theta": xr.Variable((), np.array(theta), PARAMETERS["theta"]),
-            "mu_s": xr.Variable((), np.array(mu_s), PARAMETERS["mu_s"]),
+            "time": ("time", test.times, {"units": "s", "long_name": "time"}),
+            "theta": ((), np.array(theta), PARAMETERS["theta"]),
+            "mu_s": ((), np.array(mu_s), PARAMETERS["mu_s"]),
+            "bound": BOUND,
         },
         {
-            "title": "Friction measured on a shaking table (Eq. 1)",
+            "title": "Friction measured on a shaking table (Eq. 1, and by statics)",
+            **SOURCE,
             **test.attrs,
             "g": g,
+            "constant_friction": coefficients.sentence,
             "threshold": limit,
             "threshold_from": why,
             "removed": "; ".join(removed_text(removed)) or "nothing",
         },
     )
+
+
+def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: float) -> Floats:
+    """μ(t) = tan φs − tan θ − (|Üg| − |Ü| − g tan θ) / (g + Üg tan θ)   (1)"""
+    tan_theta = np.tan(np.radians(theta))
+    return np.asarray(mu_s - tan_theta - (np.abs(table) - np.abs(block) - g * tan_theta) / (g + table * tan_theta))
+
+
+def check_contact(test: ShakingTest, theta: float, g: float) -> None:
+    """Refuse a test in which the block would lift off."""
+    table, tan_theta = test.channels[TABLE], float(np.tan(np.radians(theta)))
+    lowest = int(np.argmin(table))
+    if g + table[lowest] * tan_theta <= 0.0:
+        raise InputError(
+            f"{test.name}: {TABLE} = {table[lowest]:.4g} m/s2 at {test.times[lowest]:.6g} s: the block would lift off "
+            "(g + Üg tan θ must be > 0); are its units right?"
+        )
 
 
 def onset_acceleration(times: Floats, table: Floats, block: Floats, slide: Slide, threshold: float) -> float:

@@ -10,8 +10,8 @@ from slipsweep.errors import InputError
 from slipsweep.model.options import Model
 from slipsweep.model.parameters import check_numbers, shown
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
-from slipsweep.studies.calibration import calibration_table
-from slipsweep.studies.friction import friction_table
+from slipsweep.studies.calibration import calibration_dataset
+from slipsweep.studies.friction import friction_dataset
 
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
@@ -28,9 +28,10 @@ def measured_friction(
     rest: tuple[float, float] | None = None,
     threshold: float | None = None,
 ) -> xr.Dataset:
-    """Friction coefficient that a test on a shaking table measured, and the slides in it.
+    """Friction that a test on a shaking table measured, by Eq. 1 and by statics, and the slides in it.
 
-    The coefficient is that of Eq. 1 of the paper [1]_.
+    Eq. 1 of the paper [1]_ gives μ(t) from the accelerations of table and block.  It falls also for a block of constant
+    friction.  Statics gives the friction that acts on the block, tan(θ + arctan(Ü/g)).
 
     Parameters
     ----------
@@ -55,11 +56,13 @@ def measured_friction(
     Returns
     -------
     Dataset
-        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` μ(t) and
-        `friction_ratio` μ(t)/μs.  While the block sticks, μ(t) is what friction is mobilised, not what it could be.
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` μ(t) by Eq. 1,
+        `friction_ratio` μ(t)/μs, and `free_body_friction`, at rest the mobilised friction.
         Along `slide`: `slide_onset`, `slide_peak` (of the table's acceleration) and `slide_stop` (s; NaN where the
-        record ends before), `onset_acceleration`, `peak_acceleration` and `peak_block_acceleration` (m/s²) and
-        `least_friction`.  The attributes `threshold` (m/s²) and `threshold_from` say how slides were found.
+        record ends before), `onset_acceleration`, `peak_acceleration` and `peak_block_acceleration` (m/s²),
+        `least_friction` (Eq. 1) and `slide_free_body_friction`.  `static_friction` and `kinetic_friction` by statics,
+        each with ``_interval`` (95 %, along `bound`).  The attributes `threshold` (m/s²) and `threshold_from` say how
+        slides were found; `constant_friction` is a sentence if friction is constant by statics where Eq. 1 falls.
 
     Raises
     ------
@@ -85,11 +88,11 @@ def measured_friction(
     >>> test.least_friction.round(2).values
     array([0.07, 0.07, 0.06, 0.08, 0.06, 0.04, 0.06, 0.05])
     """
-    return friction_table(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
+    return friction_dataset(test_of(test), theta, mu_s, g=g, offset=offset, drift=drift, rest=rest, threshold=threshold)
 
 
 def calibrate(
-    test: Test,
+    test: Test | Sequence[Test],
     theta: float,
     mu_s: float,
     *,
@@ -99,16 +102,17 @@ def calibrate(
     noise: Mapping[str, float] | None = None,
     cycles: bool = True,
 ) -> xr.Dataset:
-    """Üy, λ and Δμ from a test on a shaking table, by least squares with the exact solver.
+    """Üy, λ and Δμ from tests on a shaking table, by profile likelihood with the exact solver.
 
     The table's recorded motion shakes the model's block, and what it does is fitted to whatever was measured of the
     real one, each channel weighted by its noise.  The noise of the table's own record enters the intervals.
 
     Parameters
     ----------
-    test : path, Dataset, mapping of str to DataArray, or ShakingTest
+    test : path, Dataset, mapping of str to DataArray, or ShakingTest, or a list of these
         As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²), `relative_velocity`
         (m/s) and `relative_displacement` (m), downslope positive; NaN or a blank cell where there is no sample.
+        Several tests of one interface are calibrated together.
     theta, mu_s : float
         Inclination of the plane, degrees, and static friction coefficient, measured by other means.
     model : Mendez or str
@@ -118,20 +122,23 @@ def calibrate(
         line; "all" for all.  These are fitted together with the parameters; what was found stands in the attribute
         `removed`.
     noise : mapping of str to float, optional
-        Standard deviation of the noise of channels; by default what is left over.
+        Standard deviation of the noise of channels; by default estimated from the residuals.
     cycles : bool
         Whether each cycle is fitted by itself, too.
 
     Returns
     -------
     Dataset
-        `yield_acceleration` (m/s²), `decay_rate` and `delta_mu`, each with ``_error`` (standard error; NaN where the
-        test does not determine it) and ``_interval`` (95 %, along `bound`), and their `correlation`.  Along `cycle`:
+        `yield_acceleration` (m/s²), `decay_rate` and `delta_mu`, each with ``_error`` (standard error; NaN where it is
+        not determined) and ``_interval`` (95 %, along `bound`; 0 and inf where the data set no bound), and their
+        `correlation`.  `static_friction` and `kinetic_friction` by statics with intervals.  Along `cycle`:
         ``cycle_`` and the same names, `cycle_start` (s), `cycle_peak_acceleration` (m/s²), `cycle_sliding_mode` and
         `cycle_attenuation_coefficient` (Kd, stick-slip).  Along `time`: ``measured_`` (less `removed`) and
-        ``computed_`` accelerations, velocity and displacement, and the computed friction.  ``misfit_`` and a
-        channel is the root mean square of their difference.  Attributes: `findings`, sentences on what the test
-        cannot tell and what would; `model_table` and `uncertainty_table`, to paste into a sweep file.
+        ``computed_`` accelerations, velocity and displacement, the computed friction, and the measured
+        `friction_coefficient` (Eq. 1) and `free_body_friction`.  ``misfit_`` and a channel is the root mean square of
+        their difference.  Several tests have a dimension `test` more.  Attributes: `findings`, sentences on what the
+        tests do not determine and what would; `constant_friction`, as of `measured_friction`; `model_table` and
+        `uncertainty_table`, to paste into a sweep file, commented out if they are not ready for use.
 
     Raises
     ------
@@ -157,9 +164,8 @@ def calibrate(
     >>> print(f"{found.yield_acceleration.item():.2f} m/s2, {found.decay_rate.item():.2f}, {found.delta_mu.item():.2f}")
     1.80 m/s2, 2.00, 0.10
     """
-    return calibration_table(
-        test_of(test), theta, mu_s, model=model, offset=offset, drift=drift, noise=noise, cycles=cycles
-    )
+    tests = [test_of(one) for one in test] if isinstance(test, list | tuple) else [test_of(test)]
+    return calibration_dataset(tests, theta, mu_s, model=model, offset=offset, drift=drift, noise=noise, cycles=cycles)
 
 
 def test_of(given: Any) -> ShakingTest:

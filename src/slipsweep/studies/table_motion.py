@@ -1,45 +1,43 @@
-"""The motion of a shaking table behind its noisy record: a cubic spline by least squares, and how sure it is.
+"""The motion of a shaking table behind its noisy record: a least-squares spline, and how uncertain it is.
 
-A block integrates the table's acceleration, and its own acceleration rises with the largest that the table
-reached: noise taken for motion would shift both.  The spline has as many coefficients as Akaike's criterion, with
-its correction for few samples, asks for: few under a smooth motion, many under a sharp one or without noise.
+The block integrates the table's acceleration and its own acceleration rises with the largest that the table reached:
+noise taken for motion would shift both.  Akaike's criterion (corrected for few samples) chooses the number of
+coefficients: few under a smooth motion, many under a sharp one or without noise.  A kink is put where the shaking
+begins and ends if the criterion asks for it.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, CubicSpline
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
-
-from slipsweep.motion.records import Record
-from slipsweep.studies.friction import noise_of
+from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.linalg import cholesky, solve_triangular
 
 Floats = NDArray[np.float64]
 
-DEGREE = 3
+_DEGREE = 3
 
-#: Splines with a kink at various places, and how likely each is.
-_Kink = list[tuple[float, BSpline]]
+#: Samples for each coefficient that are tried.
+_SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
 
-#: Samples a coefficient that are tried.
-_SPACINGS = (48, 32, 24, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2)
+#: Spacings by which the knots are closer than the criterion says: what a spline cannot follow is no noise, and enters
+#: no interval.
+_FINER = 2
 
-#: Points at which a spline is handed to the solver, in each interval of its knots: straight lines between them are
-#: wrong by 5e-4 of the peak or less where a cycle has 12 intervals.
-_POINTS = 8
+#: Most coefficients whose uncertainty is followed; each costs a solution.
+_MOST_SHAPES = 150
 
-#: Most ways in which a motion may be wrong; each costs a solution.
-MOST_SHAPES = 150
+#: Multiples of the noise beyond which the table moves, and samples before that where a kink is tried.
+_MOVES, _KINK_SAMPLES = 5.0, 12
 
-#: Standard deviations of the noise with which the shaking has begun, and half samples before it where a kink may lie.
-_MOVES, _KINK_SAMPLES = 5.0, 24
+#: Linear interpolation of the spline is wrong by this part of the noise at most, between these numbers of points.
+_INTERPOLATION, _FEWEST_POINTS, _MOST_POINTS = 0.05, 4, 32
 
-#: Ways in which a motion may be wrong as the place of a kink is not known.
-_KINK_WAYS = 4
+#: Multiple of the standard deviation of a converter's errors that is taken for their noise.
+_CONVERTER = 1.6
 
-#: Noise, in parts of the largest acceleration, below which a record is taken as it is.
-LITTLE_NOISE = 1e-3
+#: Third differences of white noise have 20 times its variance; those of a motion that the sampling resolves are small.
+_VARIANCE = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,134 +46,120 @@ class TableMotion:
 
     Attributes
     ----------
-    times : ndarray
-        Where `acceleration` and `shapes` are given, s; the motion is linear between them.
-    acceleration : ndarray
-        m/s².
+    times, acceleration : ndarray
+        The motion, s and m/s², linear between these points.
     shapes : ndarray
-        Ways in which it may be wrong, each of one standard deviation, independent of each other; one a column.
+        Independent errors that it may have, each of one standard deviation; one a column.
     noise : float
         Standard deviation of the noise of the record, m/s².
-    coefficients : int
-        Of the spline.
     """
 
     times: Floats
     acceleration: Floats
     shapes: Floats
     noise: float
-    coefficients: int
-    _last: list[tuple[Floats, Record]] = field(default_factory=list, init=False, repr=False)
 
-    def record(self, wrong: Floats) -> Record:
-        """The motion as a record, wrong by so many standard deviations of each shape.
 
-        The last one is kept, and with it its pieces: parameters are tried on one motion many times.
-        """
-        last = self._last[0] if self._last else None
-        if last is None or not np.array_equal(last[0], wrong):
-            last = wrong.copy(), Record(self.times, self.acceleration + self.shapes @ wrong)
-            self._last[:] = [last]
-        return last[1]
+def noise_of(values: Floats) -> float:
+    """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
+    differences = np.diff(values[np.isfinite(values)], 3) / _VARIANCE**0.5
+    return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
-    def with_line(self, line: Floats, deviation: float) -> "TableMotion":
-        """One more way to be wrong: a line (given at `times`), whose standard deviation is known so far."""
-        return replace(self, shapes=np.column_stack([self.shapes, deviation * line]))
+
+def converter_noise(values: Floats) -> float:
+    """The least noise of digitised values: errors of a converter repeat from cycle to cycle and average out less."""
+    steps = np.diff(np.unique(values[np.isfinite(values)]))
+    return _CONVERTER * float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A spline, and Akaike's criterion for it."""
+
+    spline: BSpline
+    score: float
+    noise: float
+
+
+def _fitted(times: Floats, values: Floats, knots: Floats) -> _Fitted | None:
+    """The spline on these knots; None where samples are too few for them."""
+    size, number = times.size, knots.size - _DEGREE - 1
+    if number + 2 >= size:
+        return None
+    try:
+        spline = make_lsq_spline(times, values, knots, _DEGREE)
+    except (ValueError, np.linalg.LinAlgError):  # an interval of knots without a sample
+        return None
+    square = max(float(np.sum((values - spline(times)) ** 2)), 1e-24 * float(np.sum(values**2)))
+    score = size * float(np.log(square / size)) + 2.0 * number * size / (size - number - 1.0)
+    return _Fitted(spline, score, float(np.sqrt(square / (size - number))))
+
+
+def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
+    """The motion behind a record of a table's acceleration."""
+    fits = [one for spacing in _SPACINGS if (one := _fitted(times, acceleration, _knots(times, spacing))) is not None]
+    chosen = min(range(len(fits)), key=lambda at: fits[at].score)
+    best = fits[min(chosen + _FINER, len(fits) - 1)]
+    best, alternatives = _with_kinks(times, acceleration, best)
+    knots = best.spline.t
+    bounds = np.unique(knots)
+    curvature = np.abs(best.spline(times, nu=2)).max() * np.diff(bounds).max() ** 2 / 8.0
+    parts = np.sqrt(curvature / max(_INTERPOLATION * best.noise, 1e-9 * float(np.abs(acceleration).max())))
+    parts = int(np.clip(np.ceil(parts), _FEWEST_POINTS, _MOST_POINTS))
+    fine = np.interp(np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds)
+    # of many coefficients only what is wrong over long times matters, which fewer can say
+    coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
+    design = BSpline.design_matrix(times, coarse, _DEGREE)
+    root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
+    shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
+    noise = max(best.noise, converter_noise(acceleration))
+    smooth, places = _averaged(best, alternatives, fine)
+    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right
+    smooth = smooth - np.gradient(fine) ** 2 / 12.0 * best.spline(fine, nu=2)
+    return TableMotion(fine, smooth, np.column_stack([noise * shapes, places]), noise)
 
 
 def _knots(times: Floats, spacing: int) -> Floats:
     """Knots that have about so many samples between each other, however these are spaced."""
     count = max(times.size // spacing, 1)
     inner = np.interp(np.linspace(0, times.size - 1, count + 1), np.arange(times.size), times)
-    return np.concatenate([np.repeat(times[0], DEGREE), inner, np.repeat(times[-1], DEGREE)])
+    return np.concatenate([np.repeat(times[0], _DEGREE), inner, np.repeat(times[-1], _DEGREE)])
 
 
-def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
-    """The motion behind a record of a table's acceleration."""
-    peak, size = float(np.abs(acceleration).max()), times.size
-    if noise_of(acceleration) <= LITTLE_NOISE * peak:
-        smooth = CubicSpline(times, acceleration)
-        fine = _points(times, 4)
-        return TableMotion(fine, np.asarray(smooth(fine)), np.zeros((fine.size, 0)), 0.0, size)
-    best = np.inf
-    for spacing in _SPACINGS:
-        knots = _knots(times, spacing)
-        found, rest = _fitted(times, acceleration, knots)
-        number = found.size
-        if number + 2 >= size:
-            break
-        score = size * np.log(float(np.sum(rest**2)) / size) + 2.0 * number * size / (size - number - 1.0)
-        if score < best:
-            best, chosen = score, knots
-    chosen, kinks = _with_kinks(times, acceleration, chosen)
-    coefficients, rest = _fitted(times, acceleration, chosen)
-    noise = float(np.sqrt(np.sum(rest**2) / (size - coefficients.size)))
-    fine = np.unique(_points(np.unique(chosen), _POINTS))
-    # of many coefficients only what is wrong over long times matters, which fewer can say
-    coarse = chosen if coefficients.size <= MOST_SHAPES else _knots(times, -(-size // MOST_SHAPES))
-    design = BSpline.design_matrix(times, coarse, DEGREE)
-    root = cholesky((design.T @ design).toarray(), lower=True)
-    shapes = noise * solve_triangular(root, BSpline.design_matrix(fine, coarse, DEGREE).toarray().T, lower=True).T
-    average, ways = _of_kinks(kinks, fine)
-    smooth = np.asarray(BSpline(chosen, coefficients, DEGREE)(fine)) + average
-    return TableMotion(fine, smooth, np.column_stack([shapes, ways]), noise, coefficients.size)
+def _with_kinks(times: Floats, values: Floats, best: _Fitted) -> tuple[_Fitted, list[list[_Fitted]]]:
+    """The spline with a kink where the shaking begins, and one where it ends, if these improve it, as for a sine.
 
-
-def _fitted(times: Floats, acceleration: Floats, knots: Floats) -> tuple[Floats, Floats]:
-    """Coefficients by least squares, and what they leave over."""
-    design = BSpline.design_matrix(times, knots, DEGREE)
-    found = np.asarray(cho_solve(cho_factor((design.T @ design).toarray()), design.T @ acceleration))
-    return found, acceleration - design @ found
-
-
-def _with_kinks(times: Floats, acceleration: Floats, knots: Floats) -> tuple[Floats, list[_Kink]]:
-    """A kink where the shaking begins, and one where it ends, if the record asks for them, as a sine does.
-
-    Beyond it the table is at rest, which one polynomial says if the record does not ask for more.
+    Beside it, for each kink, the splines with the kink at other places.
     """
-    size = times.size
-    moving = np.flatnonzero(np.abs(acceleration) > _MOVES * noise_of(acceleration))
-    if not moving.size:
-        return knots, []
-
-    def fitted(tried: Floats) -> tuple[float, BSpline]:
-        found, rest = _fitted(times, acceleration, tried)
-        score = size * float(np.log(np.sum(rest**2) / size)) + 2.0 * found.size * size / (size - found.size - 1.0)
-        return score, BSpline(tried, found, DEGREE)
-
-    def kinked(place: float, end: int, rests: bool) -> Floats:
-        at = float(np.interp(place, np.arange(size), times))
-        beyond = (knots < at) & (knots > times[0]) if end == 0 else (knots > at) & (knots < times[-1])
-        return np.sort(np.concatenate([knots[~(beyond & rests)], np.repeat(at, DEGREE)]))
-
-    kinks: list[_Kink] = []
-    for end, steps in ((0, -np.arange(_KINK_SAMPLES)), (-1, np.arange(_KINK_SAMPLES))):
-        places = moving[end] + 0.5 * steps
-        places = places[(places > 2) & (places < size - 3)]
-        tried = [fitted(kinked(place, end, rests)) for rests in (False, True) for place in places]
-        best = min(tried, key=lambda one: one[0], default=None)
-        if best is None or best[0] >= fitted(knots)[0]:
-            continue
-        knots = best[1].t
-        kinks.append([(float(np.exp(0.5 * (best[0] - score))), spline) for score, spline in tried])
-    return knots, kinks
+    moving = np.flatnonzero(np.abs(values) > _MOVES * max(noise_of(values), 1e-6 * float(np.abs(values).max())))
+    tried: list[list[_Fitted]] = []
+    for end, side in ((0, -1.0), (-1, 1.0)) if moving.size else ():
+        places = moving[end] + side * 0.25 * np.arange(4 * _KINK_SAMPLES)
+        places = places[(places > 2) & (places < times.size - 3)]
+        knots, found = best.spline.t, []
+        for at in np.interp(places, np.arange(times.size), times):
+            outside = (knots < at) & (knots > times[0]) if end == 0 else (knots > at) & (knots < times[-1])
+            for kept in (knots, knots[~outside]):  # at rest outside, one polynomial is enough
+                near = np.abs(kept - at) < 1e-9 * (times[-1] - times[0])
+                found.append(_fitted(times, values, np.sort(np.concatenate([kept[~near], np.repeat(at, _DEGREE)]))))
+        kinked = [one for one in found if one is not None]
+        top = min(kinked, key=lambda one: one.score, default=best)
+        if top.score < best.score:
+            best = top
+            tried.append([one for one in kinked if one.score < top.score + 12.0])
+    return best, tried
 
 
-def _of_kinks(kinks: list[_Kink], fine: Floats) -> tuple[Floats, Floats]:
-    """What is wrong as the places of kinks are not known: on average, and ways of one standard deviation each."""
-    average, ways = np.zeros(fine.size), [np.zeros((fine.size, 0))]
-    for kink in kinks:
-        likely = np.array([weight for weight, _ in kink])
-        best = max(kink, key=lambda one: one[0])[1](fine)
+def _averaged(best: _Fitted, alternatives: list[list[_Fitted]], fine: Floats) -> tuple[Floats, Floats]:
+    """The motion averaged over the places where a kink may lie, by their likelihood, and its errors from these."""
+    smooth, ways = np.asarray(best.spline(fine)), [np.zeros((fine.size, 0))]
+    for fits in alternatives:
+        likely = np.exp([0.5 * (min(one.score for one in fits) - one.score) for one in fits])
         likely /= likely.sum()
-        apart = np.column_stack([spline(fine) - best for _, spline in kink])
+        top = min(fits, key=lambda one: one.score).spline(fine)
+        apart = np.column_stack([one.spline(fine) - top for one in fits])
         middle = apart @ likely
-        average += middle
+        smooth = smooth + middle
         left, sizes, _ = np.linalg.svd((apart - middle[:, None]) * np.sqrt(likely), full_matrices=False)
-        ways.append((left * sizes)[:, :_KINK_WAYS])
-    return average, np.column_stack(ways)
-
-
-def _points(bounds: Floats, parts: int) -> Floats:
-    """Each interval cut in so many parts."""
-    return np.interp(np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds)
+        ways.append((left * sizes)[:, :3])
+    return smooth, np.column_stack(ways)

@@ -1,0 +1,247 @@
+"""One test as a likelihood: measured less computed channels, with the errors of the table's motion and of sensors.
+
+Beside Üy, λ and Δμ stand nuisance parameters with known standard deviations: errors of the table's motion
+(`table_motion`), offsets and drifts of sensors.  What is computed depends on them linearly, near enough, so that they
+need no search: scaled residuals have the covariance 1 + E Eᵀ, E being the effects of one standard deviation of each,
+and are made independent by it.
+
+Two kinds of samples count less.  The block's acceleration jumps where the block stops, and a sample beside a jump
+tells only on which side of it the jump lies: it is left out.  Readings of a converter that repeat are one
+reading: n of them have the weight of one.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.model.options import Mendez
+from slipsweep.motion.records import Record
+from slipsweep.motion.shaking import TABLE, ShakingTest
+from slipsweep.studies.forward import COLUMN, Forward
+from slipsweep.studies.table_motion import TableMotion, converter_noise, noise_of, table_motion
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: What is sought, in the order of all vectors.
+SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
+
+#: The least noise that a channel is taken to have, in parts of its largest value.
+_LEAST_NOISE = 1e-5
+
+#: Intervals of sampling to either side of a jump that are left out.
+_BESIDE_A_JUMP = 1.6
+
+#: Standard deviation of an offset or drift, in parts of a channel's largest value: no bound, in effect.
+_LARGE = 3.0
+
+#: Steps of the derivatives by errors of the table's motion and by its offset, in standard deviations.
+_SHAPE_STEP, _LINE_STEP = 0.3, 1e-3
+
+
+@dataclass(frozen=True)
+class Line:
+    """An offset, a drift or a step of a sensor: what one standard deviation of it adds to channels."""
+
+    name: str
+    parts: Mapping[str, Floats]
+    deviation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A test near one solution: independent residuals for any parameters, and the nuisance parameters."""
+
+    forward: Forward
+    times: Floats
+    columns: list[tuple[int, Mask, Floats]]
+    measured: Floats
+    left: Floats
+    sizes: Floats
+    right: Floats
+    leverage: Floats
+
+    def __call__(self, parameters: Floats) -> Floats:
+        """Independent residuals of unit variance, if the model and the noise are right."""
+        rest = self.raw(parameters)
+        shrunk = 1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2)
+        return np.asarray(rest - self.left @ (shrunk * (self.left.T @ rest)))
+
+    def raw(self, parameters: Floats) -> Floats:
+        """Measured less computed, in standard deviations, if the table's motion had no error."""
+        history = self.forward(parameters, self.times)
+        computed = np.concatenate([history[use, at] * weight for at, use, weight in self.columns])
+        return np.where(np.isfinite(computed), self.measured - computed, 1e3)
+
+    def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Most likely values of the nuisance parameters and their standard deviations, in those of their priors."""
+        along = self.left.T @ self.raw(parameters)
+        values = self.right.T @ (self.sizes / (1.0 + self.sizes**2) * along)
+        spread = 1.0 - np.sum(self.right**2 * (self.sizes**2 / (1.0 + self.sizes**2))[:, None], axis=0)
+        return np.asarray(values), np.sqrt(np.maximum(spread, 0.0))
+
+
+@dataclass(eq=False)
+class Observation:
+    """A test and what is known of its sensors.
+
+    Attributes
+    ----------
+    test : ShakingTest
+    theta, mu_s : float
+    model : Mendez
+    offsets, drifts : sequence of str
+        Channels whose sensor has an offset, or an offset and a drift.
+    given_noise : mapping of str to float
+        Standard deviation of channels; what is not given is estimated from the residuals (`take_noise`).
+    use, noise : dict of str to ndarray and to float
+        Samples that count and the standard deviation, of each channel of the block.
+    lines, table_lines : list of Line
+        Offsets, drifts and steps of the block's sensors and of the table's.
+    """
+
+    test: ShakingTest
+    theta: float
+    mu_s: float
+    model: Mendez
+    offsets: Sequence[str] = ()
+    drifts: Sequence[str] = ()
+    given_noise: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        test = self.test
+        # the last sample is that at which a record ends
+        inside = np.arange(test.times.size) < test.times.size - 1
+        self.use: dict[str, Mask] = {name: inside & np.isfinite(test.channels[name]) for name in test.responses}
+        self.weights = {name: weights_of(test.channels[name]) for name in test.responses}
+        self.least_noise = {
+            name: max(_LEAST_NOISE * float(np.nanmax(np.abs(values))), converter_noise(values), 1e-15)
+            for name, values in test.channels.items()
+            if name != TABLE
+        }
+        self.noise = {
+            name: self.given_noise.get(name, max(noise_of(test.channels[name]), least))
+            for name, least in self.least_noise.items()
+        }
+        self.motion: TableMotion = table_motion(test.times, test.channels[TABLE])
+        self.lines = self._lines(test.responses)
+        self.table_lines = self._lines((TABLE,))
+        on_motion = [np.interp(self.motion.times, test.times, one.parts[TABLE]) for one in self.table_lines]
+        self.shapes = np.column_stack([self.motion.shapes, *(-line for line in on_motion)])
+        self.wrong = np.zeros(self.shapes.shape[1])
+        self.jumps_left_out = np.zeros(test.times.size, dtype=bool)
+
+    def _lines(self, names: Sequence[str]) -> list[Line]:
+        since = (self.test.times - self.test.times[0]) / (self.test.times[-1] - self.test.times[0])
+        lines = []
+        for name in names:
+            size = _LARGE * float(np.nanmax(np.abs(self.test.channels[name])))
+            if name in self.offsets or name in self.drifts:
+                lines.append(Line(f"offset of {name}", {name: np.full(since.size, size)}, size))
+            if name in self.drifts:
+                lines.append(Line(f"drift of {name}", {name: size * since}, size))
+        return lines
+
+    @property
+    def peak(self) -> float:
+        """Largest acceleration of the table, m/s²."""
+        return float(self.motion.acceleration.max())
+
+    def record(self, wrong: Floats) -> Record:
+        """The table's motion with so many standard deviations of each of its errors."""
+        return Record(self.motion.times, self.motion.acceleration + self.shapes @ wrong)
+
+    def forward(self, wrong: Floats | None = None) -> Forward:
+        """The block on the table's motion as last estimated, or with other errors of it."""
+        return Forward(self.theta, self.mu_s, self.model, self.record(self.wrong if wrong is None else wrong))
+
+    def rough(self, forward: Forward, parameters: Floats) -> float:
+        """How far parameters are from what was measured; no sample counts for more than a few."""
+        history = forward(parameters, self.test.times)
+        total = 0.0
+        for name, use in self.use.items():
+            values = self.test.channels[name]
+            spread = max(self.noise[name], 0.1 * float(np.nanmax(np.abs(values))))
+            rest = (values - history[:, COLUMN[name]])[use] / spread
+            total += float(np.mean(np.log1p(rest**2))) if np.isfinite(rest).all() else 1e6
+        return total
+
+    def linear(self, parameters: Floats, noisy: bool = True) -> Linear:
+        """The likelihood near a solution; without `noisy`, as if the record of the table had no noise."""
+        test, forward = self.test, self.forward()
+        counted = self._counted()
+        columns = [(COLUMN[name], use, self.weights[name][use] / self.noise[name]) for name, use in counted.items()]
+        measured = np.concatenate(
+            [test.channels[name][use] * weight for name, (_, use, weight) in zip(counted, columns, strict=True)]
+        )
+        effects = np.zeros((measured.size, self.wrong.size + len(self.lines)))
+        if noisy or self.table_lines:
+            base = forward(parameters, test.times)
+            kinds = self.wrong.size - len(self.table_lines)
+            for at in range(0 if noisy else kinds, self.wrong.size):
+                moved = self.wrong.copy()
+                moved[at] += _SHAPE_STEP if at < kinds else _LINE_STEP
+                change = self.forward(moved)(parameters, test.times) - base
+                scaled = [change[use, column] * weight for column, use, weight in columns]
+                effects[:, at] = np.nan_to_num(np.concatenate(scaled)) / (moved[at] - self.wrong[at])
+        none = np.zeros(test.times.size)
+        for at, line in enumerate(self.lines, self.wrong.size):
+            scaled = [
+                line.parts.get(name, none)[use] * weight
+                for name, (_, use, weight) in zip(counted, columns, strict=True)
+            ]
+            effects[:, at] = np.concatenate(scaled)
+        measured = measured + effects[:, : self.wrong.size] @ self.wrong
+        left, sizes, right = np.linalg.svd(effects, full_matrices=False)
+        leverage = left**2 @ (sizes**2 / (1.0 + sizes**2))
+        return Linear(forward, test.times, columns, measured, left, sizes, right, leverage)
+
+    def _counted(self) -> dict[str, Mask]:
+        """The samples that count: `use`, but for those beside jumps of the block's acceleration."""
+        return {
+            name: use & ~self.jumps_left_out if name == "block_acceleration" else use for name, use in self.use.items()
+        }
+
+    def take_noise(self, linear: Linear, parameters: Floats) -> None:
+        """Estimate the noise of each channel from the residuals, where it is not given."""
+        values, _ = linear.nuisances(parameters)
+        rest = linear.raw(parameters) - (linear.left * linear.sizes) @ (linear.right @ values)
+        at = 0
+        for name, (_, use, weight) in zip(self.use, linear.columns, strict=True):
+            part = slice(at, at + int(use.sum()))
+            at = part.stop
+            freedom = float(np.sum((weight * self.noise[name]) ** 2)) - float(np.sum(linear.leverage[part])) - 1.0
+            if name not in self.given_noise and freedom > 0.0:
+                factor = float(np.sqrt(np.sum(rest[part] ** 2) / freedom))
+                self.noise[name] = max(factor * self.noise[name], self.least_noise[name])
+
+    def move(self, linear: Linear, parameters: Floats) -> None:
+        """Take the table's motion as it most likely was, and leave out the samples beside jumps."""
+        self.wrong = linear.nuisances(parameters)[0][: self.wrong.size]
+        if "block_acceleration" in self.use:
+            self.jumps_left_out = self._beside_jumps(parameters)
+
+    def _beside_jumps(self, parameters: Floats) -> Mask:
+        """Samples next to a time at which the block's computed acceleration jumps by more than the noise."""
+        times = self.test.times
+        fine = np.interp(np.arange(0, times.size - 1, 0.125), np.arange(times.size), times)
+        history = self.forward()(parameters, fine)
+        block, table = history[:, COLUMN["block_acceleration"]], history[:, COLUMN[TABLE]]
+        # either is smooth where the block holds its acceleration or sticks to the table
+        change = np.minimum(np.abs(np.diff(block)), np.abs(np.diff(block - table)))
+        least = max(self.noise["block_acceleration"], 0.02 * float(np.abs(table).max()))
+        before = np.diff(times, prepend=2 * times[0] - times[1])
+        after = np.append(before[1:], before[-1])
+        found = np.zeros(times.size, dtype=bool)
+        for jump in fine[np.flatnonzero(change > least)]:
+            found |= (times > jump - _BESIDE_A_JUMP * after) & (times < jump + _BESIDE_A_JUMP * before)
+        return found
+
+
+def weights_of(values: Floats) -> Floats:
+    """Square roots of the samples' weights: n equal readings in turn have the weight of one."""
+    same = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    lengths = np.diff(np.append(same, values.size))
+    return np.asarray(1.0 / np.sqrt(np.repeat(lengths, lengths)))
