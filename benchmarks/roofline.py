@@ -20,7 +20,7 @@ from benchmarks.grids import regime_box, regime_cells
 from benchmarks.machine import alternate, arguments, cores, measured_on, number, table
 from benchmarks.report import displacement, size_of, steps_taken
 from slipsweep.jit import form
-from slipsweep.jit.decorators import in_lanes
+from slipsweep.jit.decorators import inlined
 
 #: Operations of the building blocks; a fused multiply-add is one, a division or root is one.
 EXP, LOG, VERSINE, ARCSINE = 20, 20, 13, 23
@@ -48,7 +48,7 @@ CYCLE_OPERATIONS = {
 STEP_OPERATIONS = {"stick_slip": EXP // 2 + NODE + 4, "continuous": EXP + NODE + 4, "newmark": 6}
 
 
-@in_lanes
+@inlined
 def _sixteen(x: float) -> float:
     """16 multiply-adds, each of which waits for the one before."""
     x = (((x * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1) * 0.9 + 0.1

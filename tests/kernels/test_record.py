@@ -105,7 +105,7 @@ def test_integrals_change_smoothly_where_series_and_closed_form_meet() -> None:
 
 
 def test_a_record_is_a_wave_of_straight_pieces() -> None:
-    """Cut at its zeros, in stretches above them, and with the samples and times as they are given."""
+    """Cut at its zeros, in intervals above them, and with the samples and times as they are given."""
     record = Record(np.array([1.0, 2.0, 4.0, 5.0, 6.0, 7.5, 8.0]), np.array([3.0, -1.0, -1.0, 0.0, 2.0, 2.0, 0.0]))
     wave = wave_of_record(record, 1.0)
     table = wave.pieces[:, [START, END, FIRST, LAST, DEGREE, JUMPS]]
@@ -121,7 +121,7 @@ def test_a_record_is_a_wave_of_straight_pieces() -> None:
     assert (wave.interval.tolist(), wave.height.tolist()) == ([[0, 1], [4, 7]], [3.0, 2.0])
     assert (wave.highest, wave.lowest) == (3.0, -1.0)
     turned = wave_of_record(record, -1.0)
-    assert (turned.stretch.tolist(), turned.height.tolist(), turned.highest) == ([[1, 4]], [1.0], 1.0)
+    assert (turned.interval.tolist(), turned.height.tolist(), turned.highest) == ([[1, 4]], [1.0], 1.0)
 
 
 def test_newmark_by_the_walk_of_all_pulses(shaking: Record) -> None:

@@ -73,9 +73,10 @@ def waveform_of(case: Any) -> Waveform:
     """The waveform of a line of cases.csv, of hard_cases.csv or of waveforms.csv."""
     if not isinstance(case, WaveCase):
         return Sine(cycles=case.cycles)
-    given = {"cycles": case.cycles, "ramp_in": case.ramp_in, "ramp_out": case.ramp_out}
+    given: dict[str, Any] = {"cycles": case.cycles, "ramp_in": case.ramp_in, "ramp_out": case.ramp_out}
     if case.waveform == "harmonics":
-        return Harmonics(**(terms(case.harmonics) or {}), **given)
+        sums: dict[str, Any] = terms(case.harmonics) or {}
+        return Harmonics(**sums, **given)
     return {name.__name__.lower(): name for name in (Sine, Square, Triangle, slipsweep.Cosine)}[case.waveform](**given)
 
 
@@ -240,7 +241,7 @@ def test_square_wave_under_newmark(rule: str) -> None:
     """Rate (A − Üy) for π, then −(A + Üy) to the stop: constant, so that every rule is exact with any step."""
     exact = 3 * (pi**2 / 2 + pi**2 / (2 * 3))
     for steps in (8, 1000):
-        block = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
+        block: dict[str, Any] = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
         found = solve(Square(cycles=3), rule, steps, model="newmark", **block)
         assert found[0, 0] == pytest.approx(exact, rel=1e-13)
 
@@ -249,7 +250,7 @@ def test_square_wave_under_newmark(rule: str) -> None:
 def test_triangle_wave_under_newmark(rule: str) -> None:
     """From t1 on the rate rises for L = π/4 with s = 2A/π, falls as fast, and V is 0 √2 L after the rate was."""
     exact = 3 * (4 / pi) * (pi / 4) ** 3 * (1 + 2 * sqrt(2) / 3)
-    block = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
     found = solve(Triangle(cycles=3), rule, 8, model="newmark", **block)
     assert found[0, 0] == pytest.approx(exact, rel=1e-12), "exact on straight lines"
 
@@ -259,7 +260,7 @@ def test_triangle_wave_under_newmark(rule: str) -> None:
 def test_a_slide_that_begins_at_the_end_of_a_piece(rule: str, steps: int) -> None:
     """Where a ramp ends, steps grow from the little that was left of it: 1e-9 of Üy and less."""
     wave = Triangle(cycles=2, ramp_in=0.1)
-    block = {"theta": 0.0, "mu_s": 0.9, "amplitude": 5.0}
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 0.9, "amplitude": 5.0}
     left = np.array([1e-9, 1e-10, 1e-11, 1e-12])
     found = solve(wave, rule, steps, model="newmark", yield_acceleration=2.0 * (1 - left), **block)
     at_ramp, whole = (
@@ -297,7 +298,7 @@ def hyperbolic_friction(x: float, mu_s: float, delta_mu: float, decay_rate: floa
 HYPERBOLIC = FrictionLaw(friction=hyperbolic_friction)
 
 
-@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
+@numba.njit(error_model="numpy")
 def solve_hyperbolic(cell: physics.Cell, options: Options, wave: Any, steps: Steps) -> Motion:
     return solve_cell(HYPERBOLIC, cell, options, wave, steps)
 

@@ -112,11 +112,11 @@ def test_pieces_are_the_wave(name: str) -> None:
         assert np.all(found * (wave.pieces[p, FIRST] + wave.pieces[p, LAST]) > 0), f"piece {p}: changes its sign"
 
 
-def test_stretches_are_the_same_up_to_the_next() -> None:
+def test_intervals_are_the_same_up_to_the_next() -> None:
     """Of plain cycles; the last before a ramp that begins in its negative half wave differs from them."""
     assert wave_of(Square(cycles=5, ramp_out=1.25)).same.tolist() == [0, 0, 2, 3]
     assert wave_of(Sine(cycles=5)).same.tolist() == [0, 0]
-    # the first stretch has begun before the shaking, and the last ends with it
+    # the first interval has begun before the shaking, and the last ends with it
     assert wave_of(Cosine(cycles=5)).same.tolist() == [0, 1, 1, 1, 4]
 
 
@@ -152,12 +152,12 @@ def test_peak_is_exact(seed: int) -> None:
     assert abs(defined(waveform, np.array([phase]))[0]) == pytest.approx(exact_peak(waveform), rel=1e-13)
 
 
-def test_stretches_of_several_maxima() -> None:
+def test_intervals_of_several_maxima() -> None:
     """sin φ + 0.6 sin 5φ is above zero in one run with three maxima, and its mirror image below."""
     wave = wave_of(Harmonics([1, 0.6], [1, 5], cycles=1))
-    ((a, b),) = wave.stretch[:1]
+    ((a, b),) = wave.interval[:1]
     tops = [p for p in range(a, b - 1) if wave.pieces[p, FIRST] < wave.pieces[p, LAST] > wave.pieces[p + 1, LAST]]
-    assert len(wave.stretch) == 3 or len(tops) == 3
+    assert len(wave.interval) == 3 or len(tops) == 3
     assert wave.height.max() == 1.0
 
 

@@ -135,7 +135,7 @@ def test_a_friction_angle_is_the_coefficient_of_its_tangent(kind: str) -> None:
     width = {"absolute": (20.0, 1.0), "factor": (1.0, 0.05), "offset": (0.0, 1.0)}[kind]
     uncertain = {"phi": {"distribution": "norm", "loc": width[0], "scale": width[1], "kind": kind}}
     case: dict[str, Any] = {"theta": 5.0, "amplitude": [3.0, 5.0], "frequency": 1.0}
-    given = {} if kind == "absolute" else {"phi": 20.0}
+    given: dict[str, Any] = {} if kind == "absolute" else {"phi": 20.0}
     found = slipsweep.sample(**case, **given, uncertain=uncertain, samples=64)
     draws = drawn(uncertain, samples=64)["phi"]
     angles = {"absolute": draws, "factor": 20.0 * draws, "offset": 20.0 + draws}[kind]

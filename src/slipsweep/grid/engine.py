@@ -148,7 +148,9 @@ def solve(asked: Request) -> Arrays:
     """
     results = asked.results()
     for where, part in _parts(asked):
-        _solve_into({name: values[(*where, ...)] for name, values in results.items()}, part)
+        # the dots keep an array without dimensions an array
+        view: Any = (*where, ...)
+        _solve_into({name: values[view] for name, values in results.items()}, part)
     return results
 
 
@@ -366,7 +368,8 @@ def _fill(results: Arrays, asked: Request, inputs: list[Array], periods: Array) 
         where = tuple(slice(None) if axis == scaled else one for axis, one in enumerate(slab))
         seconds = cut({"periods": periods}, where)["periods"]
         for name, values in results.items():
-            target, own = values[(*where, ...)], found[ROWS[name]].reshape(lengths)
+            view: Any = (*where, ...)
+            target, own = values[view], found[ROWS[name]].reshape(lengths)
             if name == "permanent_displacement":
                 np.multiply(own, seconds * seconds, out=target)
             elif name == "peak_relative_velocity":

@@ -37,7 +37,8 @@ def _float_of(bits: int) -> float:
 @elementary
 def _bits_of(value: float) -> int:
     """The bit pattern of a float64 as an int64."""
-    return np.float64(value).view(np.int64)
+    bits: int = np.float64(value).view(np.int64)
+    return bits
 
 
 @elementary

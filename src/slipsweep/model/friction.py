@@ -7,7 +7,7 @@ paper is `exponential`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0. 
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,11 +39,11 @@ class FrictionLaw(NamedTuple):
     """
 
     friction: Callable[..., float]
-    derivatives: Callable[..., tuple[float, float]] | None = None
-    inflection: Callable[..., float] | None = None
-    static_acceleration: Callable[..., float] | None = None
-    moments: Callable[..., tuple[float, float, float, float]] | None = None
-    decay_length: Callable[..., float] | None = None
+    derivatives: Any = None
+    inflection: Any = None
+    static_acceleration: Any = None
+    moments: Any = None
+    decay_length: Any = None
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -32,7 +32,8 @@ class Forward:
 
     def __call__(self, parameters: Floats, times: Floats, scale: float = 1.0) -> Floats:
         """Columns of `HISTORY` at the times, for Üy, λ and Δμ and the motion times `scale`."""
-        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, scale, *map(float, parameters), math.nan)
+        onset, decay, drop = (float(one) for one in parameters)
+        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, scale, onset, decay, drop, math.nan)
         table = np.empty((len(COLUMN), times.size))
         record_history(cell, self._options, self._wave, self._workspace, times, History(*table))
         return table.T
