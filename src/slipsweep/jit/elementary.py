@@ -8,6 +8,7 @@ errors: docs/numerics.md#elementary-functions.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def _float_of(bits: int) -> float:
 @elementary
 def _bits_of(value: float) -> int:
     """The bit pattern of a float64 as an int64."""
-    bits: int = np.float64(value).view(np.int64)
+    bits: Any = np.float64(value).view(np.int64)
     return bits
 
 
