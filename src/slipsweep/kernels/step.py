@@ -178,8 +178,8 @@ _crossing = root_of(_beyond_and_slope)
 
 
 @scalar
-def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, state: State) -> Point:
-    """Where in a step Eq. 4 comes beyond Ü of the block, or turns back beyond it; `end` if nowhere."""
+def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, state: State) -> tuple[Point, Point]:
+    """Where in a step Eq. 4 comes beyond Ü of the block, or turns back beyond it (`end` if nowhere); and that turn."""
     middle, top = point_at(block, pieces, p, 0.5 * (start.tau + end.tau)), end
     first, half, last = beyond(start, state), beyond(middle, state), beyond(end, state)
     if turns(first, half, last):
@@ -191,19 +191,23 @@ def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Poin
         top = point_at(block, pieces, p, 0.5 * (low + high))
         top = top if beyond(top, state) > max(first, last) + ROUNDING * end.base else end
     if first >= 0.0 and not state.sliding:
-        return start
+        return start, top
     if first >= -ROUNDING * start.base and state.sliding:
-        return top
+        return top, top
     if beyond(top, state) <= 0.0:
-        return end
+        return end, top
     where = (block, pieces, p, state, 1e-4 * (top.tau - start.tau))
-    return point_at(block, pieces, p, _crossing(where, start.tau, top.tau, 0.5 * (start.tau + top.tau), 0.0))
+    tau = _crossing(where, start.tau, top.tau, 0.5 * (start.tau + top.tau), 0.0)
+    x = base_acceleration(pieces, p, block.amplitude, tau)
+    # Ü is by Eq. 4 there, without its rounding
+    return Point(tau, x, x - state.held if state.sliding else 0.0), top
 
 
 @inlined
-def begun(block: Block, x: float, phase: float, grows: float, state: State) -> State:
-    """The block as it begins to slide at Üg = x (t1), after which its rate grows for a phase."""
-    b = min(physics.starting_acceleration(block, x), x)
+def begun(block: Block, at: Point, phase: float, grows: float, state: State) -> State:
+    """The block as it begins to slide (t1), after which its rate grows for a phase."""
+    least = block.yield_acceleration
+    b = min(acceleration(block.rise, least, least, at.base - at.rate), at.base)
     return State(state.velocity, state.displacement, b, state.peak, state.least, True, phase, grows)
 
 
@@ -215,11 +219,11 @@ def onset(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, st
     if start.base < block.yield_acceleration:
         tau = min(max(offset_at(pieces, p, block.amplitude, block.yield_acceleration), start.tau), end.tau)
         start = Point(tau, block.yield_acceleration, eq4_rate(block, block.yield_acceleration))
-    began = next_event(block, pieces, p, start, end, state)
+    began, top = next_event(block, pieces, p, start, end, state)
     if began.tau >= end.tau:
         return end, state
-    grows = (end.tau if end.rate <= 0.0 else pieces[p, FINISH]) - began.tau
-    return began, begun(block, began.base, phase_at(pieces, p, began.tau), grows, state)
+    grows = (top.tau if top.tau < end.tau else pieces[p, FINISH]) - began.tau
+    return began, begun(block, began, phase_at(pieces, p, began.tau), grows, state)
 
 
 @inlined
@@ -277,12 +281,13 @@ def cut_step(
         cut = end if start.tau + longest >= end.tau else point_at(block, pieces, p, start.tau + longest)
         middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
         bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
-        while how != HELD and bend > limit and cut.tau - start.tau > LEAST_STEP:
+        while bend > limit and cut.tau - start.tau > LEAST_STEP:
             # friction may decay in a layer that is thinner than steps
             cut, middle = middle, point_at(block, pieces, p, 0.5 * (start.tau + middle.tau))
             bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
         if how == physics.MONOTONE:
-            cut = next_event(block, pieces, p, start, cut, state)
+            event, _ = next_event(block, pieces, p, start, cut, state)
+            cut = event if event.tau - start.tau > LEAST_STEP else cut
             middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
         size = cut.tau - start.tau
         taken, state = slide(block, rule, how, start, middle, cut, state)
@@ -298,12 +303,14 @@ def walk(
     """From τ to `until` on piece p, step by step."""
     w, rates, rule, per_cycle, amplitude = steps.w, steps.rates, steps.rule, steps.per_cycle, block.amplitude
     at, count, begin = steps.at[p], steps.counts[p], pieces[p, BEGIN]
-    h, shift, limit = (pieces[p, FINISH] - begin) / count, pieces[p, START] - begin, 0.0
+    h, shift, limit = (pieces[p, FINISH] - begin) / count, pieces[p, START] - begin, math.inf
     i = min(max(int((tau - begin) / h), 0), count - 1)
     if how != HELD:
         tabulate(block, w[at + 2 * i : at + 2 * count + 1], rates[2 * i :])
-        # a second difference of (32/N)² of what friction takes off Üg at most
-        limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * block.g * physics.friction(block, 0.0)
+    if how != HELD and block.rise != physics.NEWMARK:
+        # a second difference of (32/N)² of what friction takes off Üg at most, or of rounding
+        most = (block.g + amplitude * block.tan_theta) * physics.friction(block, 0.0)
+        limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * most + ROUNDING * amplitude
     first = i if begin == 0.0 else i - count
     start = point_at(block, pieces, p, tau)
     while i < count and start.tau < until and (state.sliding or how != HELD):
@@ -344,7 +351,7 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
                 _, state = slide(block, RECTANGLE, block.rise, top, top, top, state)
             elif top.base >= block.yield_acceleration and top.rate > 0.0:
                 grows = offset_at(pieces, q, block.amplitude, physics.starting_acceleration(block, top.base)) - begin
-                state = begun(block, top.base, pieces[q, START], grows, state)
+                state = begun(block, top, pieces[q, START], grows, state)
         if rises:
             state = walk(block, pieces, steps, q, begin, pieces[q, FINISH], block.rise, state)
         else:
