@@ -36,7 +36,7 @@ from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
 from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, LAST, START, Wave
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, Wave
 
 #: Signs at the start of a phase are read this fraction of the phase inside it, but no closer to the start than this
 #: fraction of that: where a phase ends at a turn of E, the sign just behind is known only beyond rounding.
@@ -364,6 +364,29 @@ def with_least(state: State, least: float) -> State:
 
 
 @scalar
+def glide(block: Block, pieces: np.ndarray, p: int, end: int, state: State) -> tuple[int, State]:
+    """`hold` along whole straight pieces from p on, before `end`, as long as V neither turns nor vanishes on one.
+
+    Most pieces of a record are such.  Returns the first piece that is not.
+    """
+    amplitude, held, velocity, displacement = block.amplitude, state.held, state.velocity, state.displacement
+    peak, least = state.peak, state.least
+    while p < end and pieces[p, DEGREE] <= 1.0:
+        rate, rate_end = amplitude * pieces[p, FIRST] - held, amplitude * pieces[p, LAST] - held
+        width = pieces[p, FINISH] - pieces[p, BEGIN]
+        after = velocity + 0.5 * (rate + rate_end) * width
+        if not after > 0.0 or opposite(rate, rate_end):
+            break
+        displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * width) * width
+        velocity, peak, least = after, max(peak, after), min(least, after)
+        p += 1
+    return p, State(
+        velocity, displacement, held, peak, least, state.sliding, state.follows, state.stopped_at, state.least_held,
+        state.slips, state.logged,
+    )  # fmt: skip
+
+
+@scalar
 def follow(
     block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, log: np.ndarray
 ) -> tuple[float, State]:
@@ -415,6 +438,8 @@ def rise(
             if not state.sliding or p == until:
                 break
             p += 1
+            if not phase.follows and log.size == 0:
+                p, state = glide(block, pieces, p, until, state)
             tau = pieces[p, BEGIN]
         if not state.sliding and (p < until or tau < tau_until):
             if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
@@ -467,6 +492,15 @@ def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
 
 
 @scalar
+def end_of_fall(pieces: np.ndarray, p: int, end: int) -> int:
+    """The first piece after piece p, up to piece `end`, on which the base's acceleration does not go on to fall."""
+    p += 1
+    while p < end and pieces[p, FIRST] > pieces[p, LAST] and pieces[p, JUMPS] == 0.0:
+        p += 1
+    return p
+
+
+@scalar
 def through_interval(
     block: Block, pieces: np.ndarray, p: int, tau: float, end: int, state: State, log: np.ndarray
 ) -> State:
@@ -493,6 +527,9 @@ def through_interval(
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
                     tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, log)
+            elif state.sliding and log.size == 0:
+                q, state = glide(block, pieces, q + 1, end_of_fall(pieces, q, end), state)
+                continue
         q += 1
     return state
 
@@ -520,10 +557,14 @@ def recouple(
     stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
     if recoupling == INTEGRATE:
         stopped_at = math.inf
-        for piece in range(q, min(p + 1, count)):
+        piece = q
+        while state.sliding and piece < min(p + 1, count):
+            if log.size == 0:
+                piece, state = glide(block, pieces, piece, min(p, count), state)
             end = tau if piece == p else pieces[piece, FINISH]
-            if state.sliding and end > pieces[piece, BEGIN]:
+            if piece < count and end > pieces[piece, BEGIN]:
                 _, state = hold(block, pieces, piece, pieces[piece, BEGIN], end, state, log)
+            piece += 1
         started = pieces[count - 1, END]
     if state.sliding and (last or recoupling != INTEGRATE):
         duration = math.inf if last else phase_at(pieces, p, tau) - started

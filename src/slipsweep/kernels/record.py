@@ -248,7 +248,7 @@ def respond(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
             stick_slips += 1.0
             # of a record there is a value if b > 0 at the end of the last rise
             validity |= now.validity if math.isnan(now.displacement) else 0
-            if now.velocity > 0.0 and following < wave.height.size:
+            if now.velocity > 0.0 and following < wave.height.size and block.rise != NEWMARK:
                 validity |= NOT_RECOUPLED
         velocity, highest, slips = now.velocity, max(now.peak, highest), slips + now.slips
         displacement, lost = added(displacement, lost, now.displacement)
