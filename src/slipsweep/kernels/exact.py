@@ -500,7 +500,7 @@ def end_of_fall(pieces: np.ndarray, p: int, end: int) -> int:
     return p
 
 
-@scalar
+@inlined
 def through_interval(
     block: Block, pieces: np.ndarray, p: int, tau: float, end: int, state: State, log: np.ndarray
 ) -> State:
@@ -579,7 +579,7 @@ def recouple(
     return state
 
 
-@scalar
+@inlined
 def pulse_between(
     block: Block, recoupling: int, pieces: np.ndarray, p: int, tau: float, end: int, next_p: int, next_tau: float,
     velocity: float, log: np.ndarray,
@@ -611,7 +611,7 @@ def pulse_between(
     )  # fmt: skip
 
 
-@scalar
+@inlined
 def pulse(
     block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
 ) -> Pulse:

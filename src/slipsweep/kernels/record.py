@@ -178,7 +178,7 @@ def continuous_pulse(
     return Pulse(after, displacement, velocity + most, 0.0, 0.0, slips, 0)
 
 
-@scalar
+@inlined
 def recorded_pulse(
     block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float,
     workspace: Workspace,
