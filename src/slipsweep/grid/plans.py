@@ -17,8 +17,9 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, places
-from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
+from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Request
 from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tally import Tally
 from slipsweep.model.estimates import friction_inputs
@@ -61,6 +62,9 @@ _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu",
     "minimum_friction",
 )  # fmt: skip
+
+#: Cells of which an array can count the bytes.
+_MOST_CELLS = 2**59
 
 #: Cells of the cycle solver that a cell of a record takes, about.
 _RECORD_COST = 200
@@ -494,7 +498,9 @@ def _check_amplitudes(displacement_amplitude: xr.Variable, frequency: xr.Variabl
 
 
 def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, xr.Variable], results: Collection[str]) -> None:
-    """Refuse dimensions, which DataArrays name as they like, that no dataset can have beside what is in it."""
+    """Refuse dimensions that no dataset can have beside what is in it, or of that length; DataArrays may name any."""
+    if (cells := math.prod(sizes.values())) > _MOST_CELLS:
+        raise InputError(f"grid of {grid_text(sizes)}, {cells:.4g} cells: must be {_MOST_CELLS:.4g} cells at most")
     for dim in sizes:
         if dim in results:
             raise InputError(f"{dim}: is the name of a result: must not be that of a dimension as well")
