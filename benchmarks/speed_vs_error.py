@@ -22,9 +22,9 @@ from benchmarks.sample import Group
 
 STEPS = tuple(2**k for k in range(5, 15))
 
-#: Cells at a time: enough to fill SIMD batches and hide a call, few enough for small steps.
+#: Cells at a time: enough to fill SIMD batches and to hide a call.
 MOST_CELLS = 2**18
-STEPS_AT_A_TIME = 2**23
+STEPS_AT_A_TIME = 2**20
 
 COLOURS = {"cycle": "#d62728", "simpson": "#08519c", "trapezoid": "#3182bd", "rectangle": "#9ecae1"}
 
