@@ -1,7 +1,7 @@
 """The page docs/accuracy.md, from what has been measured: ``python -m benchmarks.accuracy``.
 
-Takes speed_vs_error.csv and model_choices.md as they lie in benchmarks/results, and
-measures where double precision ends (a few 30-digit solutions, seconds).
+Takes speed_vs_error.csv as it lies in benchmarks/results, and measures where double precision ends (a few 30-digit
+solutions, seconds).
 """
 
 import csv
@@ -24,7 +24,7 @@ PLANES = ((5.0, 0.38), (0.0, 0.5), (18.0, 0.4))
 def points() -> list[dict[str, Any]]:
     """The points of speed_vs_error.csv."""
     with (RESULTS / "speed_vs_error.csv").open(newline="") as file:
-        text = ("family", "method", "regime")
+        text = ("solver", "regime")
         return [
             {name: value if name in text else float(value) for name, value in row.items()}
             for row in csv.DictReader(file)
@@ -36,12 +36,12 @@ def steps_for_errors(found: list[dict[str, Any]]) -> str:
     rows = []
     for regime in REGIMES:
         for rule in RULES:
-            own = [point for point in found if (point["family"], point["regime"]) == (f"step, {rule}", regime)]
+            own = [point for point in found if (point["solver"], point["regime"]) == (rule, regime)]
             row = [regime.replace("_", "–"), rule]
             for error in WANTED:
                 enough = [point for point in own if point["error_95"] <= error]
-                best = min(enough, key=lambda point: point["setting"], default=None)
-                row.append(f"{best['setting']:.0f} ({number(best['seconds_per_cell'] * 1e6, 2)} µs)" if best else "–")
+                best = min(enough, key=lambda point: point["steps"], default=None)
+                row.append(f"{best['steps']:.0f} ({number(best['seconds_per_cell'] * 1e6, 2)} µs)" if best else "–")
             rows.append(row)
     return table(["regime", "rule", *(f"{error:.0e}" for error in WANTED)], rows)
 
@@ -55,7 +55,7 @@ def cycle_errors(found: list[dict[str, Any]]) -> str:
             number(point["seconds_per_cell"] * 1e9),
         ]
         for point in found
-        if point["family"] == "cycle"
+        if point["solver"] == "cycle"
     ]
     return table(["regime", "median", "95 %", "worst", "ns a cell and core"], rows)
 
@@ -86,12 +86,11 @@ def near_yield() -> str:
 def main() -> None:
     """Write docs/accuracy.md."""
     found = points()
-    choices = (RESULTS / "model_choices.md").read_text().split("\n", 2)[2]
     (DOCS / "accuracy.md").write_text(f"""# Accuracy
 
 This page compares errors of the solvers, numbers of steps, and the limits of double precision. {measured_on()}
 Every number and figure here is written by `python -m benchmarks.accuracy` from the results of
-`python -m benchmarks.speed_vs_error` and `python -m benchmarks.model_choices`. Errors are relative
+`python -m benchmarks.speed_vs_error`. Errors are relative
 errors of the permanent displacement against solutions of 30 digits (tests/support/reference.py), over a fixed
 random sample of 64 cells a regime (benchmarks/data/sample.csv), one cycle of loading; "hard" cells lie
 just above yield, near static failure, at the mode limit, under sharply decaying friction or on a level
@@ -115,8 +114,8 @@ and ends at rest.
 
 ![Time a cell against relative error](../benchmarks/results/speed_vs_error.png)
 
-Each point is one solver with one setting. The table behind the figure, and what each solver does about
-the events, is in [speed_vs_error.md](../benchmarks/results/speed_vs_error.md).
+Each point is one solver with one number of steps
+([all numbers](../benchmarks/results/speed_vs_error.csv)).
 
 ## Where double precision ends
 
@@ -129,17 +128,11 @@ of it.
 {near_yield()}
 ## Options of the model
 
-These differences are not numerical errors: the paper does not specify these rules, and options select an
-interpretation.
-
-{choices}
-![Displacement under each choice over the default's](../benchmarks/results/model_choices.png)
-
-With the literal rise the block's acceleration may be below the yield acceleration. Just above yield the displacement
-then grows without bound, and some cells have no value. With re-sticking by integration instead of Eq. 12 the
-block stops sooner after the base's acceleration has become negative. This has a large effect where the block would
-otherwise still slide when the next pulse begins. Newmark's block has nearly the default's displacement where the yield
-acceleration governs, and a smaller or larger one where Eq. 4 governs.
+Differences between the options `rise`, `recoupling` and `model` are not numerical errors: the paper does not specify
+these rules, and an option selects an interpretation ([trust.md](trust.md)). With the literal rise the block's
+acceleration may be below the yield acceleration. Just above yield the displacement then grows without bound, and some
+cells have no value. With re-sticking by integration instead of Eq. 12 the block stops sooner after the base's
+acceleration has become negative.
 """)
 
 

@@ -122,10 +122,9 @@ file); a neighbour without a value is left out of the bound.
 
 The step solver must converge at first order at least, everywhere (sixteen times the steps, from 1024 on, a twelfth of
 the error), until its error is at most 100. Steps of equal length do not converge where the motion changes within a
-shorter time. kernels/step/ therefore has three rules. A slide that lasts less than a
-few steps (just above yield, or where Eq. 4 touches Üg between two nodes) is found where D = Üg − Ü has its
-maximum and gets steps of its own, which grow with the time since its onset. A layer of friction thinner than
-steps (λA/g above some 400) is cut out of the step and covered by 1/64 of the steps a cycle on each side of Üg = 0.
+shorter time. `kernels/step.py` therefore has two rules. A slide that lasts less than a few steps (just above yield, or
+where Eq. 4 touches Üg between two nodes) gets steps of its own, which grow with the time since its onset. A step in
+which the friction decays is halved until Eq. 4 is nearly straight in it.
 Where the two halves of a cycle are mirror images, V over many cycles is the integral of the part of D
 that both have in common. A sum with the other part, which cancels, would have a rounding error of 1e-14 per cycle; on a
 nearly level base this is more than the sum itself.

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machine import arguments, measured_on, number, table
-from benchmarks.roofline import slot
 from slipsweep import Record, Suite, sweep
 
 KY = 0.1
@@ -89,11 +88,8 @@ def agreement(found: dict[str, Any], g: float) -> str:
     return table([text.replace("/1", "") if text.endswith("/1") else text for text in header], rows)
 
 
-def timing(found: dict[str, Any], g: float, analyses: int, share: int, own_slot: float) -> str:
-    """Processor time of `analyses` by slipsweep in one run, of a share of them by the paper's law and by pySLAMMER.
-
-    `own_slot` is the time of a multiply-add here, s (`roofline.slot`).
-    """
+def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
+    """Processor time of `analyses` by slipsweep in one run, of a share of them by the paper's law and by pySLAMMER."""
     from pyslammer import RigidAnalysis
 
     suite = Suite(tuple(Record.sampled(motion.accel * g, motion.dt) for motion in found.values()), tuple(found))
@@ -130,11 +126,9 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int, own_slot:
     ky, law, peer = each.values()
     rows = []
     for name, (done, seconds) in runs.items():
-        sample = each[name] / samples
-        figures = [seconds, each[name], sample, sample / own_slot, peer / each[name]]
+        figures = [seconds, each[name], each[name] / samples, peer / each[name]]
         rows.append([name, done, *map(number, figures)])
-    header = ["", "analyses", "seconds", "seconds an analysis", "seconds a sample", "slots a sample"]
-    header.append("times pySLAMMER's speed")
+    header = ["", "analyses", "seconds", "seconds an analysis", "seconds a sample", "times pySLAMMER's speed"]
     return table(header, rows) + f"\nThe paper's law takes {number(law / ky)} times as long as Newmark's block.\n"
 
 
@@ -147,8 +141,8 @@ def main(given: argparse.Namespace) -> Path:
         found = motions()
         if given.tiny:
             found = dict(list(found.items())[-2:-1])
-        agree, own_slot = agreement(found, G_EARTH), slot(given.tiny)
-        times = timing(found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found), own_slot)
+        agree = agreement(found, G_EARTH)
+        times = timing(found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found))
     page = given.folder / "records.md"
     page.write_text(
         "# Newmark's block on recorded motions\n\n"
@@ -165,7 +159,7 @@ def main(given: argparse.Namespace) -> Path:
         "## Time of (ky, motion, scale) analyses\n\n"
         "Processor time of all threads together: core for core. Motions, yield coefficients (0.02 to 0.4) and scales\n"
         "(0.3 to 3) span the grid, solved in one run; seconds a sample count those of the motion, slid\n"
-        f"over or not. A slot is a multiply-add in registers on one core, here {number(own_slot * 1e9)} ns.\n\n"
+        "over or not.\n\n"
         f"{times}"
     )
     return page

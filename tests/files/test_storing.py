@@ -185,23 +185,29 @@ def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
     (folder / "large.toml").write_text(WAVE.replace("num = 4", "num = 9000000").replace("[0.5, 1, 2]", "[0.5, 1]"))
     text = (folder / "large.toml").read_text().replace("values = [0.3, 0.5]", "start = 0.3\nstop = 1\nnum = 900000")
     (folder / "large.toml").write_text(text)
-    with pytest.raises(InputError, match=r"a\.nc: takes .*TB, and as much again .* are free on the disk"):
-        stored(job_of(folder, "large"), folder / "a.nc")
+    for name in ("a.nc", "a.zarr"):
+        with pytest.raises(InputError, match=rf"{name}: takes .*TB, and as much again .* are free on the disk"):
+            stored(job_of(folder, "large"), folder / name)
+        assert not [*folder.glob(f"{name}*")]
     with pytest.raises(InputError, match=r"--memory = 100 MB: must be .* at least"):
         stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(memory=100_000_000))
 
 
-def test_memory_is_what_is_asked_for(folder: Path) -> None:
-    """A run in chunks takes no more than --memory says, and a tenth."""
+@pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
+def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
+    """A run in chunks takes no more than --memory says, and a tenth; codes are stored as whole numbers."""
     text = WAVE.replace("num = 4", "num = 2000").replace("[0.5, 1, 2]", str([0.01 * i + 1 for i in range(600)]))
     (folder / "a.toml").write_text(text)
     code = (
         "import resource, sys; from slipsweep.cli import main; "
-        "assert not main(['run', 'a.toml', '-o', 'a.nc', '-q', '--memory', '460MB']); "
+        "assert not main(['run', 'a.toml', '-o', sys.argv[1], '-q', '--memory', '460MB']); "
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code, output], cwd=folder, capture_output=True, text=True, check=True)
     assert int(done.stdout) * 1024 < 1.1 * 460e6
+    how: Any = {"engine": "zarr", "consolidated": False} if output.endswith("zarr") else {}
+    with xr.open_dataset(folder / output, mask_and_scale=False, **how) as file:
+        assert (file.validity.dtype, file.sliding_mode.dtype) == ("int16", "int8")
 
 
 @pytest.mark.parametrize("output", ["w.nc", "w.zarr"])

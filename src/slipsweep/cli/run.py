@@ -1,6 +1,7 @@
 """`slipsweep run`: a sweep computed and written."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -40,12 +41,6 @@ EXAMPLE = examples(
     "slipsweep run design_chart.nc -o again.nc --quiet",
 )
 
-#: Endings of what other commands write, and of formats that a table or a chart is often wanted in.
-_OTHER_FORMATS = (
-    ".png", ".svg", ".pdf", ".jpg", ".jpeg", ".gif", ".csv", ".tsv", ".txt", ".parquet", ".xls", ".xlsx", ".json",
-    ".html", ".htm", ".mat", ".npy", ".npz", ".zip",
-)  # fmt: skip
-
 
 def run(
     sweep: Annotated[
@@ -76,13 +71,13 @@ def run(
         raise InputError(f"--solver {solver}: not allowed with recorded motions, to which the response is exact")
     if solver is not None:
         same = solver == checked.solver.name  # with the options that the sweep file gives it
-        checked = checked if same else checked.with_solver(SOLVERS.of(solver))
+        checked = checked if same else replace(checked, solver=SOLVERS.of(solver))
     if output is None and checked.output.path is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = place_of(checked.output.path or f"{sweep.stem}.nc" if output is None else output)
     if isinstance(path, str) and not path.rstrip("/").endswith(".zarr"):
         raise InputError(f"{path}: the name of a store at an address must end in .zarr")
-    if isinstance(path, Path) and path.suffix.lower() in _OTHER_FORMATS:
+    if isinstance(path, Path) and path.suffix not in (".nc", ".zarr"):
         raise InputError(f"{path}: the name must end in .nc or .zarr, the formats that are written")
     from slipsweep.files.jobs import sweep_job
 

@@ -67,9 +67,6 @@ _RECORD_KEYS = (*_RECORDED, "pairs", *(one.name for one in declared(Reading)), "
 #: What stands for standard input on a command line.
 _STANDARD_INPUT = Path("-")
 
-#: A million cases; what is larger is no sweep file (a device, an archive).
-_MOST_BYTES = 200_000_000
-
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
 
@@ -273,10 +270,6 @@ class SweepSpec:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
-    def with_solver(self, solver: Solver) -> "SweepSpec":
-        """Return the same sweep under another solver."""
-        return replace(self, solver=solver)
-
     def plan(self) -> "AnyPlan":
         """Return what the sweep file asks for: a sweep, or the statistics of samples.
 
@@ -374,19 +367,14 @@ def load(path: str | Path) -> SweepSpec:
     if (path / "zarr.json").is_file():
         return replace(_load_result(path), files=(path,))
     try:
-        stream = is_stream(path)
         read: Read = 0 if path == _STANDARD_INPUT else path
         with open(read, "rb", closefd=read != 0) as file:
             content = file.read(4)
-            is_netcdf = content.startswith(_NETCDF) or (path.suffix == ".nc" and not stream)
-            if is_netcdf and stream:
-                raise InputError(f"{path}: is a netCDF file, which cannot be read from a pipe; give it by name")
+            is_netcdf = content.startswith(_NETCDF) or path.suffix == ".nc"
             if not is_netcdf:
-                content += file.read(_MOST_BYTES - 3)
-                if len(content) > _MOST_BYTES:
-                    raise InputError(f"{path}: not a sweep file: it has more than {_MOST_BYTES} bytes")
                 # utf-8-sig: some editors put a byte-order mark in front
-                sweep = parse(content.decode("utf-8-sig"), str(path), Path() if stream else path.parent)
+                text = (content + file.read()).decode("utf-8-sig")
+                sweep = parse(text, str(path), Path() if is_stream(path) else path.parent)
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a sweep file: it is not UTF-8 text") from None
     except OSError as error:
@@ -414,7 +402,7 @@ def _load_result(path: Path) -> SweepSpec:
     spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     try:
-        return spec.with_solver(SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
+        return replace(spec, solver=SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
     except (ValueError, TypeError) as error:  # InputError, and what numpy says of an array
         raise InputError(f"{path}: {error}") from None
 
@@ -449,7 +437,8 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Record |
         solver = _chosen(SOLVERS, file.solver, {})
         output = _output(file, parameters)
     except InputError as error:
-        raise _said_of(error, f"{source}: {_one_line(str(error))}") from None
+        error.args = (f"{source}: {_one_line(str(error))}",)
+        raise
     components = excitation.components if isinstance(excitation, Suite) else ()
     records = (excitation,) if isinstance(excitation, Record) else components
     files = () if recorded else tuple(Path(one.name) for one in records)
@@ -481,15 +470,8 @@ def _excitation(table: Any, folder: Path) -> Waveform | Record | Suite:
     except InputError as error:
         text = str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
         named = text.startswith((key, "pairs"))
-        raise _said_of(error, f"excitation.{text}" if named else f"excitation.{key}: {text}") from None
-
-
-def _said_of(error: InputError, text: str) -> InputError:
-    """The same error, said in other words: what it notes goes along."""
-    other = InputError(text)
-    for note in getattr(error, "__notes__", ()):
-        other.add_note(note)
-    return other
+        error.args = (f"excitation.{text}" if named else f"excitation.{key}: {text}",)
+        raise
 
 
 # ------------------------------------------------------------- from tables to parameters

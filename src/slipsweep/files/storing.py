@@ -140,7 +140,6 @@ def run(
     else:
         with target.locked():
             target.begin(resume, overwrite)
-            target.check_room()
             with _kept(target), job.named():
                 _solve(target, means, progress)
                 tally = target.finish(command, overwrite)
@@ -243,9 +242,22 @@ class _Chunks:
         return found
 
     @property
-    def indices(self) -> list[tuple[int, ...]]:
-        """The places of all chunks among the others, in the order of the file; a chunk's number is its place here."""
-        return list(np.ndindex(*map(len, self.cut.values())))
+    def shape(self) -> tuple[int, ...]:
+        """How many chunks there are along each dimension; they are numbered in the order of the file."""
+        return tuple(math.ceil(size / self.lengths[dim]) for dim, size in self.job.plan.sizes.items())
+
+    @property
+    def count(self) -> int:
+        """How many chunks there are."""
+        return math.prod(self.shape)
+
+    def index(self, number: int) -> tuple[int, ...]:
+        """The place of a chunk."""
+        return tuple(int(at) for at in np.unravel_index(number, self.shape))
+
+    def indices(self) -> Iterator[tuple[int, tuple[int, ...]]]:
+        """Number and place of every chunk; one after the other, as there may be more than memory holds."""
+        return enumerate(np.ndindex(*self.shape))
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -278,13 +290,15 @@ class _Chunks:
         Raises
         ------
         InputError
-            There are chunks, which neither `resume` nor `overwrite` says what to do with, or of another sweep.
+            There are chunks, which neither `resume` nor `overwrite` says what to do with, or of another sweep; or the
+            disk has no room for the results.
         """
         if overwrite:
             self.clear()
         found = self.read_identity()
         if found is None:
             self.clear()
+            self.check_room()
             with writing(self.path):
                 self.make()
             return
@@ -306,6 +320,7 @@ class _Chunks:
             )
         self.lengths = found["lengths"]
         self.done = self.finished()
+        self.check_room()
 
     @property
     def place(self) -> Place:
@@ -314,7 +329,7 @@ class _Chunks:
 
     def check_room(self) -> None:
         """Refuse what the disk has no room for."""
-        needed, left = self.nbytes, 1.0 - len(self.done) / len(self.indices)
+        needed, left = self.nbytes, 1.0 - len(self.done) / self.count
         free = shutil.disk_usage(self.folder).free
         if needed * (1.0 + left) > free:
             raise InputError(
@@ -398,7 +413,7 @@ class _NetcdfChunks(_Chunks):
         table = self.job.described(plan.template(), command)
         temporary = self.folder / "result.nc"
         with netcdf.new_file(temporary, path, table, self.job.dtypes, self.lengths, self.job.compression) as file:
-            for number, index in enumerate(self.indices):
+            for number, index in self.indices():
                 chunk, arrays = chunk_at(self.cut, index), self._read(number)
                 for name, values in arrays.items():
                     file[name][_where(table[name], chunk)] = values
@@ -448,12 +463,11 @@ class _ZarrChunks(_Chunks):
         table = self.job.described(self.job.plan.template(), "")
         for name, dtype in self.job.dtypes.items():
             one = table[name]
-            table[name] = (one.dims, da.zeros(one.shape, dtype, chunks=-1), one.attrs)  # not computed
+            table[name] = (one.dims, da.zeros(one.shape, dtype=dtype, chunks=-1), one.attrs)  # not computed
         encoding = {name: self._encoding(table[name]) for name in self.job.dtypes}
         table.to_zarr(self.store, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
         group = zarr.open_group(self.store, mode="r+")
-        count = len(self.indices)
-        group.create_array("finished", shape=(count,), chunks=(1,), dtype="uint8", dimension_names=("number",))
+        group.create_array("finished", shape=(self.count,), chunks=(1,), dtype="uint8", dimension_names=("number",))
         group.attrs["unfinished"] = json.dumps(self.state)
         super().make()
 
@@ -501,7 +515,7 @@ class _ZarrChunks(_Chunks):
 
     def write(self, number: int, arrays: Arrays) -> None:
         with writing(self.path):
-            self.region.write(self.indices[number], arrays)
+            self.region.write(self.index(number), arrays)
 
     def finish(self, command: str, overwrite: bool) -> Tally:
         import zarr
@@ -564,7 +578,7 @@ def _kept(target: _Chunks) -> Iterator[None]:
             raise
         kept = len(target.finished())
         if kept:
-            error.add_note(f"{kept} of {len(target.indices)} chunks are kept in {target.place}: --resume goes on")
+            error.add_note(f"{kept} of {target.count} chunks are kept in {target.place}: --resume goes on")
         else:
             target.clear()
             error.add_note("nothing written")
@@ -580,20 +594,18 @@ def _solve(target: _Chunks, means: Means, progress: Callable[[int], None] | None
 
     plan, cut = target.job.plan, target.cut
     chunks = solved_chunks(plan, cut)
-    missing = {number: index for number, index in enumerate(target.indices) if number not in target.done}
+    missing = ((number, index) for number, index in target.indices() if number not in target.done)
 
     def tell(number: int) -> None:
         if progress is not None:
-            progress(plan.part(chunk_at(cut, target.indices[number])).cells)
+            progress(plan.part(chunk_at(cut, target.index(number))).cells)
 
     if progress is not None and target.done:
-        progress(plan.cells * len(target.done) // len(target.indices))
+        progress(plan.cells * len(target.done) // target.count)
     if means.has_cluster:
         written = target.written(chunks)
         with cluster.connected(means.workers, means.scheduler) as client:
-            blocks = (
-                (number, (chunks if written is None else written).blocks[index]) for number, index in missing.items()
-            )
+            blocks = ((number, (chunks if written is None else written).blocks[index]) for number, index in missing)
             for number, found in cluster.computed(client, blocks):
                 if written is None:
                     target.write(number, _stored(target.job, found.item()))
@@ -601,7 +613,7 @@ def _solve(target: _Chunks, means: Means, progress: Callable[[int], None] | None
         return
     with ThreadPoolExecutor(1) as writer:
         waiting: Future[None] | None = None
-        for number, index in missing.items():
+        for number, index in missing:
             found = chunks.blocks[index].compute(scheduler="synchronous").item()
             if waiting is not None:
                 waiting.result()

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from slipsweep.errors import RunError
 from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
+from slipsweep.grid.problem import Problem
 from slipsweep.grid.served import UNBOUNDED, check_served, is_ordinary
 from slipsweep.grid.solvers import ROWS, options_of, solver_of
 from slipsweep.jit.decorators import of_arrays
 from slipsweep.kernels.block import UNSOLVED, Cell
 from slipsweep.kernels.grid import Cells, find_parameters
 from slipsweep.model import equations as eq
-from slipsweep.model.options import Model, Solver
 from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, STRENGTHS, Validity
 from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.intensity import strength_factor
@@ -49,15 +49,6 @@ Array = NDArray[np.float64]
 
 #: Results by their names.
 Arrays: TypeAlias = dict[str, NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What all cells of a grid share: what `slipsweep.sweep` was asked to solve, and how."""
-
-    model: Model
-    excitation: Waveform | Record | Suite
-    solver: Solver
 
 
 def cell_inputs(arrays: Mapping[str, Array], dimensions: int, g: float) -> list[Array]:

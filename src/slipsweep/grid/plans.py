@@ -17,8 +17,9 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, places
-from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Problem, Request
+from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Request
 from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tally import Tally
 from slipsweep.model.estimates import friction_inputs
@@ -61,6 +62,9 @@ _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu",
     "minimum_friction",
 )  # fmt: skip
+
+#: Cells of which an array can count the bytes.
+_MOST_CELLS = 2**59
 
 #: Cells of the cycle solver that a cell of a record takes, about.
 _RECORD_COST = 200
@@ -474,27 +478,19 @@ def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
 
 
 def _check_amplitudes(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> None:
-    """Refuse peak displacements that make an amplitude out of its bounds at a frequency of theirs."""
-    shared = set(displacement_amplitude.dims) & set(frequency.dims)
-    # A grows with both: their extremes, apart along dimensions of their own, have those of A
-    for extreme in (np.min, np.max):
-        reduced = {}
-        for name, variable in (("displacement_amplitude", displacement_amplitude), ("frequency", frequency)):
-            own = tuple(at for at, dim in enumerate(variable.dims) if dim not in shared)
-            left = tuple(dim for dim in variable.dims if dim in shared)
-            reduced[name] = xr.Variable(left, np.asarray(extreme(variable.values, axis=own)))
-        both = aligned(reduced, grid_sizes(reduced))
-        wrong = ~BOUNDS["amplitude"].holds(peak_acceleration(**both))
-        if wrong.any():
-            d, f = (float(np.broadcast_to(values, wrong.shape)[wrong].flat[0]) for values in both.values())
-            raise InputError(
-                f"displacement_amplitude = {number_text(d)}: with frequency = {number_text(f)} its amplitude "
-                f"A = (2 pi f)^2 d must be {BOUNDS['amplitude'].text}"
-            )
+    """Refuse peak displacements that make an amplitude out of its bounds: A grows with both."""
+    d, f = displacement_amplitude.values.max(), frequency.values.max()
+    if not BOUNDS["amplitude"].holds(peak_acceleration(d, f)):
+        raise InputError(
+            f"displacement_amplitude = {number_text(float(d))}: with frequency = {number_text(float(f))} its amplitude "
+            f"A = (2 pi f)^2 d must be {BOUNDS['amplitude'].text}"
+        )
 
 
 def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, xr.Variable], results: Collection[str]) -> None:
-    """Refuse dimensions, which DataArrays name as they like, that no dataset can have beside what is in it."""
+    """Refuse dimensions that no dataset can have beside what is in it, or of that length; DataArrays may name any."""
+    if (cells := math.prod(sizes.values())) > _MOST_CELLS:
+        raise InputError(f"grid of {grid_text(sizes)}, {cells:.4g} cells: must be {_MOST_CELLS:.4g} cells at most")
     for dim in sizes:
         if dim in results:
             raise InputError(f"{dim}: is the name of a result: must not be that of a dimension as well")

@@ -1,10 +1,11 @@
 """Which kernel solves a problem: the sine's SIMD batches, the exact walk under a wave or a record, or steps."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from slipsweep.grid.problem import Problem
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.block import UNSOLVED, Motion, Options
 from slipsweep.kernels.exact import workspace_of
@@ -20,9 +21,6 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.steps import RECTANGLE, SIMPSON, TRAPEZOID, own_steps, steps_of
 from slipsweep.motion.waveforms import Sine, Waveform
 
-if TYPE_CHECKING:
-    from slipsweep.grid.engine import Problem
-
 RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
@@ -35,7 +33,7 @@ ROWS = {_NAMES.get(field, field): row for row, field in enumerate(Motion._fields
 Solve = Callable[[Cells, np.ndarray], Any]
 
 
-def options_of(problem: "Problem", wants_peak: bool) -> Options:
+def options_of(problem: Problem, wants_peak: bool) -> Options:
     """What all cells of a problem share, as the kernels take it."""
     model = problem.model
     return Options(
@@ -47,7 +45,7 @@ def options_of(problem: "Problem", wants_peak: bool) -> Options:
     )
 
 
-def solver_of(problem: "Problem", wants_peak: bool, polarity: float) -> tuple[Solve, int]:
+def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solve, int]:
     """What solves the cells of a problem that one motion shakes, and the time of a cell in those of the sine's."""
     motion, options = problem.excitation, options_of(problem, wants_peak)
     if isinstance(motion, Record):

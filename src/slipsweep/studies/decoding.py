@@ -68,12 +68,6 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
         )
     if mask.dtype.kind not in "iu":
         raise InputError(f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)")
-    limits = np.iinfo(mask.dtype)
-    if bits.dtype.kind not in "iu" or bits.min() < limits.min or bits.max() > limits.max:
-        raise InputError(f"{data.name}: flag_masks = {shown(bits.tolist())}: must be whole numbers of {mask.dtype}")
-    for name in names:
-        if name in data.coords or name in data.dims:
-            raise InputError(f"{data.name}: has a coordinate {name!r}, as its flag is called: must have another name")
     # a flag of no kind, of another program's file, goes last
     ordered = sorted(
         zip(names, bits, strict=True), key=lambda one: _ORDER.index(_KINDS[one[0]]) if one[0] in _KINDS else len(_ORDER)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.grid.engine import Problem
+from slipsweep.grid.problem import Problem
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
 from slipsweep.kernels.exact import workspace_of

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
-from slipsweep.grid.engine import Problem, Request
+from slipsweep.grid.engine import Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, check_problem, plan_sweep
+from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory
 from slipsweep.grid.served import check_served
 from slipsweep.grid.solvers import options_of

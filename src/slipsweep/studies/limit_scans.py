@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
-from slipsweep.grid.engine import Arrays, Problem, Request
+from slipsweep.grid.engine import Arrays, Request
+from slipsweep.grid.problem import Problem
 from slipsweep.model.variables import Validity
 
 Floats = NDArray[np.float64]

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import slabs
-from slipsweep.grid.engine import Arrays, Problem, Request
+from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_sweep
+from slipsweep.grid.problem import Problem
 from slipsweep.model.options import Newmark
 from slipsweep.model.parameters import check_single, check_values, check_whole
 from slipsweep.model.variables import (

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, slabs
-from slipsweep.grid.engine import Problem, Request
+from slipsweep.grid.engine import Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes, inputs_of, memory_of, plan_sweep
+from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tally import Indices, Tally
 from slipsweep.model.estimates import friction_inputs
