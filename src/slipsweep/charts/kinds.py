@@ -18,9 +18,8 @@ from slipsweep.charts.answers import DISPLACEMENT, DRIVES
 from slipsweep.charts.sheet import Sheet
 from slipsweep.charts.slices import NAMED, Kept, Result
 from slipsweep.charts.style import Look, figure_width
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.selection import At
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, RESULTS, STRENGTHS
 

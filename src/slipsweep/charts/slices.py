@@ -12,10 +12,9 @@ import xarray as xr
 
 from slipsweep.charts.answers import solve, with_amplitude
 from slipsweep.charts.style import drawn_text
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.selection import At, Place, axis_labels, between, find
 from slipsweep.model.options import MODELS
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     INTENSITY_MEASURES,
     PARAMETERS,

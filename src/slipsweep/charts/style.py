@@ -118,7 +118,7 @@ def figure_width(width: float | str | None) -> float | None:
     """Width of a figure in inches, from mm or a text with a unit (InputError if no figure can be so wide)."""
     if width is None:
         return None
-    millimetres = 1000.0 * quantity("width", width, "displacement_amplitude", 1.0) if isinstance(width, str) else width
+    millimetres = 1000.0 * quantity("width", width, "m", 1.0) if isinstance(width, str) else width
     if not 50.0 <= millimetres <= 1000.0:
         raise InputError(f"width = {width}: must be 50 to 1000 mm, as in 90mm")
     return millimetres / 25.4
