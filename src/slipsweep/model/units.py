@@ -108,8 +108,5 @@ def quantity(key: str, text: str, own: str, g: float) -> float:
 
 def show(value: object) -> str:
     """Write a value as TOML would, on one line of bearable length."""
-    try:
-        text = json.dumps(value, ensure_ascii=False, default=str)
-    except ValueError:  # Python writes no integer of thousands of digits
-        return "an integer of thousands of digits"
+    text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else f"{text[:57]}..."
