@@ -19,23 +19,23 @@ ORDER = (
 #: Lines that a folder may have, docstrings and blanks among them.  More is a reason to look for the simpler thing;
 #: whoever takes something away lowers the limit.
 LINES = {
-    "jit": 1_650,
-    "model": 1_650,
-    "motion": 2_700,
-    "kernels": 6_400,
-    "grid": 1_850,
-    "studies": 5_900,
-    "files": 3_300,
-    "charts": 4_000,
-    "explore": 850,
-    "cli": 2_000,
+    "jit": 410,
+    "model": 1_600,
+    "motion": 2_600,
+    "kernels": 3_700,
+    "grid": 1_700,
+    "studies": 5_700,
+    "files": 3_100,
+    "charts": 3_850,
+    "explore": 780,
+    "cli": 1_950,
 }
 
 #: Modules in all, and lines of a function's body.
-MOST_MODULES, MOST_LINES = 180, 100
+MOST_MODULES, MOST_LINES = 142, 90
 
 #: Names of ours that a module imports at its head, and the number of modules that still import more.
-MOST_NAMES, MOST_WIDE = 20, 30
+MOST_NAMES, MOST_WIDE = 20, 21
 
 #: The public face, which names what lies in any folder.
 FACE = ("slipsweep", "slipsweep.__main__")

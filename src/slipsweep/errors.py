@@ -1,4 +1,7 @@
-"""Errors of two kinds: bad input, and failed runs."""
+"""Errors of two kinds, bad input and failed runs, and what to say to a name that is not known."""
+
+import difflib
+from collections.abc import Sequence
 
 
 class InputError(ValueError):
@@ -36,3 +39,9 @@ class RunError(RuntimeError):
     Traceback (most recent call last):
     slipsweep.errors.RunError: no annual rate: the model gives no value under any motion at two amplitudes or more
     """
+
+
+def did_you_mean(word: str, known: Sequence[str]) -> str:
+    """Suggest the nearest known name, or tell all of them."""
+    near = difflib.get_close_matches(word, known, n=1)
+    return f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"

@@ -239,17 +239,6 @@ def test_clusters_that_are_none(folder: Path, means: dict[str, Any], message: st
         stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(**means))
 
 
-def test_a_number_too_large_for_the_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = WAVE.replace("start = 0.1\nstop = 1", "start = 1e36\nstop = 1e39") + '[output]\ndtype = "float32"\n'
-    text += '[model]\nfriction = "newmark"\n'
-    (folder / "a.toml").write_text(text)
-    for cells in (1000, 6):
-        monkeypatch.setattr(storing, "CHUNK_CELLS", cells)
-        with pytest.raises(InputError, match=r'a\.toml: output\.dtype = "float32": .* must be "float64"'):
-            stored(job_of(folder, "a"), folder / "a.nc")
-        assert not list(folder.glob("a.nc*"))
-
-
 # --------------------------------------------------------------------------------- opening
 
 

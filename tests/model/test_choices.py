@@ -1,11 +1,9 @@
 """What a user chooses: the objects, their names, their options, and what files say of them."""
 
 import dataclasses
-import inspect
 import pickle
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import netCDF4
 import pytest
@@ -14,9 +12,8 @@ import xarray as xr
 import slipsweep
 from slipsweep import Cosine, Cycle, Harmonics, InputError, Mendez, Newmark, Sine, Square, Step, Triangle
 from slipsweep.cli import main
-from slipsweep.cli.options import chooses
 from slipsweep.files import spec
-from slipsweep.model.choices import Choice, Family, declared, option
+from slipsweep.model.choices import Choice, Family, declared
 from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.motion.waveforms import WAVEFORMS
 
@@ -80,7 +77,6 @@ WRONG: list[tuple[type[Choice], dict[str, Any], str]] = [
     (Newmark, {"g": [9.8, 9.81]}, "g = [9.8, 9.81]: must be a single number"),
     (Sine, {"cycles": 0}, "cycles = 0: must be a whole number >= 1"),
     (Cosine, {"cycles": 2.5}, "cycles = 2.5: must be a whole number >= 1"),
-    (Square, {"cycles": 10**5000}, "cycles = an integer of thousands of digits: must be a whole number <= 1000000000"),
     (Square, {"cycles": 10**20}, "cycles = 100000000000000000000: must be a whole number <= 1000000000"),
     (Sine, {"ramp_in": -0.5}, "ramp_in = -0.5: must be 0 to 100"),
     (Sine, {"cycles": 2, "ramp_in": 1.5, "ramp_out": 1}, "ramp_in + ramp_out = 2.5: must not exceed the 2 cycles"),
@@ -190,31 +186,3 @@ def test_attributes_of_no_choice(attributes: dict[str, Any], message: str) -> No
     with pytest.raises(InputError) as error:
         MODELS.from_attributes(attributes)
     assert str(error.value).startswith(message)
-
-
-# --------------------------------------------------------------------------- one more option
-
-
-@dataclass(frozen=True)
-class Damped(Choice):
-    """A choice with an option that no other has."""
-
-    name: ClassVar[str] = "damped"
-    damping: float = option("what is new", 0.0, least=0.0, most=1.0)
-
-
-def test_an_option_that_is_declared_is_known_everywhere() -> None:
-    family: Family[Any] = Family("excitation", "waveform", (Sine, Damped), "sine", "waveform")
-    assert family.made("damped", {"damping": 0.25}) == Damped(0.25)
-    assert family.from_attributes(family.attributes(Damped(0.5))) == Damped(0.5)
-    with pytest.raises(InputError, match="--damping: not allowed with --waveform = 'sine', only with 'damped'"):
-        family.made("sine", {"damping": 0.25}, lambda text: "--" + text)
-
-    @chooses(excitation=family)
-    def command(*, excitation: Choice) -> None:
-        assert excitation == Damped(0.75)
-
-    about = inspect.signature(command).parameters["damping"].annotation.__metadata__[0]
-    assert about.help == "What is new (with damped; default: 0.0)."
-    given = dict.fromkeys(inspect.signature(command).parameters) | {"waveform": "damped", "damping": 0.75}
-    command(**given)

@@ -67,8 +67,7 @@ def test_eqs_10_and_11_meet_where_the_modes_do() -> None:
 
 
 def test_eq6_without_an_excess_is_eq5() -> None:
-    law = eq.original_friction_coefficient(2.0, MU_S, 2.7, G)
-    assert law == eq.friction_coefficient(2.0, MU_S, 0.0, 2.7, G) == pytest.approx(MU_S * math.exp(-2.7 * 2.0 / G))
+    assert eq.friction_coefficient(2.0, MU_S, 0.0, 2.7, G) == pytest.approx(MU_S * math.exp(-2.7 * 2.0 / G))
 
 
 def test_eq12_brakes_evenly_and_not_backwards() -> None:
@@ -92,13 +91,12 @@ def test_slopes_of_eq4_are_those_of_its_values(ground: float) -> None:
         return eq.relative_acceleration(x, friction(x), MU_S, TAN_THETA, G)
 
     def slope(x: float) -> float:
-        return eq.relative_acceleration_slope(x, friction(x), MU_S, TAN_THETA, decay, G)
+        return eq.relative_acceleration_slope(x, friction(x), -decay * friction(x), MU_S, TAN_THETA, G)
 
     values, slopes = ((f(ground + step) - f(ground - step)) / (2 * step) for f in (rate, slope))
     assert slope(ground) == pytest.approx(values, rel=1e-8)
-    assert eq.relative_acceleration_curvature(ground, friction(ground), TAN_THETA, decay, G) == pytest.approx(
-        slopes, rel=1e-8
-    )
+    derivatives = -decay * friction(ground), decay**2 * friction(ground)
+    assert eq.relative_acceleration_curvature(ground, *derivatives, TAN_THETA, G) == pytest.approx(slopes, rel=1e-8)
 
 
 @numba.njit(error_model="numpy")

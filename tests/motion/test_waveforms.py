@@ -248,10 +248,3 @@ def test_refused(waveform: str, given: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
         WAVEFORMS.made(waveform, given, lambda key: f"excitation.{key}")
     assert message in str(error.value)
-
-
-def test_attributes_give_the_waveform_again() -> None:
-    for waveform in EVERY.values():
-        assert WAVEFORMS.from_attributes(WAVEFORMS.attributes(waveform)) == waveform
-    text = "4 cycles of a square wave, ramp in 1.5 cycles, ramp out 1.25 cycles"
-    assert str(EVERY["ramped square"]) == text

@@ -12,8 +12,7 @@ import xarray as xr
 
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
 from slipsweep.model.variables import PARAMETERS, WAVEFORM_INPUTS
-from slipsweep.motion.amplitude import peak_acceleration
-from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
 
 #: Amplitudes of a motion.

@@ -1,16 +1,19 @@
 """Figures of tests on a shaking table: measured friction (the paper's Fig. 7), measured against computed motion."""
 
-import textwrap
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slipsweep.charts.sheet import new_panels
-from slipsweep.charts.style import BLUE, VERMILION
+from slipsweep.charts.sheet import Drawing
+from slipsweep.charts.style import BLUE, VERMILION, Look
 
 _GREY = "0.45"
+
+#: What legends above a panel have in common.
+_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False}
 
 #: Of each channel of the block: label, factor to the unit drawn, and this unit.
 _CHANNELS = {
@@ -20,13 +23,16 @@ _CHANNELS = {
 }
 
 
-def friction(table: xr.Dataset, axes: Axes | None = None) -> Figure:
+def friction(table: xr.Dataset, axes: Axes | None = None, look: Look | None = None) -> Figure:
     """Draw measured friction in the manner of the paper's Fig. 7, with the friction by statics.
 
     Parameters
     ----------
     table : xr.Dataset
         What `slipsweep.measured_friction` returns.
+    axes : Axes, optional
+        Refused: there are several panels.
+    look : Look, optional
 
     Returns
     -------
@@ -34,37 +40,39 @@ def friction(table: xr.Dataset, axes: Axes | None = None) -> Figure:
         Panels over time: accelerations of table and block; friction by Eq. 1 and by statics.  Slides are shaded, from
         onset to stop.
     """
-    figure, panels = new_panels(axes, 2, 1, (7.0, 4.8), sharey=False)
-    accelerations, coefficient = panels.ravel()
+    drawing = Drawing(look or Look(), 2, 1, (7.0, 4.8), axes, sharey=False)
+    accelerations, coefficient = drawing.grid.ravel()
     time = table["time"].values
     accelerations.plot(time, table["ground_acceleration"].values, color=BLUE, label="table")
     accelerations.plot(time, table["block_acceleration"].values, color=VERMILION, linewidth=1.0, label="block")
     accelerations.set_ylabel("acceleration\n(m/s²)")
-    accelerations.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+    accelerations.legend(ncols=2, **_ABOVE)
     _friction_lines(table, coefficient)
     coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
-    coefficient.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False)
+    coefficient.legend(ncols=3, **_ABOVE)
     coefficient.set_xlabel("time (s)")
     stops = np.where(np.isnan(table["slide_stop"].values), time[-1], table["slide_stop"].values)
     for panel in (accelerations, coefficient):
         for onset, stop in zip(table["slide_onset"].values, stops, strict=True):
             panel.axvspan(onset, stop, color="0.92", zorder=0)
-    _finish(figure, [accelerations, coefficient])
+    drawing.mark_zero([accelerations, coefficient])
     caption = (
         f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}; shaded: slides, relative acceleration "
         f"beyond {table.attrs['threshold']:.3g} m/s²"
     )
-    _caption(figure, caption, table.attrs["constant_friction"])
-    return figure
+    return drawing.finish([table.attrs["constant_friction"], caption])
 
 
-def calibration(table: xr.Dataset, axes: Axes | None = None) -> Figure:
+def calibration(table: xr.Dataset, axes: Axes | None = None, look: Look | None = None) -> Figure:
     """Draw measured against computed motion in the manner of the paper's Figs. 8 and 9.
 
     Parameters
     ----------
     table : xr.Dataset
         What `slipsweep.calibrate` returns.
+    axes : Axes, optional
+        Refused: there are several panels.
+    look : Look, optional
 
     Returns
     -------
@@ -74,17 +82,15 @@ def calibration(table: xr.Dataset, axes: Axes | None = None) -> Figure:
     """
     tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
     rows = 5 if "free_body_friction" in table else 4
-    figure, grid = new_panels(axes, rows, len(tests), (7.0 if len(tests) == 1 else 5.0 * len(tests), 9.0), sharey=False)
-    grid = np.asarray(grid).reshape(rows, len(tests))
-    for test, panels in zip(tests, grid.T, strict=True):
+    size = (7.0 if len(tests) == 1 else 5.0 * len(tests), 9.0)
+    drawing = Drawing(look or Look(), rows, len(tests), size, axes, sharey=False)
+    for test, panels in zip(tests, drawing.grid.T, strict=True):
         shown = test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values})
         _test(shown, list(panels))
-    for panels in grid[:, 1:]:
-        for panel in panels:
-            panel.set_ylabel("")
-    _finish(figure, list(grid.ravel()))
-    _caption(figure, _parameters(table), table.attrs["constant_friction"])
-    return figure
+    for panel in drawing.grid[:, 1:].ravel():
+        panel.set_ylabel("")
+    drawing.mark_zero(drawing.grid.ravel())
+    return drawing.finish([table.attrs["constant_friction"], _parameters(table)])
 
 
 def _test(table: xr.Dataset, panels: list[Axes]) -> None:
@@ -93,7 +99,7 @@ def _test(table: xr.Dataset, panels: list[Axes]) -> None:
     ground.plot(time, table["measured_ground_acceleration"].values, ".", color=_GREY, markersize=2, label="measured")
     ground.plot(time, table["computed_ground_acceleration"].values, color=BLUE, label="smooth")
     ground.set_ylabel("acceleration of\nthe table (m/s²)")
-    ground.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+    ground.legend(ncols=2, **_ABOVE)
     for panel, (name, (label, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
         measured = f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull())
         if measured:
@@ -106,10 +112,10 @@ def _test(table: xr.Dataset, panels: list[Axes]) -> None:
             misfit, share = factor * table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
             text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
         panel.set_title(text, fontsize="small", loc="left")
-    panels[1].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+    panels[1].legend(ncols=2, **_ABOVE)
     if len(panels) > 4:
         _friction_lines(table, panels[4])
-        panels[4].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+        panels[4].legend(ncols=2, **_ABOVE)
     panels[-1].set_xlabel("time (s)")
 
 
@@ -137,17 +143,3 @@ def _parameters(table: xr.Dataset) -> str:
         parts.append(f"{sign} {value}")
     given = f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}"
     return f"{', '.join(parts)}; 95 % intervals\n{given}"
-
-
-def _caption(figure: Figure, text: str, constant: str) -> None:
-    """The caption; a block of constant friction is named first."""
-    first = textwrap.fill(constant, 90) + "\n" if constant else ""
-    figure.supxlabel(first + text, fontsize="small")
-
-
-def _finish(figure: Figure, panels: list[Axes]) -> None:
-    for axes in panels:
-        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        axes.margins(x=0)
-        axes.grid(color="0.9")
-    figure.align_ylabels()

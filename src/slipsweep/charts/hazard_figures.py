@@ -36,7 +36,7 @@ def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
 
 
 def hazard_chart(
-    rates: xr.Dataset, axes: Axes | None = None, marked: Floats | None = None, look: Look | None = None
+    rates: xr.Dataset, axes: Axes | None = None, look: Look | None = None, marked: Floats | None = None
 ) -> Figure:
     """Draw the mean annual rate of exceedance over the displacement.
 
@@ -46,9 +46,9 @@ def hazard_chart(
         What `slipsweep.displacement_hazard` returns.
     axes : Axes, optional
         What to draw in, instead of a new figure.
+    look : Look, optional
     marked : array, optional
         Its displacements that are marked; by default all, if they are few.
-    look : Look, optional
 
     Returns
     -------

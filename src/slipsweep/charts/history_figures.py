@@ -67,11 +67,7 @@ def history(data: xr.Dataset, axes: Axes | None = None, look: Look | None = None
     displacement.plot(time, data["relative_displacement"].values * (1 if metres else 1000), color=VERMILION)
     displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
     displacement.set_xlabel("time (s)")
-    for panel in panels:
-        panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        panel.margins(x=0)
-        panel.grid(color="0.9")
-    drawing.figure.align_ylabels()
+    drawing.mark_zero(panels)
     return drawing.finish([caption(data, look)])
 
 

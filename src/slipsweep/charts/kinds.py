@@ -16,11 +16,10 @@ from matplotlib.figure import Figure
 from slipsweep.charts import curves, maps, sensitivity_figures, suite_figures, uncertainty_figures, whole
 from slipsweep.charts.answers import DISPLACEMENT, DRIVES
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.slices import NAMED, Kept, Result
+from slipsweep.charts.slices import NAMED, Kept, Result, spread
 from slipsweep.charts.style import Look, figure_width
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.selection import At
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, RESULTS, STRENGTHS
 
@@ -72,7 +71,7 @@ Drawn = Result | whole.WholeResult
 
 def drawable(data: xr.Dataset, name: str | Path) -> Drawn:
     """What can be drawn of a dataset: slices of a result, or one chart of the whole (InputError if neither)."""
-    kind = whole.whole_kind(data)
+    kind = next((kind for kind, (variable, _) in whole.DRAWN_WHOLE.items() if variable in data), None)
     return Result(data, str(name)) if kind is None else whole.WholeResult(data, str(name), kind)
 
 
@@ -176,7 +175,8 @@ def look_of(
         A level is no number with a unit of the result, or not above zero; no figure can be so wide.
     """
     own = "displacement_amplitude" if RESULTS.get(variable, {}).get("units") == "m" else "mu_s"
-    found = [quantity("levels", one, own, result.g) if isinstance(one, str) else float(one) for one in levels]
+    g = float(result.data.attrs.get("g", 9.81))
+    found = [quantity("levels", one, own, g) if isinstance(one, str) else float(one) for one in levels]
     for level in found:
         if not 0 < level < float("inf"):
             raise InputError(f"levels: {level:g}: must be > 0")
@@ -356,7 +356,7 @@ def _dimensionless(result: Result, request: Request) -> Figure:
     also: dict[str, Kept] = {}
     free = _free(result, request, DISPLACEMENT)
     if "frequency" in free:
-        also["frequency"] = result.spread("frequency", _FREQUENCIES)
+        also["frequency"] = spread(result.data.sizes["frequency"], _FREQUENCIES)
     preferred = ("mu_s", "theta", "yield_acceleration", "yield_coefficient")
     family = result.axis(request.y) if request.y else next((d for d in preferred if d in free), None)
     if family is None and (several := [d for d in _several(result, request) if d not in also]):

@@ -1,6 +1,5 @@
 """The chart of limit amplitudes: curves over one parameter, of a family or of motions, in panels over two more."""
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -8,11 +7,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slipsweep.charts.sheet import Drawing, curve_looks, over, plot_curve, set_scale
-from slipsweep.charts.style import SYMBOLS, Look, axis_label, length_text, model_text, plain, value_text
+from slipsweep.charts.sheet import Panel, Sheet, curve_looks, over, plot_curve
+from slipsweep.charts.slices import NAMED, spread
+from slipsweep.charts.style import SYMBOLS, Look, plain
 from slipsweep.charts.suite_figures import QUANTILES, SUITE, draw_suite, suite_text
-from slipsweep.files.selection import axis_labels, axis_numbers
-from slipsweep.model.variables import TOLERABLE_DISPLACEMENT, LimitStatus
+from slipsweep.files.selection import axis_labels
+from slipsweep.model.variables import LimitStatus
 from slipsweep.studies.suite_statistics import limit_quantiles
 
 #: Most curves in a panel, and panels across and down, that a page can show.
@@ -48,133 +48,85 @@ def limit_chart(data: xr.Dataset, axes: Axes | None = None, look: Look | None = 
     sizes = {str(dim): size for dim, size in data["limit_amplitude"].sizes.items()}
     suite = [dim for dim in SUITE if dim in sizes] if sizes.get("motion", 1) > 1 else []
     wide = [dim for dim in sizes if sizes[dim] > 1 and dim not in suite]
-    abscissa = next((dim for dim in (*_ABSCISSAE, *wide) if dim in wide), "motion" if suite else None)
-    curves = next((dim for dim in (*_CURVES, *wide) if dim in wide and dim != abscissa and not suite), None)
-    columns, rows = (*(dim for dim in wide if dim not in (abscissa, curves)), None, None)[:2]
-    shown = {
-        dim: _spread(sizes[dim], _MOST_CURVES if dim == curves else _MOST_PANELS)
-        for dim in (curves, columns, rows)
+    x = next((dim for dim in (*_ABSCISSAE, *wide) if dim in wide), "motion" if suite else "")
+    curves = next((dim for dim in (*_CURVES, *wide) if dim in wide and dim != x and not suite), None)
+    across, down = (*(dim for dim in wide if dim not in (x, curves)), None, None)[:2]
+    shown: dict[str, Any] = {
+        dim: spread(sizes[dim], _MOST_CURVES if dim == curves else _MOST_PANELS)
+        for dim in (curves, across, down)
         if dim is not None
     }
-    fixed = dict.fromkeys((dim for dim in sizes if dim not in shown and dim not in (abscissa, *suite)), 0)
-    across, down = (shown.get(dim, [0]) if dim else [0] for dim in (columns, rows))
-    size = max(6.0, 3.6 * len(across) + 1.2), max(4.2, 2.9 * len(down) + 1.3)
-    drawing = Drawing(look or Look(), len(down), len(across), size, axes)
-    family = shown[curves] if curves else [0]
-    x = axis_numbers(data, abscissa) if abscissa else np.zeros(1)
-
-    for (i, at_row), (j, at_column) in itertools.product(enumerate(down), enumerate(across)):
-        panel = drawing.grid[i, j]
-        where = {**fixed, **{dim: at for dim, at in ((rows, at_row), (columns, at_column)) if dim}}
+    shown |= {dim: 0 for dim in sizes if dim not in (x, *suite, *shown)}
+    sheet = Sheet(data.isel(shown), x, curves, look or Look(), across, down, axes)
+    for panel in sheet.panels:
+        panel.axes.grid(color="0.9", which="both")
+        panel.axes.set_ylabel("limit amplitude A / g")
         if suite:
-            _draw_motions(drawing, panel, data.isel(where), abscissa, x)
-        for number, at_curve in enumerate(family if not suite else ()):
-            one = data.isel({**where, **({curves: at_curve} if curves else {})})
-            line = _draw_curve(drawing, panel, one, x, number / len(family), curve_looks(len(family))[number])
-            if curves:
-                drawing.legend[_label(data, curves, at_curve)] = line
-        title = ", ".join(_label(data, d, k) for d, k in ((columns, at_column), (rows, at_row)) if d)
-        if title:
-            panel.set_title(title, fontsize="medium")
-        panel.grid(color="0.9", which="both")
-        names = axis_labels(data, abscissa) if abscissa else []
-        if names:
-            slanted = {"rotation": 40, "ha": "right"} if abscissa == "motion" else {}
-            panel.set_xticks(x, list(map(plain, names)), **slanted)
-        elif x.size > 1:
-            set_scale(panel, "x", x)
-        panel.set_xlabel(_axis_label(abscissa) if i == len(down) - 1 else "")
-    drawing.grid[0, 0].set_ylim(bottom=0.0)  # one scale for all, from zero; only now, for it ends the autoscaling
-    for panel in drawing.grid[:, 0]:
-        panel.set_ylabel("limit amplitude A / g")
-    return drawing.finish(_caption(data, sizes, shown, fixed))
+            _draw_motions(sheet, panel, *suite)
+        else:
+            _draw_curves(sheet, panel)
+    _set_abscissa(sheet)
+    # one scale for all, from zero; only now, for it ends the autoscaling
+    sheet.panels[0].axes.set_ylim(bottom=0.0)
+    if not np.isfinite(data["limit_amplitude"]).any():
+        sheet.notes.append("No limits to draw: limit_status has the reasons.")
+    if suite:
+        sheet.notes.append(_suite_text(data))
+    chosen = {dim: np.size(places) for dim, places in shown.items()}
+    thinned = [f"{n} of {sizes[dim]} {SYMBOLS.get(dim, dim)}" for dim, n in chosen.items() if n < sizes[dim]]
+    if thinned:
+        sheet.notes.append(f"Shown: {', '.join(thinned)}.")
+    return sheet.done()
 
 
-def _draw_curve(
-    drawing: Drawing, panel: Axes, data: xr.Dataset, x: np.ndarray, offset: float, look: dict[str, Any]
-) -> Any:
-    """A curve of a family, in circles where a discontinuity of the model sets the limit."""
-    y = np.atleast_1d(data["limit_amplitude"].values) / float(data.attrs["g"])
-    line = plot_curve(panel, x, y, offset, **look)
-    status = np.atleast_1d(data["limit_status"].values)
-    abrupt = (status >= LimitStatus.AT_MODE_JUMP) & (status <= LimitStatus.AFTER_GAP)
+def _set_abscissa(sheet: Sheet) -> None:
+    """Scale and label of a parameter's axis; names along one of cases or motions."""
+    if sheet.x in NAMED:
+        names = [plain(name) for name in axis_labels(sheet.data, sheet.x)]
+        slanted: dict[str, Any] = {"rotation": 40, "ha": "right"} if sheet.x == "motion" else {}
+        for panel in sheet.panels:
+            panel.axes.set_xticks(panel.values(sheet.x), names or None, **slanted)
+            panel.axes.set_xlabel(sheet.x)
+    elif sheet.x:
+        sheet.set_axis("x", sheet.x)
+
+
+def _draw_curves(sheet: Sheet, panel: Panel) -> None:
+    """The curves of a family, in circles where a discontinuity of the model sets the limit."""
+    xs = panel.values(panel.x) if panel.x else np.zeros(1)
+    limits, states = panel.grid("limit_amplitude") / panel.g, panel.grid("limit_status")
     circle: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 9, "color": "0.82", "zorder": 1.5}
-    (marks,) = panel.plot(x[abrupt], y[abrupt], **circle)
-    if abrupt.any():
-        drawing.remarks["set by a discontinuity\nof the model"] = marks
-    return line
+    for member, look in enumerate(curve_looks(len(limits))):
+        line = plot_curve(panel.axes, xs, limits[member], member / len(limits), **look)
+        if panel.y:
+            sheet.legend[panel.member(member)] = line
+        abrupt = (states[member] >= LimitStatus.AT_MODE_JUMP) & (states[member] <= LimitStatus.AFTER_GAP)
+        if abrupt.any():
+            (marks,) = panel.axes.plot(xs[abrupt], limits[member][abrupt], **circle)
+            sheet.remarks["set by a discontinuity\nof the model"] = marks
 
 
-def _draw_motions(drawing: Drawing, panel: Axes, data: xr.Dataset, abscissa: str | None, x: np.ndarray) -> None:
+def _draw_motions(sheet: Sheet, panel: Panel, *suite: str) -> None:
     """The limits of the motions of a suite, with their median and band."""
-    limits, g = data["limit_amplitude"], float(data.attrs["g"])
-    found = limit_quantiles(data, QUANTILES)["limit_quantile"]
-    quantiles = found.transpose("quantile", ...).values / g
+    xs, limits = panel.values(panel.x), panel.data["limit_amplitude"]
+    found = limit_quantiles(panel.data, QUANTILES)["limit_quantile"]
+    quantiles = found.transpose("quantile", ...).values / panel.g
     quantiles[np.isinf(quantiles)] = np.nan
-    if abscissa == "motion":
-        # no lines from motion to motion: a row of points for each polarity, and the quantiles across all of them
-        across = np.array([0.5, x.size + 0.5])
-        draw_suite(
-            drawing.legend, panel, across, np.empty((0, 2)), np.repeat(quantiles[:, np.newaxis], 2, axis=1), None
-        )
-        panel.set_xlim(*across)
-        del drawing.legend["a motion"]
-        points = limits.transpose("motion", ...).values.reshape(x.size, -1)
-        names = [f"polarity {one:g}" for one in data["polarity"].values] if "polarity" in limits.dims else ["a motion"]
-        look: dict[str, Any] = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
-        for name, row, marker in zip(names, points.T / g, "os", strict=False):
-            (drawing.legend[name],) = panel.plot(x, row, marker=marker, **look)
+    if panel.x != "motion":
+        lines = over(limits, panel.data, (*suite, panel.x)).reshape(-1, xs.size)
+        draw_suite(sheet.legend, panel.axes, xs, lines / panel.g, quantiles, None)
         return
-    lines = over(limits, data, (*(dim for dim in SUITE if dim in limits.dims), abscissa))
-    draw_suite(drawing.legend, panel, x, lines.reshape(-1, x.size) / g, quantiles, None)
-
-
-def _spread(size: int, most: int) -> list[int]:
-    """At most `most` of `size` indices, evenly spread from the first to the last."""
-    return sorted({int(index) for index in np.linspace(0, size - 1, min(size, most)).round()})
-
-
-def _text(name: str, value: float) -> str:
-    """A value with symbol and unit; the tolerable displacement in mm below a metre."""
-    if name == "displacement":
-        return f"u = {length_text(value)}"
-    return value_text(name, value) if name in SYMBOLS else f"{name} {value:.4g}"
-
-
-def _label(data: xr.Dataset, name: str, index: int) -> str:
-    names = axis_labels(data, name)
-    return f"{name} {plain(names[index])}" if names else _text(name, axis_numbers(data, name)[index])
-
-
-def _axis_label(name: str | None) -> str:
-    if name is None:
-        return ""
-    if name == "displacement":
-        return f"{TOLERABLE_DISPLACEMENT['long_name']} u (m)"
-    return axis_label(name) if name in SYMBOLS else name
-
-
-def _caption(data: xr.Dataset, sizes: dict[str, int], shown: dict[str, list[int]], fixed: dict[str, int]) -> list[str]:
-    """Parameters, model, and what of the limits is not shown."""
-    single = [
-        _text(str(name), value.item())
-        for name, value in data.coords.items()
-        if not value.dims and name in (*SYMBOLS, "displacement")
-    ]
-    single += [_label(data, dim, index) for dim, index in fixed.items()]
-    thinned = [
-        f"{len(chosen)} of {sizes[dim]} {SYMBOLS.get(dim, dim)}"
-        for dim, chosen in {**shown, **{dim: [0] for dim in fixed}}.items()
-        if len(chosen) < sizes[dim]
-    ]
-    lines = [
-        ", ".join(single),
-        model_text(data.attrs),
-        _suite_text(data) if sizes.get("motion", 1) > 1 else "",
-        "" if np.isfinite(data["limit_amplitude"]).any() else "No limits to draw: limit_status has the reasons.",
-        f"Shown: {', '.join(thinned)}." if thinned else "",
-    ]
-    return [line for line in lines if line]
+    # no lines from motion to motion: a row of points for each polarity, and the quantiles across all of them
+    ends = np.array([0.5, xs.size + 0.5])
+    draw_suite(sheet.legend, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles[:, np.newaxis], 2, axis=1), None)
+    panel.axes.set_xlim(*ends)
+    del sheet.legend["a motion"]
+    points = limits.transpose("motion", ...).values.reshape(xs.size, -1)
+    polarities = panel.data["polarity"].values if "polarity" in limits.dims else ()
+    names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
+    look: dict[str, Any] = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
+    for name, row, marker in zip(names, points.T / panel.g, "os", strict=False):
+        (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
 
 
 def _suite_text(data: xr.Dataset) -> str:

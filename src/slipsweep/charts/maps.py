@@ -99,18 +99,11 @@ def contours(sheet: Sheet, name: str) -> Figure:
     if not levels or not np.isfinite(drawn).any():
         sheet.notes.append(_without_levels(name, drawn.values))
         return _finish(sheet, name)
-    places = np.log10(levels)
     colours = COLOURS.resampled(len(levels) + 1)
-    norm = BoundaryNorm(places, colours.N, extend="both")
-    if np.nanmax(drawn) < levels[-1]:
-        norm = BoundaryNorm(places, colours.N, extend="min")
-    texts = {place: _value_label(name, level) for place, level in zip(places, levels, strict=True)}
-
+    norm = BoundaryNorm(np.log10(levels), colours.N, extend="min" if np.nanmax(drawn) < levels[-1] else "both")
+    texts = [_value_label(name, level) for level in levels]
     # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is covered later
-    def logarithms(values: Floats) -> Floats:
-        return np.maximum(np.log10(values), places[0] - 2)
-
-    _fill_panels(sheet, logarithms, colours, norm, texts, RESULTS[name]["long_name"])
+    _fill_panels(sheet, colours, norm, texts, RESULTS[name]["long_name"], least=levels[0] / 100)
     return _finish(sheet, name)
 
 
@@ -129,15 +122,10 @@ def newmark_ratio(sheet: Sheet) -> Figure:
     farthest = float(np.abs(np.log10(there)).max())
     above = [level for level in _RATIOS if level == _RATIOS[0] or math.log10(level) < farthest]
     levels = [1 / level for level in reversed(above)] + above
-    places = np.log10(levels)
     colours = ratio_colours(len(above))
-    norm = BoundaryNorm(places, colours.N, extend="both")
-    texts = {place: f"{level:.2g}" if level < 1 else f"{level:g}" for place, level in zip(places, levels, strict=True)}
-
-    def logarithms(values: Floats) -> Floats:
-        return np.where(values > 0, np.log10(values), np.nan)
-
-    _fill_panels(sheet, logarithms, colours, norm, texts, "displacement over that of Newmark's block")
+    norm = BoundaryNorm(np.log10(levels), colours.N, extend="both")
+    texts = [f"{level:.2g}" if level < 1 else f"{level:g}" for level in levels]
+    _fill_panels(sheet, colours, norm, texts, "displacement over that of Newmark's block")
     return _finish(sheet, DISPLACEMENT)
 
 
@@ -169,30 +157,34 @@ def _prepare(sheet: Sheet, drawn: xr.DataArray) -> None:
 
 
 def _fill_panels(
-    sheet: Sheet, logarithms: Any, colours: Colormap, norm: BoundaryNorm, texts: dict[float, str], label: str
+    sheet: Sheet, colours: Colormap, norm: BoundaryNorm, texts: list[str], label: str, least: float = 0.0
 ) -> None:
-    """Fill between contours and label them; both end on the mode limit, where the result jumps."""
-    places, areas = sorted(texts), None
+    """Fill between contours and label them; both end on the mode limit, where the result jumps.
+
+    Values below `least` are drawn as that; of zero there is no logarithm.
+    """
+    places, areas = norm.boundaries, None
+    labels = dict(zip(places, texts, strict=True))
     look: dict[str, Any] = {"cmap": colours, "norm": norm}
     for panel in sheet.panels:
         xs, ys = panel.values(panel.x), panel.values(str(panel.y))
         with np.errstate(divide="ignore", invalid="ignore"):
             # what contours leave open beside the mode limit and cells without a value has the colours of the cells
-            cells = np.ma.masked_invalid(logarithms(panel.grid("drawn")))
+            cells = np.ma.masked_invalid(np.log10(np.maximum(panel.grid("drawn"), least)))
             panel.axes.pcolormesh(_edges(xs), _edges(ys), cells, zorder=0.4, rasterized=True, **look)
             for values in _sides(panel):
-                logs = np.ma.masked_invalid(logarithms(values))
+                logs = np.ma.masked_invalid(np.log10(np.maximum(values, least)))
                 if not logs.count():
                     continue
                 areas = panel.axes.contourf(xs, ys, logs, places, zorder=0.5, extend=norm.extend, **look)
                 line: dict[str, Any] = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
                 lines = panel.axes.contour(xs, ys, logs, places, **line)
                 lines.set_gid("contours")
-                _label_contours(panel, lines, texts)
+                _label_contours(panel, lines, labels)
     if areas is None:
         return
     bar = sheet.figure.colorbar(areas, ax=[panel.axes for panel in sheet.panels], ticks=places, pad=0.02)
-    bar.ax.set_yticklabels([texts[place] for place in places], fontsize=sheet.look.font)
+    bar.ax.set_yticklabels(texts, fontsize=sheet.look.font)
     bar.ax.minorticks_off()
     bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
 

@@ -7,7 +7,7 @@ Figures are made without pyplot, hence without a window system or state between 
 import itertools
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -89,10 +89,27 @@ class Drawing:
     ) -> None:
         factor = 1.0 if look.width is None else look.width / size[0]
         self.look, self.axes = look, axes
-        self.figure, self.grid = new_panels(axes, rows, columns, (size[0] * factor, size[1] * factor), **shared)
+        if axes is None:
+            self.figure = Figure(figsize=(size[0] * factor, size[1] * factor), layout="constrained")
+            self.grid = self.figure.subplots(rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False)
+        else:
+            root = axes.get_figure(root=True) if isinstance(axes, Axes) else None
+            if root is None:
+                raise InputError(f"ax = {axes!r}: must be the axes of a matplotlib figure")
+            if rows * columns > 1:
+                raise InputError(f"ax: is one panel, and this chart has {rows * columns}; leave out ax")
+            self.figure, self.grid = root, np.array([[axes]], dtype=object)
         self.legend: dict[str, Artist] = {}
         self.remarks: dict[str, Artist] = {}
         self.notes: list[str] = []
+
+    def mark_zero(self, panels: Iterable[Axes]) -> None:
+        """A line at zero and a grid in panels over time."""
+        for panel in panels:
+            panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+            panel.margins(x=0)
+            panel.grid(color="0.9")
+        self.figure.align_ylabels()
 
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
         """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
@@ -137,21 +154,6 @@ class Drawing:
                 panel.yaxis.label.set_fontsize(size)
 
 
-def new_panels(
-    axes: Axes | None, rows: int, columns: int, size: tuple[float, float], **shared: Any
-) -> tuple[Figure, NDArray[Any]]:
-    """Panels of a new figure, or the one that is given, with its figure (InputError if one is not enough)."""
-    if axes is None:
-        figure = Figure(figsize=size, layout="constrained")
-        return figure, figure.subplots(rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False)
-    root = axes.get_figure(root=True) if isinstance(axes, Axes) else None
-    if root is None:
-        raise InputError(f"ax = {axes!r}: must be the axes of a matplotlib figure")
-    if rows * columns > 1:
-        raise InputError(f"ax: is one panel, and this chart has {rows * columns}; leave out ax")
-    return root, np.array([[axes]], dtype=object)
-
-
 def add_caption(figure: Figure, axes: Axes | None, texts: Sequence[str], font: float = 10.0) -> int:
     """A caption under a figure, or under the one panel that is given, as wide as that; returns its lines."""
     width = figure.get_figwidth() if axes is None else axes.get_window_extent().width / figure.dpi
@@ -172,13 +174,10 @@ def without_colour(figure: Figure) -> None:
     for artist in figure.findobj():
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
             artist.set_cmap(grey_map(artist.get_cmap()))
-        elif isinstance(artist, Line2D):
-            artist.set_color(tuple(to_grey(artist.get_color())[0]))
-            artist.set_markerfacecolor(tuple(to_grey(artist.get_markerfacecolor())[0]))
-            artist.set_markeredgecolor(tuple(to_grey(artist.get_markeredgecolor())[0]))
-        elif isinstance(artist, Patch):
-            artist.set(facecolor=tuple(to_grey(artist.get_facecolor())[0]))
-            artist.set(edgecolor=tuple(to_grey(artist.get_edgecolor())[0]))
+        elif isinstance(artist, Line2D | Patch):
+            kinds = ("color", "markerfacecolor", "markeredgecolor")
+            for kind in kinds if isinstance(artist, Line2D) else ("facecolor", "edgecolor"):
+                artist.set(**{kind: tuple(to_grey(getattr(artist, f"get_{kind}")())[0])})
         elif isinstance(artist, mpl.collections.Collection):
             for kind in ("facecolor", "edgecolor"):
                 colours = getattr(artist, f"get_{kind}")()

@@ -12,10 +12,9 @@ import xarray as xr
 
 from slipsweep.charts.answers import solve, with_amplitude
 from slipsweep.charts.style import drawn_text
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.selection import At, Place, axis_labels, between, find
 from slipsweep.model.options import MODELS
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import (
     INTENSITY_MEASURES,
     PARAMETERS,
@@ -95,11 +94,6 @@ class Result:
         return "suite" if "motion" in self.dims else "record"
 
     # ------------------------------------------------------------------------ what is meant
-
-    @property
-    def g(self) -> float:
-        """Gravity, m/s²."""
-        return float(self.attrs["g"])
 
     @property
     def is_newmark(self) -> bool:
@@ -235,19 +229,19 @@ class Result:
 
     def members(self, dim: str, number: int, at: Mapping[str, At]) -> Kept:
         """The values that tell curves or panels apart: those requested, or `number` at most from end to end."""
-        return self.places({dim: at[dim]})[dim] if dim in at else self.spread(dim, number)
+        return self.places({dim: at[dim]})[dim] if dim in at else spread(self.data.sizes[dim], number)
 
     def thinned(self, dim: str) -> slice:
         """A slice of an axis of `MOST_POINTS` values at most."""
         size = self.data.sizes[dim]
         return slice(0, size, math.ceil(size / MOST_POINTS))
 
-    def spread(self, dim: str, number: int) -> list[int]:
-        """Indices of `number` values at most, from end to end of an axis, in even steps if a few less have them."""
-        size = self.data.sizes[dim]
-        even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
-        number = even[0] if even and size > number else number
-        return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
+
+def spread(size: int, number: int) -> list[int]:
+    """At most `number` of `size` indices, from end to end, in even steps if a few less have them."""
+    even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
+    number = even[0] if even and size > number else number
+    return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
 
 
 def check_attributes(attrs: Mapping[str, Any], name: str) -> None:

@@ -13,7 +13,15 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap,
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import PARAMETERS, RECORD_RESULTS, RESULTS, STATISTICS, SlidingMode, Validity
+from slipsweep.model.variables import (
+    PARAMETERS,
+    RECORD_RESULTS,
+    RESULTS,
+    STATISTICS,
+    TOLERABLE_DISPLACEMENT,
+    SlidingMode,
+    Validity,
+)
 from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
@@ -42,6 +50,7 @@ SYMBOLS = {
     "time_scale": "time scale",
     "polarity": "polarity",
     "azimuth": "azimuth",
+    "displacement": "u",
 }
 
 #: What sliding modes are called in legends and captions.
@@ -118,7 +127,7 @@ def figure_width(width: float | str | None) -> float | None:
     """Width of a figure in inches, from mm or a text with a unit (InputError if no figure can be so wide)."""
     if width is None:
         return None
-    millimetres = 1000.0 * quantity("width", width, "displacement_amplitude", 1.0) if isinstance(width, str) else width
+    millimetres = 1000.0 * quantity("width", width, "m", 1.0) if isinstance(width, str) else width
     if not 50.0 <= millimetres <= 1000.0:
         raise InputError(f"width = {width}: must be 50 to 1000 mm, as in 90mm")
     return millimetres / 25.4
@@ -158,8 +167,8 @@ def is_acceleration(name: str) -> bool:
 
 
 def about(name: str) -> dict[str, Any]:
-    """Long name and unit of a parameter or result."""
-    return PARAMETERS.get(name) or (RECORD_RESULTS | RESULTS | STATISTICS)[name]
+    """Long name and unit of a parameter, result or tolerable displacement."""
+    return (PARAMETERS | RECORD_RESULTS | RESULTS | STATISTICS | {"displacement": TOLERABLE_DISPLACEMENT})[name]
 
 
 def unit(name: str) -> str:
@@ -174,7 +183,7 @@ def unit_text(units: str) -> str:
 
 def axis_label(name: str, look: Look | None = None) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
-    text = PARAMETERS[name]["long_name"]
+    text = about(name)["long_name"]
     if SYMBOLS[name] != name.replace("_", " "):
         text = f"{text.split(',')[0].split(' that ')[0]} {SYMBOLS[name]}"
     units = (look or Look()).unit(name)

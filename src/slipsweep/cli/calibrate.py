@@ -82,8 +82,8 @@ def friction(
     quiet: Quiet = False,
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
-    angle = quantity("--theta", theta, "theta", g)
-    least = None if threshold is None else quantity("--threshold", threshold, "amplitude", g)
+    angle = quantity("--theta", theta, "degree", g)
+    least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = _checked(output, overwrite, [test], (".nc", *FIGURES))
     from slipsweep.motion.shaking import read_test
     from slipsweep.studies.friction import friction_dataset
@@ -148,7 +148,7 @@ def calibrate(
     quiet: Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
-    angle = quantity("--theta", theta, "theta", model.g)
+    angle = quantity("--theta", theta, "degree", model.g)
     paths = _checked(output, overwrite, tests, (".nc", ".toml", *FIGURES))
     from slipsweep.motion.shaking import read_test
     from slipsweep.studies.calibration import calibration_dataset

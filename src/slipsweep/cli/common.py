@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from slipsweep.files.storing import Place, Report
     from slipsweep.grid.tally import Indices, Tally
 
+#: The largest displacement that a number without a unit is taken for, m: more is likely to be meant in millimetres.
+_MOST_WITHOUT_UNIT = 2.0
+
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
 
@@ -132,6 +135,29 @@ def cuts(given: Sequence[str] | None) -> dict[str, str]:
             raise InputError(f"--at {text}: {name.strip()} is given twice")
         found[name.strip()] = value.strip()
     return found
+
+
+def displacements(texts: Sequence[str], g: float) -> list[float]:
+    """Return the displacements given with ``-d``, in m, in order and each once.
+
+    Raises
+    ------
+    InputError
+        One is no length, not > 0, or a number so large that its unit is in doubt.
+    """
+    from slipsweep.model.parameters import check_values
+    from slipsweep.model.units import quantity
+
+    found = set()
+    for text in texts:
+        length = quantity("--displacement", text, "m", g)
+        if length > _MOST_WITHOUT_UNIT and not text.strip()[-1].isalpha():
+            raise InputError(
+                f"--displacement = {text}: without a unit that is {length:g} m; give the unit: -d {text.strip()}mm or "
+                f"-d {text.strip()}m"
+            )
+        found.add(length)
+    return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
 
 
 def taken_as(values: Mapping[str, float], g: float) -> str:

@@ -1,6 +1,5 @@
 """`slipsweep explore`: a result as a page for the browser."""
 
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -8,11 +7,8 @@ import typer
 
 from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, check_ending, echo
 from slipsweep.cli.help import examples
-from slipsweep.errors import InputError
 
 EXAMPLE = examples("slipsweep explore design_chart.nc -o design_chart.html")
-
-_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9}
 
 
 def explore(
@@ -28,11 +24,11 @@ def explore(
 ) -> None:
     """Write a page for the browser in which to explore a result."""
     from slipsweep.explore import page as pages
-    from slipsweep.grid.resources import size_text
+    from slipsweep.grid.resources import parse_size, size_text
 
     path = output or file.with_suffix(".html")
     check_ending(path, (".html", ".htm"))
-    nbytes = parse_size(size)
+    nbytes = parse_size("--size", size)
     excerpt = pages.write_page(file, path, size=nbytes, overwrite=overwrite)
     if quiet:
         return
@@ -41,11 +37,3 @@ def explore(
         thinned = "" if shown == length else f"  thinned: {shown} of {length} (more with --size)"
         echo(f"{dim:<24}{shown} values{thinned}")
     echo(f"{path}  {size_text(path.stat().st_size)}")
-
-
-def parse_size(text: str) -> int:
-    """Return the bytes in a size such as ``10MB``; InputError for anything else."""
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(kB|MB|GB)", text.strip())
-    if not found:
-        raise InputError(f"--size = {text!r}: must be a number and kB, MB or GB, such as 10MB")
-    return int(float(found[1]) * _UNITS[found[2]])

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, write_figure
+from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, displacements, write_figure
 from slipsweep.cli.help import Panel
-from slipsweep.cli.lengths import displacements
 from slipsweep.cli.suite import write_fragility
 from slipsweep.errors import InputError
 

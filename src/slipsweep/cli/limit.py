@@ -16,6 +16,7 @@ from slipsweep.cli.common import (
     Scheduler,
     Workers,
     check_ending,
+    displacements,
     echo_found,
     place_of,
     progress_bar,
@@ -23,7 +24,6 @@ from slipsweep.cli.common import (
     write_figure,
 )
 from slipsweep.cli.help import Panel
-from slipsweep.cli.lengths import displacements
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
 
@@ -122,7 +122,7 @@ def _asked(
 
     g = sweep.model.g
     lengths = displacements(displacement, g)
-    highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "amplitude", g)
+    highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
     # one is one number; several are a dimension, in order and without repetition
     return (lengths if len(displacement) > 1 else lengths[0]), highest
 

@@ -24,6 +24,7 @@ from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import (
     HISTORY,
+    PARAMETERS,
     RECORD_COUNTS,
     VALIDITY_TEXT,
     VALUELESS,
@@ -108,7 +109,11 @@ def simulate(
         "yield_acceleration": yield_acceleration,
         "structure_frequency": structure_frequency,
     }
-    given = {name: quantity(option_name(name), text, name, model.g) for name, text in typed.items() if text is not None}
+    given = {
+        name: quantity(option_name(name), text, PARAMETERS[name]["units"], model.g)
+        for name, text in typed.items()
+        if text is not None
+    }
 
     motion = _motion(record, reading, excitation)
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slipsweep.cli.common import echo
-from slipsweep.cli.lengths import displacements
+from slipsweep.cli.common import displacements, echo
 
 if TYPE_CHECKING:
     import xarray as xr

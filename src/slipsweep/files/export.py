@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.contents import result_names, tally_in, values_text
 from slipsweep.files.jobs import RUN
 from slipsweep.files.netcdf import WITH_MISSING
@@ -24,7 +24,6 @@ from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import FLAG_KINDS, LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS, VALIDITY_TEXT
 
 if TYPE_CHECKING:

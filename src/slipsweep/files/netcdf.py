@@ -9,9 +9,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from slipsweep.errors import InputError
 from slipsweep.files.motions import embedded
 from slipsweep.files.outputs import complete_or_absent, writing
 from slipsweep.model.variables import RECORD_COUNTS, SlidingMode
@@ -73,25 +71,6 @@ def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
     if dtype.kind == "f":
         return float("nan")
     return int(SlidingMode.MISSING) if name in WITH_MISSING else None
-
-
-class TooLarge(InputError):
-    """A result is too large for the type that the sweep file asks for: no run of that sweep can be finished."""
-
-
-def rounded(name: str, values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """A result as the file holds it; what is too large for that is an error (`TooLarge`), and not infinite."""
-    if values.dtype == dtype:
-        return values
-    with np.errstate(over="ignore"):
-        stored = values.astype(dtype)
-    beyond = np.isinf(stored)
-    if beyond.any() and np.isfinite(worst := np.abs(values[beyond]).max()):
-        raise TooLarge(
-            f'output.dtype = "{dtype}": {name} reaches {worst:.4g}, more than the {np.finfo(dtype).max:.4g} that it '
-            'holds; must be "float64"'
-        )
-    return stored
 
 
 @contextmanager
@@ -222,7 +201,7 @@ def write_whole(
         new_file(temporary, path, table, dtypes, compression=compression) as file,
     ):
         for name, dtype in dtypes.items():
-            file[name][...] = rounded(name, table[name].values, dtype)
+            file[name][...] = table[name].values.astype(dtype, copy=False)
 
 
 def without_time_axis(table: xr.Dataset) -> xr.Dataset:

@@ -10,9 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.errors import InputError
-from slipsweep.model.suggest import did_you_mean
-from slipsweep.model.units import conversion, quantity_in
+from slipsweep.errors import InputError, did_you_mean
+from slipsweep.model.units import conversion, quantity
 
 #: What may be given for an axis: a number in its own unit, a text with another ("0.3g"), a label, or several of them.
 At = float | str | Sequence[float | str]
@@ -156,7 +155,7 @@ def _place(key: str, given: float | str, labels: list[str], values: np.ndarray, 
     text = str(given)
     if labels and not text.isdecimal():
         raise InputError(f"{key} = {text}: must be a number or one of {', '.join(labels)}")
-    number = quantity_in(key, text, units, g) if isinstance(given, str) else float(given)
+    number = quantity(key, text, units, g) if isinstance(given, str) else float(given)
     slack = _SAME * float(np.abs(values).max())
     if isinstance(given, str):
         mantissa, exponent, unit = re.findall(r"^\s*[-+]?([\d.]+)(?:[eE]([-+]?\d+))?\s*(.*?)\s*$", text)[0]

@@ -4,9 +4,8 @@ import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs, spec
-from slipsweep.model.suggest import did_you_mean
 
 _PACKAGE = Path(__file__).parents[1]
 

@@ -20,15 +20,14 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.outputs import Read
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.model.choices import Family, declared
 from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
 from slipsweep.model.parameters import BOUNDS
-from slipsweep.model.suggest import did_you_mean
-from slipsweep.model.units import show, unit_factor
+from slipsweep.model.units import conversion, show
 from slipsweep.model.variables import (
     DEFAULT_RECORD_RESULTS,
     DEFAULT_RESULTS,
@@ -601,7 +600,7 @@ def _axis(name: str, axis: Axis, g: float) -> Floats:
         numbers = _spaced(key, axis)
 
     with np.errstate(over="ignore"):
-        values = numbers * unit_factor(f"{key}.units", name, axis.units, g)
+        values = numbers * conversion(f"{key}.units", PARAMETERS[name]["units"], axis.units, g)
     if (bad := _first_bad(name, values)) is not None:
         where = f"values[entry {bad + 1}]" if axis.values is not None else "start" if bad == 0 else "stop"
         number = axis.stop if where == "stop" else numbers[bad]

@@ -548,7 +548,7 @@ class _Region:
 
         chunk = chunk_at(self.cut, index)
         for name, values in arrays.items():
-            one = xr.Dataset({name: (self.dims[name], netcdf.rounded(name, values, self.dtypes[name]))})
+            one = xr.Dataset({name: (self.dims[name], values.astype(self.dtypes[name], copy=False))})
             region: Any = {dim: chunk[dim] for dim in self.dims[name] if dim in chunk}
             how: Any = {"region": region} if region else {"mode": "r+"}
             one.to_zarr(self.store, zarr_format=3, consolidated=False, **how)
@@ -569,13 +569,10 @@ def _where(result: xr.DataArray, chunk: Chunk) -> Any:
 
 @contextmanager
 def _kept(target: _Chunks) -> Iterator[None]:
-    """Say with an error what is kept of the run; of one that can never be finished nothing is."""
+    """Say with an error what is kept of the run."""
     try:
         yield
     except BaseException as error:
-        if isinstance(error, netcdf.TooLarge):
-            target.clear()
-            raise
         kept = len(target.finished())
         if kept:
             error.add_note(f"{kept} of {target.count} chunks are kept in {target.place}: --resume goes on")
@@ -625,4 +622,4 @@ def _solve(target: _Chunks, means: Means, progress: Callable[[int], None] | None
 
 def _stored(job: Job, arrays: Arrays) -> Arrays:
     """The results of a chunk in the types of the file."""
-    return {name: netcdf.rounded(name, arrays[name], dtype) for name, dtype in job.dtypes.items()}
+    return {name: arrays[name].astype(dtype, copy=False) for name, dtype in job.dtypes.items()}

@@ -24,11 +24,10 @@ from slipsweep.kernels.block import UNSOLVED, Cell
 from slipsweep.kernels.grid import Cells, find_parameters
 from slipsweep.model import equations as eq
 from slipsweep.model.variables import FRICTION_PARAMETERS, RESULT_DTYPES, STRENGTHS, Validity
-from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Waveform
+from slipsweep.motion.waveforms import Waveform, peak_acceleration
 
 #: Cells that a kernel solves in a call: their arrays stay in the cache, and Ctrl-C is heard between two calls.
 _TILE = 16384

@@ -52,11 +52,10 @@ from slipsweep.model.variables import (
     STRENGTHS,
     WAVEFORM_INPUTS,
 )
-from slipsweep.motion.amplitude import peak_acceleration
 from slipsweep.motion.cutting import MOST_TABLES, TABLE_BYTES
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import WAVEFORMS, Waveform
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu",
@@ -537,7 +536,8 @@ def memory_of(problem: Problem) -> int:
     suite = problem.excitation
     lengths = [one.times.size for one in (suite if isinstance(suite, Suite) else (suite,))]
     # of two polarities; one table is made beside those that are kept
-    return TABLE_BYTES * max(lengths) + min(2 * TABLE_BYTES * sum(lengths), MOST_TABLES)
+    kept = sorted(2 * lengths)[-MOST_TABLES:]
+    return TABLE_BYTES * (max(lengths) + sum(kept))
 
 
 def cost_of(problem: Problem) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choice,
@@ -22,7 +22,6 @@ from slipsweep.model.parameters import (
     number_text,
     shown,
 )
-from slipsweep.model.suggest import did_you_mean
 
 
 def option(

@@ -1,10 +1,9 @@
 """The equations of Mendez, Romo and Botero (2012), one small function each.
 
-Scalars in, a scalar out, SI units, angles already as tangents; the equation number of
-the paper stands in each docstring.  The kernels call these functions as they are, so
-that what is written here is what is computed; but Eq. 5, which Eq. 6 replaces, and `attenuation_coefficient`:
-in Eq. 12 only g Kd = Ümax counts.  The operators of the printed equations
-were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
+Scalars in, a scalar out, SI units, angles already as tangents; the equation number of the paper stands in each
+docstring.  The kernels call these functions as they are, so that what is written here is what is computed; but for
+`attenuation_coefficient`: in Eq. 12 only g Kd = Ümax counts.  The operators of the printed equations were recovered
+from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 """
 
 import math
@@ -94,17 +93,11 @@ def block_acceleration(ground_acceleration: float, friction: float, mu_s: float,
     return ground_acceleration - relative_acceleration(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
-@inlined
-def original_friction_coefficient(ground_acceleration: float, mu_s: float, decay_rate: float, g: float) -> float:
-    """Eq. 5: the original friction law, which starts from the static coefficient."""
-    return friction_coefficient(ground_acceleration, mu_s, 0.0, decay_rate, g)
-
-
 @registered
 def friction_coefficient(
     ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> float:
-    """Eq. 6: friction that decays with the loading rate from μs + Δμ."""
+    """Eq. 6: friction that decays with the loading rate from μs + Δμ; with Δμ = 0 the original law, Eq. 5."""
     return (mu_s + delta_mu) * exp(-decay_rate * abs(ground_acceleration) / g)
 
 

@@ -108,11 +108,8 @@ def shown(value: Any) -> str:
     """A value as an error shows it: one line, and not a long one."""
     import numpy as np
 
-    try:
-        with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
-            text = " ".join(repr(value).split())
-    except ValueError:  # Python writes no integer of thousands of digits
-        return "an integer of thousands of digits"
+    with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
+        text = " ".join(repr(value).split())
     return text if len(text) <= 160 else f"{text[:157]}..."
 
 

@@ -5,7 +5,6 @@ import re
 from typing import Any
 
 from slipsweep.errors import InputError
-from slipsweep.model.variables import PARAMETERS
 
 #: Spellings of each parameter's own unit that need no units library.
 _OWN_UNITS = {
@@ -24,18 +23,17 @@ _LONGEST = 60
 _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
 
 
-def unit_factor(key: str, name: str, units: str | None, g: float) -> float:
-    """Return what to multiply a number in `units` by, to have it in the parameter's own unit.
-
-    `key` is what the units are called in errors.
-    "g" as a unit of acceleration is the sweep's own [model] g: an amplitude "in g" is
-    meant against the gravity that the block feels.
-    """
-    return conversion(key, PARAMETERS[name]["units"], units, g)
-
-
 def conversion(key: str, own: str, units: str | None, g: float) -> float:
-    """Return what to multiply a number in `units` by, to have it in the unit `own`; as `unit_factor`."""
+    """Return what to multiply a number in `units` by, to have it in the unit `own`.
+
+    `key` is what the units are called in errors.  "g" as a unit of acceleration is `g`, the sweep's own gravity: an
+    amplitude "in g" is meant against the gravity that the block feels.
+
+    Raises
+    ------
+    InputError
+        They do not convert.
+    """
     if units is None or units in _OWN_UNITS.get(own, (own,)):
         return 1.0
     if own == "m s-2" and units in ("g", "gal", "Gal"):  # a gallon, to pint
@@ -93,16 +91,11 @@ def without_unit(key: str, own: str, values: Any, g: float) -> Any:
     return values if factor == 1.0 else values * factor
 
 
-def quantity(key: str, text: str, parameter: str, g: float) -> float:
-    """Return a number with a unit, such as "50 mm" or "1.5g", in a parameter's own unit (InputError: it is none).
+def quantity(key: str, text: str, own: str, g: float) -> float:
+    """Return a number with a unit, such as "50 mm" or "1.5g", in the unit `own` (InputError: it is none).
 
     `key` is what it is called in errors, `g` what "g" as a unit of acceleration stands for, m/s².
     """
-    return quantity_in(key, text, PARAMETERS[parameter]["units"], g)
-
-
-def quantity_in(key: str, text: str, own: str, g: float) -> float:
-    """Return a number with a unit in the unit `own`; as `quantity`."""
     found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
     refusal = InputError(f"{key} = {show(text)}: must be a number, with a unit that converts to {own} if in another")
     if found is None:
@@ -115,8 +108,5 @@ def quantity_in(key: str, text: str, own: str, g: float) -> float:
 
 def show(value: object) -> str:
     """Write a value as TOML would, on one line of bearable length."""
-    try:
-        text = json.dumps(value, ensure_ascii=False, default=str)
-    except ValueError:  # Python writes no integer of thousands of digits
-        return "an integer of thousands of digits"
+    text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -18,7 +18,6 @@ carried over is all that one pulse leaves to the next (`kernels.train`).
 import functools
 import itertools
 import math
-import weakref
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -359,27 +358,9 @@ def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray
 # ------------------------------------------------------------------------------- a record
 
 
-#: Tables of the last records, by identity and polarity: of 10⁵ samples one takes as long as ten cells, and each chunk
-#: of a run asks for those of all motions of a suite.
-_TABLES: dict[tuple[int, float], tuple[weakref.ref[Record], Wave]] = {}
-
-#: Bytes that they may take, and those of a sample, about: a line through zero is two pieces.
-MOST_TABLES = 2**27
+#: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two pieces.
+MOST_TABLES = 16
 TABLE_BYTES = 160
-
-
-def wave_of_record(record: Record, polarity: float) -> Wave:
-    """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
-    key = (id(record), polarity)
-    known = _TABLES.get(key)
-    if known is not None and known[0]() is record:
-        return known[1]
-    wave = _record_cut(record, polarity)
-    left = MOST_TABLES - wave.pieces.nbytes
-    while _TABLES and sum(own.pieces.nbytes for _, own in list(_TABLES.values())) > left:
-        _TABLES.pop(next(iter(_TABLES)), None)
-    _TABLES[key] = (weakref.ref(record, lambda _: _TABLES.pop(key, None)), wave)
-    return wave
 
 
 def _spacing(times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -393,7 +374,9 @@ def _spacing(times: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.full(spacing.size, even) if off <= 2.0 * np.spacing(np.abs(times).max()) else spacing
 
 
-def _record_cut(record: Record, polarity: float) -> Wave:
+@functools.lru_cache(maxsize=MOST_TABLES)
+def wave_of_record(record: Record, polarity: float) -> Wave:
+    """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
     times, values = record.times, polarity * record.acceleration
     with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
         spacing, change = _spacing(times), np.diff(values)

@@ -5,7 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -13,9 +13,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import check_list, check_single, shown
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.variables import INTENSITY_MEASURES, MOTION_COORDINATES
 from slipsweep.motion.intensity import intensity_measures
 from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
@@ -177,9 +176,6 @@ class Suite:
         what = f"{'pair' if self.has_pairs else 'motion'}{'s' if len(self) > 1 else ''}"
         return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(shown_labels)})"
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _same_suite, (self.motions, self.labels, self.name)
-
     def __len__(self) -> int:
         return len(self.motions)
 
@@ -265,12 +261,6 @@ class Suite:
     def summary(self) -> str:
         """One line a motion, as `Record.summary`."""
         return "\n".join(one.summary() for one in self.components)
-
-
-@lru_cache(maxsize=4)
-def _same_suite(motions: tuple[Motion, ...], labels: tuple[str, ...], name: str) -> Suite:
-    """A suite that was pickled: with every chunk the same comes again, and tables are made once of a record."""
-    return Suite(motions, labels, name)
 
 
 def read_suite(

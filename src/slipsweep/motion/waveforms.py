@@ -15,13 +15,18 @@ A ramp multiplies it by an envelope that grows linearly from 0 over the first `r
 falls to 0 over the last `ramp_out`; A is the peak without it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import MOST_CYCLES, number_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 #: Largest multiple of a harmonic, and longest ramp in cycles (each of its cycles has pieces of its own).
 MOST_MULTIPLE = 100
@@ -227,3 +232,14 @@ class Harmonics(Waveform, _Terms):
 WAVEFORMS: Family[Waveform] = Family(
     "excitation", "waveform", (Sine, Cosine, Triangle, Square, Harmonics), "sine", "waveform"
 )
+
+
+def peak_acceleration(
+    displacement_amplitude: "NDArray[np.float64]", frequency: "NDArray[np.float64]"
+) -> "NDArray[Any]":
+    """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
+    import numpy as np  # here only: `slipsweep --help` imports these declarations
+
+    omega = 2.0 * math.pi * frequency
+    with np.errstate(over="ignore"):  # `plans.plan_sweep` refuses what has no finite A
+        return omega * omega * displacement_amplitude

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import check_choice, check_finite, check_numbers, shown
-from slipsweep.model.suggest import did_you_mean
-from slipsweep.model.units import unit_factor
+from slipsweep.model.units import conversion
 from slipsweep.model.variables import PARAMETERS
 
 Floats = NDArray[np.float64]
@@ -92,7 +91,7 @@ def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribut
         raise InputError(f"{key}: parameters that scipy.stats does not allow: {about}")
     if units is not None:
         about["units"] = units
-    factor = unit_factor(f"{key}.units", parameter, units, g)
+    factor = conversion(f"{key}.units", PARAMETERS[parameter]["units"], units, g)
     return Distribution(parameter, kind, frozen, factor, {**about, "kind": kind})
 
 

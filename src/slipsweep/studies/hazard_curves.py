@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_numbers, number_text, shown
-from slipsweep.model.units import unit_factor
+from slipsweep.model.units import conversion
 from slipsweep.motion.columns import columns_of, words_and_unit
 from slipsweep.motion.records import read_lines
 
@@ -162,7 +162,7 @@ def _column(where: str, cell: str, g: float) -> tuple[str, float]:
         return "", 1.0
     if not unit:
         raise InputError(f"{where}: column {shown(cell)}: must give its unit in brackets, such as PGA (g)")
-    return "PGA", unit_factor(f"{where}: column {shown(cell)}: unit", "amplitude", unit, g)
+    return "PGA", conversion(f"{where}: column {shown(cell)}: unit", "m s-2", unit, g)
 
 
 def _openquake_curve(

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choice,
@@ -22,7 +22,6 @@ from slipsweep.model.parameters import (
     number_text,
     shown,
 )
-from slipsweep.model.suggest import did_you_mean
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import DRAWN
 from slipsweep.studies.distributions import Distribution, distribution_of
@@ -260,7 +259,7 @@ def check_quantiles(key: str, given: Any) -> Floats:
 def check_thresholds(key: str, given: Any, g: float) -> Floats:
     """Displacements, m or with a unit, one at least, as an increasing coordinate."""
     entries = np.atleast_1d(np.asarray(computed(given), object)).tolist()
-    values = [quantity(key, one, "displacement_amplitude", g) if isinstance(one, str) else one for one in entries]
+    values = [quantity(key, one, "m", g) if isinstance(one, str) else one for one in entries]
     return _increasing(key, values, "threshold")
 
 
