@@ -174,7 +174,7 @@ def look_of(
     InputError
         A level is no number with a unit of the result, or not above zero; no figure can be so wide.
     """
-    own = "displacement_amplitude" if RESULTS.get(variable, {}).get("units") == "m" else "mu_s"
+    own = "m" if RESULTS.get(variable, {}).get("units") == "m" else "1"
     g = float(result.data.attrs.get("g", 9.81))
     found = [quantity("levels", one, own, g) if isinstance(one, str) else float(one) for one in levels]
     for level in found:
