@@ -158,13 +158,19 @@ class Observation:
         return Forward(self.theta, self.mu_s, self.model, self.record(self.wrong if wrong is None else wrong))
 
     def rough(self, forward: Forward, parameters: Floats) -> float:
-        """How far parameters are from what was measured; no sample counts for more than a few."""
+        """How far parameters are from what was measured; no sample counts for more than a few.
+
+        Offsets and drifts are taken as they fit best: a drift much larger than the motion would rank by itself.
+        """
         history = forward(parameters, self.test.times)
         total = 0.0
         for name, use in self.use.items():
             values = self.test.channels[name]
             spread = max(self.noise[name], 0.1 * float(np.nanmax(np.abs(values))))
             rest = (values - history[:, COLUMN[name]])[use] / spread
+            lines = [line.parts[name][use] / line.deviation for line in self.lines if name in line.parts]
+            if lines and np.isfinite(rest).all():
+                rest = rest - (design := np.column_stack(lines)) @ np.linalg.lstsq(design, rest)[0]
             total += float(np.mean(np.log1p(rest**2))) if np.isfinite(rest).all() else 1e6
         return total
 

@@ -114,8 +114,10 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
     noise = max(best.noise, converter_noise(acceleration))
     smooth, places = _averaged(best, alternatives, fine)
-    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right
-    smooth = smooth - np.gradient(fine) ** 2 / 12.0 * best.spline(fine, nu=2)
+    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right; beside a kink
+    # the curve bends only over the shorter of two intervals, which may be much the shorter
+    width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
+    smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
     return TableMotion(fine, smooth, np.column_stack([noise * shapes, places]), noise)
 
 
