@@ -91,7 +91,7 @@ def report(results: dict[tuple[str, str], np.ndarray]) -> str:
             "ends. *White*: noise of 1 % of each channel's peak, the table's among them. *12 bits*: a converter of 12 "
             f"bits and no other noise. {CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 "
             "to 0.6, λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. By `python -m "
-            "benchmarks.calibration`.\n",
+            f"benchmarks.calibration --repetitions {rows[0][2]}`.\n",
             table(["tests", "noise", "number", "Üy", "λ", "Δμ"], rows),
         ]
     )
