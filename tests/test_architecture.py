@@ -22,7 +22,7 @@ LINES = {
     "jit": 410,
     "model": 1_600,
     "motion": 2_600,
-    "kernels": 3_700,
+    "kernels": 3_740,
     "grid": 1_700,
     "studies": 5_700,
     "files": 3_100,

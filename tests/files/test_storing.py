@@ -193,6 +193,7 @@ def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
         stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(memory=100_000_000))
 
 
+@pytest.mark.slow  # a process that also compiles a kernel takes 2 GB
 @pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
 def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
     """A run in chunks takes no more than --memory says, and a tenth; codes are stored as whole numbers."""

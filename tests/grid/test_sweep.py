@@ -259,8 +259,8 @@ def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
 
 def test_progress_counts_every_cell_once() -> None:
     seen: list[int] = []
-    slipsweep.sweep(np.linspace(0, 15, 40), np.linspace(0.2, 0.9, 40), [1.0, 3.0], [1.0, 2.0], progress=seen.append)
-    assert sum(seen) == 40 * 40 * 2 * 2
+    slipsweep.sweep(np.linspace(0, 15, 400), np.linspace(0.2, 0.9, 40), [1.0, 3.0], [1.0, 2.0], progress=seen.append)
+    assert sum(seen) == 400 * 40 * 2 * 2
     assert len(seen) > 1
 
 

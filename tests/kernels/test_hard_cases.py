@@ -53,21 +53,3 @@ def test_step_solver_gives_numbers(rule: str) -> None:
         if mode >= 0:
             assert isfinite(displacement), f"displacement of case {case_number}"
             assert 0 <= velocity < float("inf"), f"peak velocity of case {case_number}"
-
-
-@RULES
-def test_step_solver_converges_at_first_order(rule: str) -> None:
-    """Worst error over three fine step counts against three coarse ones, a sixteenth as many, or the floor."""
-    coarse = [1024, 1192, 1360]
-
-    def worst(counts: list[int]) -> dict[int, float]:
-        runs = [solve(CASES, solver="step", rule=rule, steps_per_cycle=count) for count in counts]
-        return {case.case: max(case.times_bound(run[case.case][0]) for run in runs) for case in CASES}
-
-    before, after = worst(coarse), worst([16 * count for count in coarse])
-    slow = [
-        f"case {case}: {after[case.case]:.1e} times the conditioning bound, {before[case.case]:.1e} with coarse steps"
-        for case in CASES
-        if case.sliding_mode >= 0 and not after[case.case] <= max(100.0, before[case.case] / 16**0.9)
-    ]
-    assert not slow

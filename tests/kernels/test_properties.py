@@ -166,7 +166,7 @@ def test_newmark_grows_with_amplitude(cell: strategies.Cell, factor: float) -> N
 # Symmetry of the level plane
 
 
-@SOLVERS
+@pytest.mark.parametrize("solver", ["cycle"])  # the step that holds t1 is cut there, in the first cycle only
 @strategies.reproducible
 @given(cell=strategies.continuous(theta=0.0))
 def test_level_plane_velocity_repeats(solver: str, cell: strategies.Cell) -> None:
@@ -210,7 +210,9 @@ def assert_solvers_agree(cell: strategies.Cell) -> None:
     exact = respond(cell, solver="cycle")
     stepped = respond(cell, solver="step", rule="trapezoid", steps_per_cycle=FINE)
     for found in (exact, stepped):  # of a displacement that is 0 but for roundings they may have either sign
-        assert bool(int(found.validity) & Validity.UPSLOPE) == (value(found) < 0), "upslope"
+        # zero to rounding is none upslope
+        rounding = 1e-12 * cell["amplitude"] / (2 * pi * cell["frequency"]) ** 2
+        assert bool(int(found.validity) & Validity.UPSLOPE) == (value(found) < -rounding), "upslope"
     others = ~int(Validity.UPSLOPE)
     assert int(exact.validity) & others == int(stepped.validity) & others, "validity"
     assert int(exact.sliding_mode) == int(stepped.sliding_mode), "sliding mode"

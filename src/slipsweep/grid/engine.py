@@ -360,12 +360,15 @@ def _fill(results: Arrays, asked: Request, inputs: list[Array], periods: Array) 
         for name, values in results.items():
             view: Any = (*where, ...)
             target, own = values[view], found[ROWS[name]].reshape(lengths)
-            if name == "permanent_displacement":
-                np.multiply(own, seconds * seconds, out=target)
-            elif name == "peak_relative_velocity":
-                np.multiply(own, seconds, out=target)
-            else:
-                np.copyto(target, own, casting="unsafe")
+            with np.errstate(
+                over="ignore", under="ignore", invalid="ignore"
+            ):  # what is no finite number is refused by name
+                if name == "permanent_displacement":
+                    np.multiply(own, seconds * seconds, out=target)
+                elif name == "peak_relative_velocity":
+                    np.multiply(own, seconds, out=target)
+                else:
+                    np.copyto(target, own, casting="unsafe")
         wrong = np.flatnonzero(found[ROWS["validity"]].astype(np.int64) & UNSOLVED)
         if wrong.size:
             at = np.unravel_index(int(wrong[0]), lengths)
