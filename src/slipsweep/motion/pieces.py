@@ -21,8 +21,7 @@ WHOLE, WHOLE_MOMENT = 10, 11
 COEFFICIENTS, ONCE, TWICE = 12, 13, 14
 TERM = 3
 
-#: Gauss-Legendre nodes on [0, 1], two SIMD registers.  The last columns of a table with curves are |w| at the nodes of
-#: whole pieces, from the end that is no anchor.
+#: Gauss-Legendre nodes on [0, 1], two SIMD registers.
 NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
 
 
@@ -97,8 +96,7 @@ def pieces_of(
         JUMPS: first > np.maximum(before, 0.0),
         ARC: arc & (np.abs(np.where(at_end, last, first)) == 1.0) & (coefficients[:, 0] == 0.0),
     }
-    curved = power.size > 1
-    pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size + (NODES.size if curved else 0)))
+    pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size))
     for column, values in named.items():
         pieces[:, column] = values
     series = COEFFICIENTS + TERM * power.size
@@ -115,11 +113,6 @@ def pieces_of(
         once, moment = once * tau, moment * tau * tau
         pieces[:, WHOLE] = np.where(at_end, -once, once)
         pieces[:, WHOLE_MOMENT] = np.where(at_end, -moment - once * length, moment)
-        if curved:
-            at_nodes, fallen = np.multiply.outer(tau, 1.0 - NODES), np.zeros((first.size, NODES.size))
-            for k in range(power.size - 1, -1, -1):
-                fallen = (fallen + coefficients[:, k, np.newaxis]) * at_nodes
-            pieces[:, -NODES.size :] = np.abs(pieces[:, TOP, np.newaxis] + fallen)
     return pieces
 
 
