@@ -21,7 +21,7 @@ import slipsweep
 from slipsweep.files import spec
 from slipsweep.model.choices import declared
 from slipsweep.model.options import MODELS, SOLVERS
-from slipsweep.model.variables import FLAG_KINDS, Validity
+from slipsweep.model.variables import Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
 from tests.support.commands import command, working_folder
@@ -293,7 +293,7 @@ def test_numbers_of_the_paper_sweep(document: str) -> None:
 )
 def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
     stated = [(int(bit), name.strip("`"), kind) for bit, name, kind, _ in rows(section(document, heading))[1:]]
-    assert stated == [(int(flag), (flag.name or "").lower(), str(kind)) for flag, kind in FLAG_KINDS.items()]
+    assert stated == [(int(flag), (flag.name or "").lower(), str(flag.kind)) for flag in Validity]
 
 
 @pytest.mark.parametrize(

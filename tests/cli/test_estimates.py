@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 from slipsweep.charts import style
 from slipsweep.files.opening import read_result
-from slipsweep.model.estimates import friction_inputs
+from slipsweep.model.options import friction_inputs
 from tests.support.commands import command
 
 RECORD = slipsweep.Record(np.arange(3.0), np.array([0.0, 5.0, 0.0]))

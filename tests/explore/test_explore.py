@@ -18,7 +18,7 @@ import xarray as xr
 
 from slipsweep import InputError, Sine, SlidingMode, Validity, read_suite, simulate, suite_statistics, sweep
 from slipsweep.explore.page import write_page
-from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, VALIDITY_TEXT, VALUELESS, FlagKind, flags_of
+from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, VALUELESS, FlagKind, flags_of
 from tests.support.commands import command
 
 pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
@@ -421,7 +421,7 @@ def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
                     metres = float(text.split()[0]) * {"mm": 1e-3, "m": 1.0}[text.split()[1]]
                     assert metres == pytest.approx(expected, rel=5.1e-4, abs=1e-30)
             flags = [
-                [f"{kind}: {FLAG_KIND_TEXT[kind]}", f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}"]
+                [f"{kind}: {FLAG_KIND_TEXT[kind]}", f"{(flag.name or '').lower()}: {flag.text}"]
                 for kind in FlagKind
                 for flag in Validity(int(cell.validity)) & flags_of(kind)
             ]

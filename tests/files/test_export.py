@@ -17,7 +17,7 @@ from slipsweep.errors import InputError
 from slipsweep.files import export, spec
 from slipsweep.files import storing as store
 from slipsweep.files.jobs import sweep_job
-from slipsweep.model.variables import FLAG_KINDS, VALIDITY_TEXT, Validity
+from slipsweep.model.variables import Validity
 from tests.support.commands import command
 
 GRID = """
@@ -351,9 +351,9 @@ def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None
         together = sum(int(flag) * flags[(flag.name or "").lower()].astype(int) for flag in Validity)
         xr.testing.assert_equal(together, data.validity.astype(int))
         xr.testing.assert_identical(flags, slipsweep.flags(data.validity))
-        for flag, text in VALIDITY_TEXT.items():
+        for flag in Validity:
             assert flags[(flag.name or "").lower()].dtype == bool
-            assert flags[(flag.name or "").lower()].attrs == {"long_name": text, "kind": str(FLAG_KINDS[flag])}
+            assert flags[(flag.name or "").lower()].attrs == {"long_name": flag.text, "kind": str(flag.kind)}
         assert not slipsweep.flags(data).sel(theta=20, mu_s=0.5).statically_unstable.any()
 
 

@@ -15,13 +15,11 @@ from slipsweep.charts.slices import NAMED, Result
 from slipsweep.charts.style import LEFT_OUT, SYMBOLS, drawn_text, flag_name, model_text, plain, unit
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import (
-    FLAG_KINDS,
     PARAMETERS,
     RECORD_RESULTS,
     REFERENCE,
     RESULTS,
     STATISTICS,
-    VALIDITY_TEXT,
 )
 
 _LONG_NAMES = RECORD_RESULTS | RESULTS | STATISTICS
@@ -42,7 +40,7 @@ def title_page(result: Result) -> Figure:
     attributes = result.attrs
     recorded = result.sort in ("record", "suite")
     hatched = [
-        f"{flag_name(flag)} ({FLAG_KINDS[flag]}): {VALIDITY_TEXT[flag]}"
+        f"{flag_name(flag)} ({flag.kind}): {flag.text}"
         + ("; left out of contours and curves unless their caption says that it is drawn" if flag in LEFT_OUT else "")
         for flag in HATCHES
     ]

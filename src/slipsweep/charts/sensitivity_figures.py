@@ -12,7 +12,7 @@ from slipsweep.charts.sheet import Sheet, curve_looks, over, plot_curve
 from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, plain
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
-from slipsweep.model.variables import SENSITIVITY_STATUS_TEXT, SensitivityStatus
+from slipsweep.model.variables import SensitivityStatus
 
 #: Results that the charts show, and how: name, interval, text, colour of bars.
 _INDICES = (
@@ -88,7 +88,7 @@ def curves(sheet: Sheet) -> Figure:
     status = sheet.data["sensitivity_status"].values
     for one in SensitivityStatus:
         if one is not SensitivityStatus.COMPUTED and (status == int(one)).any():
-            sheet.notes.append(f"No indices where {SENSITIVITY_STATUS_TEXT[one]}.")
+            sheet.notes.append(f"No indices where {one.text}.")
     return sheet.done()
 
 
@@ -97,7 +97,7 @@ def _check_there(sheet: Sheet) -> None:
     if np.isfinite(sheet.data["total_index"].values).any():
         return
     status = {int(one) for one in np.unique(sheet.data["sensitivity_status"].values)}
-    reasons = [text for one, text in SENSITIVITY_STATUS_TEXT.items() if int(one) in status and int(one)]
+    reasons = [one.text for one in SensitivityStatus if int(one) in status and int(one)]
     raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons) or 'missing'}; choose another slice (--at)")
 
 

@@ -18,8 +18,6 @@ from slipsweep.errors import InputError
 from slipsweep.model.variables import (
     FLAG_KIND_TEXT,
     PARAMETERS,
-    SENSITIVITY_STATUS_TEXT,
-    VALIDITY_TEXT,
     FlagKind,
     SensitivityStatus,
     Validity,
@@ -72,7 +70,7 @@ def echo_tally(tally: "Tally") -> None:
                 typer.echo(f"  {kind}: {FLAG_KIND_TEXT[kind]}")
             for flag in seen & flags_of(kind):
                 name = (flag.name or "").lower()
-                typer.echo(f"    {name:<22}{tally.share(tally.flags[flag]):7.2%}  {VALIDITY_TEXT[flag]}")
+                typer.echo(f"    {name:<22}{tally.share(tally.flags[flag]):7.2%}  {flag.text}")
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
         typer.echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
@@ -92,7 +90,7 @@ def _echo_indices(indices: "Indices") -> None:
             typer.echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
     for status, count in indices.status.items():
         if count and status is not SensitivityStatus.COMPUTED:
-            text = SENSITIVITY_STATUS_TEXT[status]
+            text = status.text
             typer.echo(f"  none at {count} ({status.name.lower()}): {text}")
 
 

@@ -25,7 +25,7 @@ from slipsweep.cli.common import (
 )
 from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
-from slipsweep.model.variables import LIMIT_STATUS_TEXT, LimitStatus
+from slipsweep.model.variables import LimitStatus
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,7 +150,7 @@ def _summarize(table: "xr.Dataset") -> None:
     for one in LimitStatus:
         share = np.count_nonzero(status == one) / status.size
         if share:
-            typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {LIMIT_STATUS_TEXT[one]}")
+            typer.echo(f"  {one.name.lower():<24}{share:7.2%}  {one.text}")
 
 
 def _summarize_suite(table: "xr.Dataset", g: float) -> None:

@@ -26,7 +26,6 @@ from slipsweep.model.variables import (
     HISTORY,
     PARAMETERS,
     RECORD_COUNTS,
-    VALIDITY_TEXT,
     VALUELESS,
     FlagKind,
     SlidingMode,
@@ -144,7 +143,7 @@ def simulate(
     table = time_history(inputs, excitation=motion, model=model, points_per_cycle=points)
     flags = Validity(table["validity"].item())
     if flags & VALUELESS:
-        why = "; ".join(f"{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}" for flag in flags & VALUELESS)
+        why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags & VALUELESS)
         raise RunError(f"the model gives no value: {why} ({taken_as(given, model.g)})")
     for path in paths:
         writers[path.suffix](table, path, overwrite, motion)
@@ -169,7 +168,7 @@ def _summarize(table: "xr.Dataset") -> None:
     typer.echo(f"inputs                  {table.attrs['friction_inputs']}")
     for kind in FlagKind:
         for flag in Validity(table["validity"].item()) & flags_of(kind):
-            typer.echo(f"{kind:<24}{(flag.name or '').lower()}: {VALIDITY_TEXT[flag]}")
+            typer.echo(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}")
 
 
 def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":

@@ -30,7 +30,6 @@ from slipsweep.grid.resources import size_text
 from slipsweep.model.variables import (
     FLAG_KIND_TEXT,
     PARAMETERS,
-    VALIDITY_TEXT,
     FlagKind,
     SlidingMode,
     flags_of,
@@ -195,7 +194,7 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
         "figures": figures(excerpt),
         "modes": {int(mode): mode.name.lower() for mode in SlidingMode},
         "flags": [
-            {"mask": int(flag), "name": (flag.name or "").lower(), "kind": str(kind), "text": VALIDITY_TEXT[flag]}
+            {"mask": int(flag), "name": (flag.name or "").lower(), "kind": str(kind), "text": flag.text}
             for kind in FlagKind
             for flag in flags_of(kind)
         ],

@@ -24,7 +24,7 @@ from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
-from slipsweep.model.variables import FLAG_KINDS, LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS, VALIDITY_TEXT
+from slipsweep.model.variables import LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -414,7 +414,7 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
         flags = [
             (
                 f"{int(flag)} {(flag.name or '').lower()}",
-                f"{FLAG_KINDS[flag]}: {tally.share(count):.2%} of {tally.cells} cells; {VALIDITY_TEXT[flag]}",
+                f"{flag.kind}: {tally.share(count):.2%} of {tally.cells} cells; {flag.text}",
             )
             for flag, count in (tally.flags or {}).items()
         ]

@@ -22,8 +22,7 @@ from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tally import Tally
-from slipsweep.model.estimates import friction_inputs
-from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Step
+from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Step, friction_inputs
 from slipsweep.model.parameters import (
     BOUNDS,
     check_choices,

@@ -19,26 +19,16 @@ from slipsweep.model.parameters import (
     check_list,
     check_single,
     check_whole,
-    number_text,
     shown,
 )
 
 
-def option(
-    about: str,
-    default: Any = dataclasses.MISSING,
-    *,
-    least: float | None = None,
-    most: float | None = None,
-    multiple_of: int = 1,
-) -> Any:
-    """A field of a `Choice`: what it is about, in one line, and what it may be.
+def option(about: str, default: Any = dataclasses.MISSING, *, least: int = 0, most: int | None = None) -> Any:
+    """A field of a `Choice`, with one line on what it is about.
 
-    The bounds of a number are `least` and `most`, or those of the parameter of its name.
+    A whole number is `least` to `most`; another is within the bounds of the parameter of its name.
     """
-    return dataclasses.field(
-        default=default, metadata={"about": about, "least": least, "most": most, "multiple_of": multiple_of}
-    )
+    return dataclasses.field(default=default, metadata={"about": about, "least": least, "most": most})
 
 
 @dataclass(frozen=True)
@@ -46,14 +36,13 @@ class Option:
     """An option as its class declares it."""
 
     name: str
-    about: str  # one line for people
+    default: Any  # dataclasses.MISSING where it must be given
     kind: type  # str, int or float; of one entry, where it is a list
     words: tuple[str, ...]  # what a word may be; empty for numbers
     is_list: bool
-    default: Any  # dataclasses.MISSING where it must be given
-    least: float | None
-    most: float | None
-    multiple_of: int
+    about: str
+    least: int
+    most: int | None
 
     def checked(self, value: Any) -> Any:
         """The value, in the option's own type (InputError: what is allowed)."""
@@ -68,15 +57,8 @@ class Option:
         if self.words:
             return check_choice(name, value, self.words)
         if self.kind is int:
-            most = None if self.most is None else int(self.most)
-            return check_whole(name, value, int(self.least or 0), most, self.multiple_of)
-        if self.name in BOUNDS:
-            return check_single(self.name, value, name)
-        number = check_finite(name, value)
-        if self.least is not None and self.most is not None and not self.least <= number <= self.most:
-            low, high = map(number_text, (self.least, float(self.most)))
-            raise InputError(f"{name} = {number_text(number)}: must be {low} to {high}")
-        return number
+            return check_whole(name, value, self.least, self.most)
+        return check_single(self.name, value, name) if self.name in BOUNDS else check_finite(name, value)
 
 
 @dataclass(frozen=True)
@@ -96,8 +78,8 @@ class Choice:
 
     @property
     def options(self) -> dict[str, Any]:
-        """The options by name; those left out where nothing stands for them are left out."""
-        values = {one.name: getattr(self, one.name) for one in declared(type(self))}
+        """The options by name, but for those that are None."""
+        values = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
         return {name: value for name, value in values.items() if value is not None}
 
     def but(self, **options: Any) -> Self:
@@ -113,18 +95,16 @@ def declared(choice: type[Choice]) -> tuple[Option, ...]:
 
 @functools.cache  # every object made asks for them, and hints take long to look up
 def _declared(choice: Any) -> tuple[Option, ...]:
-    hints = get_type_hints(choice)
-    return tuple(_option(field, hints[field.name]) for field in dataclasses.fields(choice))
-
-
-def _option(field: "dataclasses.Field[Any]", hint: Any) -> Option:
-    if get_origin(hint) in (Union, types.UnionType):
-        hint = next(part for part in get_args(hint) if part is not type(None))
-    is_list = get_origin(hint) is Sequence
-    kind = get_args(hint)[0] if is_list else hint
-    words = get_args(kind) if get_origin(kind) is Literal else ()
-    return Option(field.name, kind=str if words else kind, words=words, is_list=is_list, default=field.default,
-                  **field.metadata)  # fmt: skip
+    found = []
+    for field in dataclasses.fields(choice):
+        hint = get_type_hints(choice)[field.name]
+        if get_origin(hint) in (Union, types.UnionType):
+            hint = next(part for part in get_args(hint) if part is not type(None))
+        is_list = get_origin(hint) is Sequence
+        kind = get_args(hint)[0] if is_list else hint
+        words = get_args(kind) if get_origin(kind) is Literal else ()
+        found.append(Option(field.name, field.default, str if words else kind, words, is_list, **field.metadata))
+    return tuple(found)
 
 
 Some = TypeVar("Some", bound=Choice)
@@ -142,10 +122,10 @@ class Family(Generic[Some]):
         What names the choice in that table.
     choices : tuple of type
     default : str
-    aliases : dict of str to str
-        Other names of choices.
     attribute : str
         What names the choice in the attributes of a result, and on the command line.
+    aliases : dict of str to str
+        Other names of choices.
     """
 
     keyword: str
@@ -160,6 +140,15 @@ class Family(Generic[Some]):
         """All names that a choice may be called by."""
         return (*self.aliases, *(choice.name for choice in self.choices))
 
+    @property
+    def options(self) -> dict[str, Option]:
+        """The options of all choices, by name."""
+        return {one.name: one for choice in self.choices for one in declared(choice)}
+
+    def called(self, name: str) -> type[Some]:
+        """The class of a choice, by name."""
+        return {choice.name: choice for choice in self.choices}[self.aliases.get(name, name)]
+
     def of(self, given: Any) -> Some:
         """The choice that a caller gives: an object, or the name of one with its defaults."""
         if isinstance(given, self.choices):
@@ -171,10 +160,6 @@ class Family(Generic[Some]):
             f"{self.keyword} = {shown(given)}: must be one of {', '.join(map(repr, self.names))}, or {objects}"
         )
 
-    def called(self, name: str) -> type[Some]:
-        """The class of a choice, by name."""
-        return {choice.name: choice for choice in self.choices}[self.aliases.get(name, name)]
-
     def made(self, name: Any, options: Mapping[str, Any], key: Callable[[str], str] = str) -> Some:
         """The choice of a name, with options as a table or a command gives them.
 
@@ -183,22 +168,19 @@ class Family(Generic[Some]):
         check_choice(key(self.key), name, self.names)
         choice = self.called(name)
         known = {one.name: one for one in declared(choice)}
-        for option_ in options:
-            if option_ not in known:
-                allowed = [repr(other.name) for other in self.choices if option_ in {o.name for o in declared(other)}]
-                if not allowed:
-                    raise InputError(f"{key(option_)}: unknown; {did_you_mean(option_, tuple(known))}")
-                raise InputError(
-                    f"{key(option_)}: not allowed with {key(self.key)} = {name!r}, only with {', '.join(allowed)}"
-                )
+        for unknown in (one for one in options if one not in known):
+            if unknown not in self.options:
+                raise InputError(f"{key(unknown)}: unknown; {did_you_mean(unknown, tuple(known))}")
+            having = [one for one in self.choices if unknown in {option.name for option in declared(one)}]
+            allowed = ", ".join(repr(one.name) for one in having)
+            raise InputError(f"{key(unknown)}: not allowed with {key(self.key)} = {name!r}, only with {allowed}")
         for one in known.values():
             if one.default is dataclasses.MISSING and one.name not in options:
                 raise InputError(f"{key(one.name)}: must be given with {key(self.key)} = {name!r}")
         try:
             return choice(**options)
         except InputError as error:
-            # the message begins with the option's name
-            text = str(error)
+            text = str(error)  # it begins with the option's name
             raise InputError(key(text) if text.startswith(tuple(known)) else text) from None
 
     def attributes(self, choice: Some) -> dict[str, Any]:
@@ -209,23 +191,10 @@ class Family(Generic[Some]):
         """The choice that the attributes of a result tell of (InputError: they tell of none)."""
         if self.attribute not in attributes:
             raise InputError(f"attribute {self.attribute!r}: missing")
-        name = attributes[self.attribute]
-        check_choice(f"attribute {self.attribute}", name, self.names)
-        known = declared(self.called(name))
-        return self.made(
-            name,
-            {one.name: _plain(attributes[one.name], one) for one in known if one.name in attributes},
-            lambda text: f"attribute {text}",
-        )
-
-    @property
-    def options(self) -> dict[str, Option]:
-        """The options of all choices, by name."""
-        return {one.name: one for choice in self.choices for one in declared(choice)}
-
-
-def _plain(value: Any, one: Option) -> Any:
-    """An attribute's value without numpy; a list of one number is read back as a number."""
-    import numpy as np  # here only: `slipsweep --help` imports these declarations
-
-    return np.atleast_1d(value).tolist() if one.is_list else np.asarray(value).item()
+        check_choice(f"attribute {self.attribute}", attributes[self.attribute], self.names)
+        choice = self.called(attributes[self.attribute])
+        options = {one.name: attributes[one.name] for one in declared(choice) if one.name in attributes}
+        for name in options:  # files give a list of one number as a number
+            if self.options[name].is_list and not isinstance(options[name], Sequence):
+                options[name] = getattr(options[name], "flat", [options[name]])
+        return self.made(choice.name, options, lambda text: f"attribute {text}")

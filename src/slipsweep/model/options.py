@@ -1,10 +1,12 @@
-"""The models and the solvers that a user may choose, with their options."""
+"""The models and the solvers that a user may choose, and what of a model is estimated."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal, TypeAlias
 
+from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
-from slipsweep.model.parameters import MOST_STEPS, STEPS_PER_CYCLE
+from slipsweep.model.parameters import GRAVITY, MOST_STEPS, STEPS_PER_CYCLE
 
 Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
@@ -50,7 +52,7 @@ class Mendez(Choice):
     recoupling: Literal["eq12", "integrate"] = option(
         "rule by which the block re-sticks after the base has reversed", "eq12"
     )
-    g: float = option("gravity, m/s²", 9.81)
+    g: float = option("gravity, m/s²", GRAVITY)
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Newmark(Choice):
     """
 
     name: ClassVar[str] = "newmark"
-    g: float = option("gravity, m/s²", 9.81)
+    g: float = option("gravity, m/s²", GRAVITY)
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,12 @@ class Step(Choice):
 
     name: ClassVar[str] = "step"
     rule: Rule = option("rule of the steps; orders 1, 2 and 4", "trapezoid")
-    steps_per_cycle: int = option("steps in a cycle", STEPS_PER_CYCLE, least=8, most=MOST_STEPS, multiple_of=4)
+    steps_per_cycle: int = option("steps in a cycle", STEPS_PER_CYCLE, least=8, most=MOST_STEPS)
+
+    def check(self) -> None:
+        """Refuse steps that do not end at the zeros and peaks of a sine."""
+        if self.steps_per_cycle % 4:
+            raise InputError(f"steps_per_cycle = {self.steps_per_cycle}: must be a multiple of 4")
 
 
 Model = Mendez | Newmark
@@ -142,3 +149,42 @@ Solver = Cycle | Step
 
 MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")
 SOLVERS: Family[Solver] = Family("solver", "method", (Cycle, Step), "auto", "solver", {"auto": "cycle"})
+
+#: Inputs that the displacement depends on: symbol, and the estimate in place of one that is not given.
+_INPUTS = {
+    "yield_acceleration": ("Üy", "by Coulomb"),
+    "decay_rate": ("λ", "by Eq. 6"),
+    "delta_mu": ("Δμ", "by Eqs. 10–11"),
+}
+
+
+def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str] | None = None) -> str:
+    """Say where Üy, λ and Δμ of a result come from: given, drawn, or estimated; Newmark's block has only Üy.
+
+    `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
+
+    Examples
+    --------
+    >>> friction_inputs("mendez", ())
+    'Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated'
+    >>> friction_inputs("mendez", ("yield_acceleration", "decay_rate"))
+    'Üy, λ given; Δμ by Eqs. 10–11: estimated'
+    """
+    drawn = drawn or {}
+    if "yield_coefficient" in drawn or "yield_coefficient" in given:
+        return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
+    known, uncertain, estimated = [], [], []
+    for name, (symbol, rule) in _INPUTS.items():
+        if model == "newmark" and name != "yield_acceleration":
+            continue
+        if name in drawn and (name in given or drawn[name] == "absolute"):
+            uncertain.append(symbol)
+        elif name in given:
+            known.append(symbol)
+        else:
+            with_minimum = ", μmin given" if name == "decay_rate" and "minimum_friction" in given else ""
+            about = ", drawn about it" if name in drawn else ""
+            detail = (with_minimum + about).removeprefix(", ")
+            estimated.append(f"{symbol} {rule}" + (f" ({detail})" if detail else ""))
+    parts = ((known, " given"), (uncertain, " drawn"), (estimated, ": estimated"))
+    return "; ".join(", ".join(names) + what for names, what in parts if names)

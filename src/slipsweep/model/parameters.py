@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Collection, Iterable, Mapping, Set
-from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from slipsweep.errors import InputError
 from slipsweep.model.units import without_unit
@@ -21,71 +20,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-
-@dataclass(frozen=True)
-class Bound:
-    """An interval, its upper end included unless said otherwise, and how to say it."""
-
-    low: float
-    includes_low: bool
-    high: float
-    text: str
-    includes_high: bool = True
-
-    def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which values lie in the interval (NaN and infinity never do)."""
-        import numpy as np
-
-        above = values >= self.low if self.includes_low else values > self.low
-        return np.asarray(above & (values <= self.high if self.includes_high else values < self.high))
-
-
 #: The largest acceleration and length, and the largest of all other numbers, whose inverse is the least: more than
 #: physics ever needs, and so much less than the largest double that the solvers can work with each of them.  What is
-#: too much of several together is refused by `grid.served`, of a run before it is begun (`runs.jobs`).
+#: too much of several together is refused by `grid.served`.
 LARGEST, LARGEST_FACTOR = 1e300, 1e100
-
-_AMOUNT = Bound(0.0, True, LARGEST, f"a finite number >= 0 and at most {LARGEST:g}")
-_POSITIVE_AMOUNT = Bound(0.0, False, LARGEST, f"a finite number > 0 and at most {LARGEST:g}")
-_FACTOR = Bound(0.0, True, LARGEST_FACTOR, f"a finite number >= 0 and at most {LARGEST_FACTOR:g}")
-_POSITIVE_FACTOR = Bound(
-    1.0 / LARGEST_FACTOR,
-    True,
-    LARGEST_FACTOR,
-    f"a finite number > 0, from {1.0 / LARGEST_FACTOR:g} to {LARGEST_FACTOR:g}",
-)
-
-#: What each parameter may be (MODEL: what no physics allows is an error, not a NaN).
-BOUNDS: dict[str, Bound] = {
-    "theta": Bound(0.0, True, 90.0, "0 <= theta < 90 degrees", includes_high=False),
-    "mu_s": _POSITIVE_FACTOR,
-    "phi": Bound(0.0, False, 90.0, "0 < phi < 90 degrees", includes_high=False),
-    "amplitude": _AMOUNT,
-    "displacement_amplitude": _AMOUNT,
-    "frequency": _POSITIVE_FACTOR,
-    "displacement": _POSITIVE_AMOUNT,
-    "maximum_amplitude": _POSITIVE_AMOUNT,
-    "yield_acceleration": Bound(-LARGEST, True, LARGEST, f"a finite number from {-LARGEST:g} to {LARGEST:g}"),
-    "yield_coefficient": Bound(
-        -LARGEST_FACTOR, True, LARGEST_FACTOR, f"a finite number from {-LARGEST_FACTOR:g} to {LARGEST_FACTOR:g}"
-    ),
-    "decay_rate": _FACTOR,
-    "delta_mu": _FACTOR,
-    "minimum_friction": _POSITIVE_FACTOR,
-    "structure_frequency": _POSITIVE_FACTOR,
-    "scale": _POSITIVE_FACTOR,
-    "pgv": _AMOUNT,
-    "arias_intensity": _AMOUNT,
-    "time_scale": _POSITIVE_FACTOR,
-    "interval": Bound(0.0, False, LARGEST, f"a finite number > 0 and at most {LARGEST:g}"),
-    "azimuth": Bound(0.0, True, 360.0, "0 <= azimuth <= 360 degrees"),
-    "g": Bound(1.0 / LARGEST, True, LARGEST, f"a finite number > 0, from {1.0 / LARGEST:g} to {LARGEST:g}"),
-    "quantile": Bound(0.0, False, 1.0, "a number between 0 and 1", includes_high=False),
-    "threshold": _AMOUNT,
-}
-
-#: Own units of numbers that are no parameters of a sweep.
-_UNITS_OF_OTHERS = {"displacement": "m", "threshold": "m", "maximum_amplitude": "m s-2", "g": "m s-2", "interval": "s"}
 
 #: Gravity of the models by default, m/s²: the value that reproduces the paper's tables.
 GRAVITY = 9.81
@@ -97,6 +35,65 @@ STEPS_PER_CYCLE = 1024
 MOST_CYCLES = 1_000_000_000
 MOST_STEPS = 16_777_216
 MOST_POINTS = 1_000_000_000
+
+#: Longest ramp in cycles, each of which has pieces of its own.
+MOST_RAMP = 100
+
+
+class Bound(NamedTuple):
+    """A closed interval, and how to say it."""
+
+    low: float
+    high: float
+    text: str
+
+    def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which values lie in the interval (NaN and infinity never do)."""
+        return (values >= self.low) & (values <= self.high)
+
+
+def _from(low: float, high: float) -> Bound:
+    least = f">= 0 and at most {high:g}" if low == 0.0 else f"from {low:g} to {high:g}"
+    return Bound(low, high, f"a finite number {'> 0, ' if low > 0.0 else ''}{least}")
+
+
+_AMOUNT, _FACTOR = _from(0.0, LARGEST), _from(0.0, LARGEST_FACTOR)
+_POSITIVE_AMOUNT, _POSITIVE_FACTOR = _from(1.0 / LARGEST, LARGEST), _from(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
+_ABOVE_0, _BELOW_1, _BELOW_90 = math.ulp(0.0), math.nextafter(1.0, 0.0), math.nextafter(90.0, 0.0)
+
+#: What each parameter may be (MODEL: what no physics allows is an error, not a NaN).
+BOUNDS: dict[str, Bound] = {
+    "theta": Bound(0.0, _BELOW_90, "0 <= theta < 90 degrees"),
+    "mu_s": _POSITIVE_FACTOR,
+    "phi": Bound(_ABOVE_0, _BELOW_90, "0 < phi < 90 degrees"),
+    "amplitude": _AMOUNT,
+    "displacement_amplitude": _AMOUNT,
+    "frequency": _POSITIVE_FACTOR,
+    "displacement": _POSITIVE_AMOUNT,
+    "maximum_amplitude": _POSITIVE_AMOUNT,
+    "yield_acceleration": _from(-LARGEST, LARGEST),
+    "yield_coefficient": _from(-LARGEST_FACTOR, LARGEST_FACTOR),
+    "decay_rate": _FACTOR,
+    "delta_mu": _FACTOR,
+    "minimum_friction": _POSITIVE_FACTOR,
+    "structure_frequency": _POSITIVE_FACTOR,
+    "scale": _POSITIVE_FACTOR,
+    "pgv": _AMOUNT,
+    "arias_intensity": _AMOUNT,
+    "time_scale": _POSITIVE_FACTOR,
+    "interval": _POSITIVE_AMOUNT,
+    "azimuth": Bound(0.0, 360.0, "0 <= azimuth <= 360 degrees"),
+    "g": _POSITIVE_AMOUNT,
+    "ramp_in": Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}"),
+    "ramp_out": Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}"),
+    "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
+    "threshold": _AMOUNT,
+}
+
+#: Own units of all that may bring one.
+_UNITS = {"displacement": "m", "threshold": "m", "maximum_amplitude": "m s-2", "g": "m s-2", "interval": "s"} | {
+    name: about["units"] for name, about in PARAMETERS.items()
+}
 
 
 def number_text(value: float) -> str:
@@ -124,11 +121,9 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     import numpy as np
 
     array: Any = computed(values)
-    among = array if isinstance(array, (list, tuple)) else [array]
-    masked = sum(int(np.ma.count_masked(one)) for one in among if isinstance(one, np.ma.MaskedArray))
+    masked = int(np.ma.count_masked(array)) if isinstance(array, np.ma.MaskedArray) else 0
     if masked:
-        size = np.size(array) if among is not array else len(array)
-        raise InputError(f"{key}: {masked} of {size} values are masked: must be numbers, every one of them")
+        raise InputError(f"{key}: {masked} of {array.size} values are masked: must be numbers, every one of them")
     try:
         array = np.asarray(array)
         exact = array.dtype == object and all(isinstance(one, (Real, Decimal)) for one in array.flat)
@@ -149,27 +144,6 @@ def computed(values: Any) -> Any:
     return values.compute() if dask and isinstance(values, dask.Array) else values
 
 
-def check_single(name: str, value: Any, key: str | None = None) -> float:
-    """Return a single number within the bounds of parameter `name`, called `key` in errors."""
-    values = check_values(name, value, key)
-    if values.ndim:
-        raise InputError(f"{key or name} = {shown(value)}: must be a single number")
-    return float(values)
-
-
-def check_finite(key: str, value: Any) -> float:
-    """Return a single finite number of whatever sign."""
-    import numpy as np
-
-    try:
-        number = check_numbers(key, value)
-    except InputError:
-        number = np.array(np.nan)
-    if number.ndim or not np.isfinite(number):
-        raise InputError(f"{key} = {shown(value)}: must be a finite number")
-    return float(number)
-
-
 def check_values(name: str, values: Any, key: str | None = None, g: float = GRAVITY) -> NDArray[np.float64]:
     """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors.
 
@@ -181,13 +155,45 @@ def check_values(name: str, values: Any, key: str | None = None, g: float = GRAV
     InputError
         Naming the parameter, the first value that is not allowed, and what is.
     """
-    own = PARAMETERS[name]["units"] if name in PARAMETERS else _UNITS_OF_OTHERS.get(name)
-    array = check_numbers(key or name, values if own is None else without_unit(key or name, own, values, g))
+    key = key or name
+    array = check_numbers(key, without_unit(key, _UNITS[name], values, g) if name in _UNITS else values)
     bound = BOUNDS[name]
-    wrong = ~bound.holds(array)
-    if wrong.any():
-        raise InputError(f"{key or name} = {number_text(float(array[wrong].flat[0]))}: must be {bound.text}")
+    for wrong in array[~bound.holds(array)][:1]:
+        raise InputError(f"{key} = {number_text(float(wrong))}: must be {bound.text}")
     return array
+
+
+def check_single(name: str, value: Any, key: str | None = None) -> float:
+    """Return a single number within the bounds of parameter `name`, called `key` in errors."""
+    values = check_values(name, value, key)
+    if values.ndim:
+        raise InputError(f"{key or name} = {shown(value)}: must be a single number")
+    return float(values)
+
+
+def check_finite(key: str, value: Any) -> float:
+    """Return a single finite number of whatever sign."""
+    try:
+        number = check_numbers(key, value)
+    except InputError:
+        number = None
+    if number is None or number.ndim or not math.isfinite(number):
+        raise InputError(f"{key} = {shown(value)}: must be a finite number")
+    return float(number)
+
+
+def check_whole(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """Return `value` as an int if it is a whole number from `least` to `most`."""
+    is_integer = isinstance(value, int) and not isinstance(value, bool)
+    try:
+        number = value if is_integer else check_finite(name, value)  # an integer may have more digits than a double
+    except InputError:
+        number = math.nan
+    if not number >= least or number % 1:
+        raise InputError(f"{name} = {shown(value)}: must be a whole number >= {least}")
+    if most is not None and number > most:
+        raise InputError(f"{name} = {shown(value)}: must be a whole number <= {most}")
+    return int(number)
 
 
 def friction_coefficient(phi: Any) -> Any:
@@ -241,8 +247,7 @@ def check_choice(name: str, value: Any, allowed: Collection[str]) -> str:
 
 def check_choices(name: str, values: Any, allowed: Collection[str]) -> tuple[str, ...]:
     """Return which of `allowed` a caller names, one at least, in the order of `allowed`."""
-    entries = list(values) if isinstance(values, (set, frozenset)) else check_list(name, values, "names")
-    wanted = [check_choice(name, value, allowed) for value in entries]
+    wanted = [check_choice(name, value, allowed) for value in check_list(name, values, "names")]
     if not wanted:
         raise InputError(f"{name} = []: must name one of {', '.join(map(repr, allowed))} at least")
     return tuple(one for one in allowed if one in wanted)
@@ -263,19 +268,3 @@ def check_progress(progress: Any) -> Any:
     if progress is not None and not callable(progress):
         raise InputError(f"progress = {shown(progress)}: must be a function of a number of cells")
     return progress
-
-
-def check_whole(name: str, value: Any, least: int, most: int | None = None, multiple_of: int = 1) -> int:
-    """Return `value` as an int if it is a whole number from `least` to `most`, and a multiple of `multiple_of`."""
-    kind = "a whole number" if multiple_of == 1 else f"a multiple of {multiple_of}"
-    # an integer may have more digits than a double
-    is_integer = isinstance(value, int) and not isinstance(value, bool)
-    try:
-        number = value if is_integer else check_finite(name, value)
-    except InputError:
-        number = math.nan
-    if not number >= least or number % multiple_of or number % 1:
-        raise InputError(f"{name} = {shown(value)}: must be {kind} >= {least}")
-    if most is not None and number > most:
-        raise InputError(f"{name} = {shown(value)}: must be {kind} <= {most}")
-    return int(number)

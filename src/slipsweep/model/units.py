@@ -6,21 +6,13 @@ from typing import Any
 
 from slipsweep.errors import InputError
 
-#: Spellings of each parameter's own unit that need no units library.
-_OWN_UNITS = {
-    "degree": ("degree", "degrees", "deg"),
-    "m s-2": ("m s-2", "m/s2", "m/s^2", "m/s**2"),
-    "Hz": ("Hz",),
-    "m": ("m",),
-    "m s-1": ("m s-1", "m/s"),
-    "s": ("s",),
-    "1": ("1", "dimensionless"),
-}
+#: Other spellings of the parameters' own units, which need no units library.
+_SPELLINGS = dict.fromkeys(("deg", "degrees"), "degree") | dict.fromkeys(("m/s2", "m/s^2", "m/s**2"), "m s-2")
+_SPELLINGS |= {"m/s": "m s-1", "dimensionless": "1"}
 
 #: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
 _FACTOR = r"(?:[^\W\d]+0?|°)(?:\*\*-?[1-9])?"
-_LONGEST = 60
-_UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR})*")
+_UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR}){{0,8}}")
 
 
 def conversion(key: str, own: str, units: str | None, g: float) -> float:
@@ -34,7 +26,7 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
     InputError
         They do not convert.
     """
-    if units is None or units in _OWN_UNITS.get(own, (own,)):
+    if units is None or _SPELLINGS.get(units, units) == own:
         return 1.0
     if own == "m s-2" and units in ("g", "gal", "Gal"):  # a gallon, to pint
         return g if units == "g" else 0.01
@@ -42,7 +34,7 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
     refusal = InputError(f"{key} = {show(units)}: must be a unit that converts to {own}")
     # "m s-2", "m/s2" and "m/s^2" are all common; pint reads "m s**-2" and "m/s**2"
     text = re.sub(r"(?<=[A-Za-z])\^?(-?[1-9])\b", r"**\1", units.strip())
-    if own == "1" or len(text) > _LONGEST or not _UNIT_GRAMMAR.fullmatch(text):
+    if own == "1" or not _UNIT_GRAMMAR.fullmatch(text):
         raise refusal
 
     import pint  # only here: it takes 0.2 s to import

@@ -1,13 +1,11 @@
 """Names, units and CF attributes of everything slipsweep reads or returns, written once.
 
-`PARAMETERS` describes the inputs (they become coordinates), `RESULTS` what a sweep
-returns, `HISTORY` what `simulate` returns along time, `VALIDITY` and `SLIDING_MODE`
-the codes.  The xarray datasets, the netCDF files, the sweep-file schema and the figures
-all take their words from here.
+`PARAMETERS` describes the inputs (they become coordinates), `RESULTS` what a sweep returns, `HISTORY` what `simulate`
+returns along time.  Datasets, netCDF files, the sweep-file schema and figures all take their words from here.
 """
 
 from enum import IntEnum, IntFlag, StrEnum
-from typing import Any
+from typing import Any, Self
 
 REFERENCE = (
     "B. C. Mendez, M. P. Romo, E. Botero (2012), Linearization of rigid body dynamics on "
@@ -39,8 +37,26 @@ class SlidingMode(IntEnum):
     CONTINUOUS = 2
 
 
+class FlagKind(StrEnum):
+    """What a flag says of the value of its cell."""
+
+    NO_VALUE = "no value"  # NaN, and sliding mode missing
+    CAUTION = "caution"
+    NOTE = "note"
+
+
+#: The same in words, for people.
+FLAG_KIND_TEXT: dict[FlagKind, str] = {
+    FlagKind.NO_VALUE: "the model does not apply",
+    FlagKind.CAUTION: "an assumption of the model is violated",
+    FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
+}
+
+
 class Validity(IntFlag):
     """What is to be known of a cell's value, or why it has none; 0 means that no flag is raised.
+
+    Each flag has its `kind` ("no value", "caution" or "note") and a `text` of one line.
 
     See Also
     --------
@@ -51,116 +67,83 @@ class Validity(IntFlag):
     --------
     >>> import slipsweep
     >>> result = slipsweep.sweep(theta=25, mu_s=0.38, amplitude=3.0, frequency=1.0)
-    >>> slipsweep.Validity(result.validity.item()).name
-    'STATICALLY_UNSTABLE'
+    >>> flag = slipsweep.Validity(result.validity.item())
+    >>> flag.name, flag.text
+    ('STATICALLY_UNSTABLE', 'yield acceleration <= 0: the block slides under its own weight')
     """
 
-    STATICALLY_UNSTABLE = 1
-    UPLIFT = 2
-    LIMIT_UNDEFINED = 4
-    FRICTION_NOT_DECAYING = 8
-    YIELD_GOVERNS = 16
-    KD_NOT_POSITIVE = 32
-    NOT_RECOUPLED = 64
-    FLEXIBLE_BLOCK = 128
-    UPSLOPE = 256
-    NEAR_MODE_LIMIT = 512
-    FRICTION_ESTIMATED = 1024
+    kind: FlagKind
+    text: str
+
+    def __new__(cls, mask: int, kind: FlagKind = FlagKind.NO_VALUE, text: str = "") -> Self:
+        """A flag with its kind and its text."""
+        flag = int.__new__(cls, mask)
+        flag._value_, flag.kind, flag.text = mask, kind, text
+        return flag
+
+    STATICALLY_UNSTABLE = 1, FlagKind.NO_VALUE, "yield acceleration <= 0: the block slides under its own weight"
+    UPLIFT = 2, FlagKind.NO_VALUE, "A tan(theta) >= g: the block loses contact within the cycle"
+    LIMIT_UNDEFINED = 4, FlagKind.NO_VALUE, "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit"
+    FRICTION_NOT_DECAYING = 8, FlagKind.NO_VALUE, "calibrated decay rate <= 0 (mu_s xi^2 >= 1)"
+    YIELD_GOVERNS = 16, FlagKind.NOTE, (
+        "the yield acceleration governs: the result is that of Newmark's block and does not depend on lambda"
+    )  # fmt: skip
+    KD_NOT_POSITIVE = 32, FlagKind.NO_VALUE, "literal rise: Kd <= 0, Eq. 12 cannot stop the block"
+    NOT_RECOUPLED = 64, FlagKind.CAUTION, (
+        "does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable"
+    )  # fmt: skip
+    FLEXIBLE_BLOCK = 128, FlagKind.CAUTION, "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold"
+    UPSLOPE = 256, FlagKind.CAUTION, "the permanent displacement is negative: the block ends upslope"
+    NEAR_MODE_LIMIT = 512, FlagKind.CAUTION, (
+        "0.9 <= xi <= 1.1: at xi = 1 the displacement jumps to several times its value"
+    )  # fmt: skip
+    FRICTION_ESTIMATED = 1024, FlagKind.NOTE, "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11"
 
 
-class FlagKind(StrEnum):
-    """What a flag says of the value of its cell."""
-
-    NO_VALUE = "no value"
-    CAUTION = "caution"
-    NOTE = "note"
+def flags_of(kind: FlagKind) -> Validity:
+    """All flags of a kind."""
+    return Validity(sum(flag for flag in Validity if flag.kind is kind))
 
 
-class LimitStatus(IntEnum):
+VALUELESS, CAUTIONS, NOTES = (flags_of(kind) for kind in FlagKind)
+
+
+class _Status(IntEnum):
+    """A code with a `text` of one line for people."""
+
+    text: str
+
+    def __new__(cls, code: int, text: str = "") -> Self:
+        """A code with its text."""
+        status = int.__new__(cls, code)
+        status._value_, status.text = code, text
+        return status
+
+
+class LimitStatus(_Status):
     """How a limit amplitude was found, or why there is none."""
 
-    REACHED = 0
-    AT_MODE_JUMP = 1
-    AT_JUMP = 2
-    AFTER_GAP = 3
-    NOT_REACHED = 4
-    INVALID = 5
+    REACHED = 0, "the displacement is reached where it is continuous"
+    AT_MODE_JUMP = 1, "the displacement is exceeded by the jump where the sliding mode changes"
+    AT_JUMP = 2, "the displacement is exceeded by a jump within one sliding mode"
+    AFTER_GAP = 3, "just below the limit the model gives no value"
+    NOT_REACHED = 4, "not reached up to the maximum amplitude, or the last one with a value (no limit)"
+    INVALID = 5, "the model gives no value at any amplitude (no limit)"
 
 
-#: One line a status, for people (`slipsweep limit`).
-LIMIT_STATUS_TEXT: dict[LimitStatus, str] = {
-    LimitStatus.REACHED: "the displacement is reached where it is continuous",
-    LimitStatus.AT_MODE_JUMP: "the displacement is exceeded by the jump where the sliding mode changes",
-    LimitStatus.AT_JUMP: "the displacement is exceeded by a jump within one sliding mode",
-    LimitStatus.AFTER_GAP: "just below the limit the model gives no value",
-    LimitStatus.NOT_REACHED: "not reached up to the maximum amplitude, or the last one with a value (no limit)",
-    LimitStatus.INVALID: "the model gives no value at any amplitude (no limit)",
-}
-
-
-class SensitivityStatus(IntEnum):
+class SensitivityStatus(_Status):
     """Whether there are Sobol indices, or why there are none."""
 
-    COMPUTED = 0
-    NO_VARIANCE = 1
-    RUNS_WITHOUT_VALUE = 2
+    COMPUTED = 0, "there are indices"
+    NO_VARIANCE = 1, "all runs have the same displacement"
+    RUNS_WITHOUT_VALUE = 2, "some runs have no value"
 
-
-#: One line a status, for people.
-SENSITIVITY_STATUS_TEXT: dict[SensitivityStatus, str] = {
-    SensitivityStatus.COMPUTED: "there are indices",
-    SensitivityStatus.NO_VARIANCE: "all runs have the same displacement",
-    SensitivityStatus.RUNS_WITHOUT_VALUE: "some runs have no value",
-}
 
 #: End of the search for a limit amplitude when none is given, in g.
 MAXIMUM_AMPLITUDE_IN_G = 5.0
 
 
-#: What each flag says of the value: there is none (NaN, and sliding mode missing); there is one, but an assumption
-#: behind it is broken; there is one, and it is sound.
-FLAG_KINDS: dict[Validity, FlagKind] = dict.fromkeys(Validity, FlagKind.NO_VALUE) | {
-    Validity.YIELD_GOVERNS: FlagKind.NOTE,
-    Validity.NOT_RECOUPLED: FlagKind.CAUTION,
-    Validity.FLEXIBLE_BLOCK: FlagKind.CAUTION,
-    Validity.UPSLOPE: FlagKind.CAUTION,
-    Validity.NEAR_MODE_LIMIT: FlagKind.CAUTION,
-    Validity.FRICTION_ESTIMATED: FlagKind.NOTE,
-}
-
-
-def flags_of(kind: FlagKind) -> Validity:
-    """All flags of a kind."""
-    return Validity(sum(flag for flag in Validity if FLAG_KINDS[flag] is kind))
-
-
-VALUELESS, CAUTIONS, NOTES = flags_of(FlagKind.NO_VALUE), flags_of(FlagKind.CAUTION), flags_of(FlagKind.NOTE)
-
-#: A heading for each kind, for people.
-FLAG_KIND_TEXT: dict[FlagKind, str] = {
-    FlagKind.NO_VALUE: "the model does not apply",
-    FlagKind.CAUTION: "an assumption of the model is violated",
-    FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
-}
-
-#: One line a flag, for people (`slipsweep info`).
-VALIDITY_TEXT: dict[Validity, str] = {
-    Validity.STATICALLY_UNSTABLE: "yield acceleration <= 0: the block slides under its own weight",
-    Validity.UPLIFT: "A tan(theta) >= g: the block loses contact within the cycle",
-    Validity.LIMIT_UNDEFINED: "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit",
-    Validity.FRICTION_NOT_DECAYING: "calibrated decay rate <= 0 (mu_s xi^2 >= 1)",
-    Validity.YIELD_GOVERNS: "the yield acceleration governs: the result is that of Newmark's block and does not depend "
-    "on lambda",
-    Validity.KD_NOT_POSITIVE: "literal rise: Kd <= 0, Eq. 12 cannot stop the block",
-    Validity.NOT_RECOUPLED: "does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable",
-    Validity.FLEXIBLE_BLOCK: "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold",
-    Validity.UPSLOPE: "the permanent displacement is negative: the block ends upslope",
-    Validity.NEAR_MODE_LIMIT: "0.9 <= xi <= 1.1: at xi = 1 the displacement jumps to several times its value",
-    Validity.FRICTION_ESTIMATED: "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11",
-}
-
-
-def _described(units: str, long_name: str, ancillary: str | None = None, **more: str) -> dict[str, Any]:
+def _cf(units: str, long_name: str, ancillary: str | None = None, **more: str) -> dict[str, Any]:
     """CF attributes of a variable."""
     about = {"units": units, "long_name": long_name}
     return about | ({"ancillary_variables": ancillary} if ancillary else {}) | more
@@ -183,27 +166,26 @@ _DIRECTION = (
     "statics the distance along the plane is that of Newmark's block times cos(phi - theta) / cos(phi), mu_s = tan(phi)"
 )
 
-
 #: Inputs: attributes of their coordinates, in the order of the dimensions of a result.
 PARAMETERS: dict[str, dict[str, Any]] = {
-    "theta": _described("degree", "base inclination"),
-    "mu_s": _described("1", "static friction coefficient"),
-    "phi": _described("degree", "friction angle of the interface"),
-    "amplitude": _described("m s-2", "peak ground acceleration"),
-    "displacement_amplitude": _described("m", "peak ground displacement"),
-    "frequency": _described("Hz", "excitation frequency"),
-    "yield_acceleration": _described("m s-2", "yield acceleration"),
-    "yield_coefficient": _described("1", "yield coefficient, yield acceleration over g"),
-    "decay_rate": _described("1", "friction decay with loading rate"),
-    "delta_mu": _described("1", "friction above static"),
-    "minimum_friction": _described("1", "minimum friction coefficient"),
-    "structure_frequency": _described("Hz", "natural frequency of the structure"),
-    "scale": _described("1", "scale factor of the recorded acceleration"),
-    "pgv": _described("m s-1", "peak ground velocity that motions are scaled to"),
-    "arias_intensity": _described("m s-1", "Arias intensity that motions are scaled to"),
-    "time_scale": _described("1", "factor on the time of the record"),
-    "polarity": _described("1", "sign that the recorded acceleration is taken with"),
-    "azimuth": _described("degree", "downslope direction, from the first component to the second"),
+    "theta": _cf("degree", "base inclination"),
+    "mu_s": _cf("1", "static friction coefficient"),
+    "phi": _cf("degree", "friction angle of the interface"),
+    "amplitude": _cf("m s-2", "peak ground acceleration"),
+    "displacement_amplitude": _cf("m", "peak ground displacement"),
+    "frequency": _cf("Hz", "excitation frequency"),
+    "yield_acceleration": _cf("m s-2", "yield acceleration"),
+    "yield_coefficient": _cf("1", "yield coefficient, yield acceleration over g"),
+    "decay_rate": _cf("1", "friction decay with loading rate"),
+    "delta_mu": _cf("1", "friction above static"),
+    "minimum_friction": _cf("1", "minimum friction coefficient"),
+    "structure_frequency": _cf("Hz", "natural frequency of the structure"),
+    "scale": _cf("1", "scale factor of the recorded acceleration"),
+    "pgv": _cf("m s-1", "peak ground velocity that motions are scaled to"),
+    "arias_intensity": _cf("m s-1", "Arias intensity that motions are scaled to"),
+    "time_scale": _cf("1", "factor on the time of the record"),
+    "polarity": _cf("1", "sign that the recorded acceleration is taken with"),
+    "azimuth": _cf("degree", "downslope direction, from the first component to the second"),
 }
 
 #: Dimensions of a result, in order; further ones follow.
@@ -228,23 +210,23 @@ DRAWN = (
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
-    "permanent_displacement": _described("m", "permanent displacement, downslope", "validity", comment=_DIRECTION),
-    "peak_relative_velocity": _described("m s-1", "largest downslope relative velocity", "validity"),
+    "permanent_displacement": _cf("m", "permanent displacement, downslope", "validity", comment=_DIRECTION),
+    "peak_relative_velocity": _cf("m s-1", "largest downslope relative velocity", "validity"),
     "sliding_mode": _coded("sliding mode", SlidingMode, "validity"),
     "validity": {
         "long_name": "validity flags; 0 = no flag raised",
         "flag_masks": [int(flag) for flag in Validity],
         "flag_meanings": " ".join((flag.name or "").lower() for flag in Validity),
     },
-    "newmark_displacement": _described(
+    "newmark_displacement": _cf(
         "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
     ),
-    "yield_acceleration": _described("m s-2", "yield acceleration"),
-    "limiting_acceleration": _described("m s-2", "limiting acceleration (Eq. 7)"),
-    "acceleration_ratio": _described("1", "peak ground over limiting acceleration"),
-    "minimum_friction": _described("1", "minimum friction coefficient (Eq. 9)"),
-    "delta_mu": _described("1", "friction above static (Eqs. 10, 11)"),
-    "decay_rate": _described("1", "friction decay with loading rate (Eq. 6 at the peak)"),
+    "yield_acceleration": _cf("m s-2", "yield acceleration"),
+    "limiting_acceleration": _cf("m s-2", "limiting acceleration (Eq. 7)"),
+    "acceleration_ratio": _cf("1", "peak ground over limiting acceleration"),
+    "minimum_friction": _cf("1", "minimum friction coefficient (Eq. 9)"),
+    "delta_mu": _cf("1", "friction above static (Eqs. 10, 11)"),
+    "decay_rate": _cf("1", "friction decay with loading rate (Eq. 6 at the peak)"),
     # where the displacement amplitude and the frequency span a grid; elsewhere it is a coordinate
     "amplitude": PARAMETERS["amplitude"],
 }
@@ -254,47 +236,45 @@ TOLERABLE_DISPLACEMENT: dict[str, Any] = {"units": "m", "long_name": "tolerable 
 
 #: Results of `limit_amplitude`; sliding mode and validity go with them.
 LIMIT_RESULTS: dict[str, dict[str, Any]] = {
-    "limit_amplitude": _described(
+    "limit_amplitude": _cf(
         "m s-2", "smallest peak ground acceleration that reaches the tolerable displacement", "limit_status"
     ),
     "limit_status": _coded("how the limit amplitude was found", LimitStatus),
-    "permanent_displacement": _described("m", "permanent displacement, downslope, at the limit amplitude", "validity"),
+    "permanent_displacement": _cf("m", "permanent displacement, downslope, at the limit amplitude", "validity"),
 }
 
 #: Results of a record, further to the displacement, the velocity and the validity: -1 where there is no value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
-    "number_of_slips": _described("1", "number of slips that begin at rest", "validity"),
-    "stick_slip_pulses": _described("1", "number of pulses in stick-slip mode", "validity"),
-    "continuous_pulses": _described("1", "number of pulses in continuous mode", "validity"),
+    "number_of_slips": _cf("1", "number of slips that begin at rest", "validity"),
+    "stick_slip_pulses": _cf("1", "number of pulses in stick-slip mode", "validity"),
+    "continuous_pulses": _cf("1", "number of pulses in continuous mode", "validity"),
 }
 
 #: Results of a sweep under a record.
 RECORD_RESULTS: dict[str, dict[str, Any]] = {
-    "permanent_displacement": RESULTS["permanent_displacement"],
-    "peak_relative_velocity": RESULTS["peak_relative_velocity"],
+    **{name: RESULTS[name] for name in ("permanent_displacement", "peak_relative_velocity")},
     **RECORD_COUNTS,
-    "validity": RESULTS["validity"],
-    "newmark_displacement": RESULTS["newmark_displacement"],
-    "motion_factor": _described("1", "factor on the recorded acceleration"),
+    **{name: RESULTS[name] for name in ("validity", "newmark_displacement")},
+    "motion_factor": _cf("1", "factor on the recorded acceleration"),
 }
 
 #: Intensity measures of a motion as it was recorded (`slipsweep.motion.intensity`).
 INTENSITY_MEASURES: dict[str, dict[str, Any]] = {
-    "pga": _described("m s-2", "peak ground acceleration as recorded"),
-    "pgv": _described("m s-1", "peak ground velocity as recorded"),
-    "pgd": _described("m", "peak ground displacement as recorded"),
-    "arias_intensity": _described("m s-1", "Arias intensity as recorded"),
-    "cav": _described("m s-1", "cumulative absolute velocity as recorded"),
-    "significant_duration": _described("s", "significant duration, 5 to 95 % of the Arias intensity"),
-    "mean_period": _described("s", "mean period, 0.25 to 20 Hz"),
+    "pga": _cf("m s-2", "peak ground acceleration as recorded"),
+    "pgv": _cf("m s-1", "peak ground velocity as recorded"),
+    "pgd": _cf("m", "peak ground displacement as recorded"),
+    "arias_intensity": _cf("m s-1", "Arias intensity as recorded"),
+    "cav": _cf("m s-1", "cumulative absolute velocity as recorded"),
+    "significant_duration": _cf("s", "significant duration, 5 to 95 % of the Arias intensity"),
+    "mean_period": _cf("s", "mean period, 0.25 to 20 Hz"),
 }
 
 #: Further coordinates of a suite along `motion`.
 MOTION_COORDINATES: dict[str, dict[str, Any]] = {
     "motion_file": {"long_name": "file of the motion"},
     "motion_sha256": {"long_name": "SHA-256 of the file of the motion"},
-    "motion_samples": _described("1", "samples of the motion"),
-    "motion_interval": _described("s", "mean sampling interval of the motion"),
+    "motion_samples": _cf("1", "samples of the motion"),
+    "motion_interval": _cf("s", "mean sampling interval of the motion"),
     **{f"motion_{name}": about for name, about in INTENSITY_MEASURES.items()},
 }
 
@@ -306,16 +286,16 @@ MOTION: dict[str, Any] = {"long_name": "recorded motion"}
 
 #: The record itself, in the files of results: what is read back to repeat a run.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {
-    "record_time": _described("s", "time of a sample of the record"),
-    "record_acceleration": _described(
+    "record_time": _cf("s", "time of a sample of the record"),
+    "record_acceleration": _cf(
         "m s-2", "recorded acceleration of the base, at scale and polarity 1", coordinates="record_time"
     ),
 }
 
 #: Coordinates of the statistics of `sample`, further to the parameters.
 STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
-    "quantile": _described("1", "share of the samples with a value that lies below"),
-    "threshold": _described("m", "displacement to exceed"),
+    "quantile": _cf("1", "share of the samples with a value that lies below"),
+    "threshold": _cf("m", "displacement to exceed"),
     "mode": {"units": "1", **_coded("sliding mode", SlidingMode)},
     "flag": {
         "units": "1",
@@ -324,39 +304,37 @@ STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
         "flag_meanings": RESULTS["validity"]["flag_meanings"],
     },
     "input": {"long_name": "uncertain input; inputs that are correlated are one, with + between them"},
-    "bound": _described("1", "probability below an end of an interval"),
+    "bound": _cf("1", "probability below an end of an interval"),
 }
 
 #: Statistics of `sample`.  Quantiles and mean are of the samples that have a value; probabilities also count the
 #: statically unstable samples, as exceeding every threshold.
 STATISTICS: dict[str, dict[str, Any]] = {
-    "displacement_quantile": _described("m", "quantile of the permanent displacement", "valueless_share"),
-    "mean_displacement": _described("m", "mean permanent displacement", "valueless_share"),
-    "exceedance_probability": _described(
+    "displacement_quantile": _cf("m", "quantile of the permanent displacement", "valueless_share"),
+    "mean_displacement": _cf("m", "mean permanent displacement", "valueless_share"),
+    "exceedance_probability": _cf(
         "1", "probability that the permanent displacement exceeds a threshold", "valueless_share"
     ),
-    "mode_share": _described("1", "share of the samples in a sliding mode"),
-    "flag_share": _described("1", "share of the samples with a flag"),
-    "valueless_share": _described("1", "share of the samples without a value"),
-    "first_order_index": _described("1", "first-order Sobol index of the permanent displacement", "sensitivity_status"),
-    "first_order_interval": _described("1", "95 % interval of the first-order Sobol index", "sensitivity_status"),
-    "total_index": _described("1", "total Sobol index of the permanent displacement", "sensitivity_status"),
-    "total_interval": _described("1", "95 % interval of the total Sobol index", "sensitivity_status"),
+    "mode_share": _cf("1", "share of the samples in a sliding mode"),
+    "flag_share": _cf("1", "share of the samples with a flag"),
+    "valueless_share": _cf("1", "share of the samples without a value"),
+    "first_order_index": _cf("1", "first-order Sobol index of the permanent displacement", "sensitivity_status"),
+    "first_order_interval": _cf("1", "95 % interval of the first-order Sobol index", "sensitivity_status"),
+    "total_index": _cf("1", "total Sobol index of the permanent displacement", "sensitivity_status"),
+    "total_interval": _cf("1", "95 % interval of the total Sobol index", "sensitivity_status"),
     "sensitivity_status": _coded("whether there are Sobol indices, or why there are none", SensitivityStatus),
 }
 
 #: Statistics over the motions of a suite; all but counts and shares are of the motions that have a value.
 SUITE_STATISTICS: dict[str, dict[str, Any]] = {
-    "value_count": _described("1", "number of motions with a value"),
-    "valueless_count": _described("1", "number of motions without a value"),
-    "valueless_flag_count": _described("1", "number of motions without a value that have a flag"),
-    "valueless_share": _described("1", "share of the motions without a value"),
-    "zero_probability": _described("1", "probability of zero permanent displacement", "valueless_share"),
-    "nonzero_median": _described("m", "median of the non-zero permanent displacements", "valueless_share"),
-    "nonzero_geometric_mean": _described(
-        "m", "geometric mean of the non-zero permanent displacements", "valueless_share"
-    ),
-    "log_standard_deviation": _described(
+    "value_count": _cf("1", "number of motions with a value"),
+    "valueless_count": _cf("1", "number of motions without a value"),
+    "valueless_flag_count": _cf("1", "number of motions without a value that have a flag"),
+    "valueless_share": _cf("1", "share of the motions without a value"),
+    "zero_probability": _cf("1", "probability of zero permanent displacement", "valueless_share"),
+    "nonzero_median": _cf("m", "median of the non-zero permanent displacements", "valueless_share"),
+    "nonzero_geometric_mean": _cf("m", "geometric mean of the non-zero permanent displacements", "valueless_share"),
+    "log_standard_deviation": _cf(
         "1", "standard deviation of ln u of the non-zero permanent displacements u", "valueless_share"
     ),
     "displacement_quantile": STATISTICS["displacement_quantile"],
@@ -365,14 +343,14 @@ SUITE_STATISTICS: dict[str, dict[str, Any]] = {
 
 #: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the grid's amplitudes.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
-    "annual_rate": _described(
+    "annual_rate": _cf(
         "year-1", "mean annual rate of exceeding a permanent displacement", "held_rate omitted_rate valueless_share"
     ),
-    "held_rate": _described("year-1", "part of it above the largest amplitude, where the probability is held constant"),
-    "omitted_rate": _described(
+    "held_rate": _cf("year-1", "part of it above the largest amplitude, where the probability is held constant"),
+    "omitted_rate": _cf(
         "year-1", "upper bound of the part below the smallest amplitude, where the probability is taken as 0"
     ),
-    "valueless_share": _described("1", "largest share of the motions without a value at any amplitude"),
+    "valueless_share": _cf("1", "largest share of the motions without a value at any amplitude"),
 }
 
 #: dtype of each result; everything else is float64.
@@ -397,18 +375,18 @@ FRICTION_PARAMETERS = (
 
 #: Variables of a time history.
 HISTORY: dict[str, dict[str, Any]] = {
-    "ground_acceleration": _described("m s-2", "acceleration of the base"),
-    "block_acceleration": _described("m s-2", "acceleration of the block"),
-    "friction_coefficient": _described("1", "instantaneous friction coefficient"),
-    "relative_velocity": _described("m s-1", "relative velocity of the block"),
-    "relative_displacement": _described("m", "relative displacement of the block", comment=_DIRECTION),
+    "ground_acceleration": _cf("m s-2", "acceleration of the base"),
+    "block_acceleration": _cf("m s-2", "acceleration of the block"),
+    "friction_coefficient": _cf("1", "instantaneous friction coefficient"),
+    "relative_velocity": _cf("m s-1", "relative velocity of the block"),
+    "relative_displacement": _cf("m", "relative displacement of the block", comment=_DIRECTION),
 }
 
 #: The positive half waves of the record that a time history is of, along `half_wave`.
 HALF_WAVES: dict[str, dict[str, Any]] = {
-    "half_wave_start": _described("s", "time at which the acceleration of the base rises through zero"),
-    "half_wave_end": _described("s", "time at which it falls through zero"),
-    "half_wave_peak": _described("m s-2", "largest acceleration of the base between"),
+    "half_wave_start": _cf("s", "time at which the acceleration of the base rises through zero"),
+    "half_wave_end": _cf("s", "time at which it falls through zero"),
+    "half_wave_peak": _cf("m s-2", "largest acceleration of the base between"),
     "half_wave_mode": _coded(
         "sliding mode that the peak decides; stuck where it does not exceed the yield acceleration", SlidingMode
     ),
@@ -416,32 +394,32 @@ HALF_WAVES: dict[str, dict[str, Any]] = {
 
 #: What Eq. 1 makes of a test on a shaking table, along time.
 MEASURED_FRICTION: dict[str, dict[str, Any]] = {
-    "friction_coefficient": _described("1", "friction coefficient by Eq. 1"),
-    "friction_ratio": _described("1", "friction coefficient by Eq. 1 over the static one"),
-    "free_body_friction": _described("1", "friction coefficient by statics; at rest the mobilised one"),
+    "friction_coefficient": _cf("1", "friction coefficient by Eq. 1"),
+    "friction_ratio": _cf("1", "friction coefficient by Eq. 1 over the static one"),
+    "free_body_friction": _cf("1", "friction coefficient by statics; at rest the mobilised one"),
 }
 
 #: The slides that a test shows.
 SLIDES: dict[str, dict[str, Any]] = {
-    "slide_onset": _described("s", "time at which a slide begins"),
-    "slide_peak": _described("s", "time of the largest table acceleration within a slide"),
-    "slide_stop": _described("s", "time at which a slide stops; missing where the record ends before"),
-    "onset_acceleration": _described("m s-2", "acceleration of the table where a slide begins"),
-    "peak_acceleration": _described("m s-2", "largest acceleration of the table within a slide"),
-    "peak_block_acceleration": _described("m s-2", "largest acceleration of the block within a slide"),
-    "least_friction": _described("1", "least friction coefficient by Eq. 1 within a slide"),
-    "slide_free_body_friction": _described("1", "median friction coefficient by statics within a slide"),
+    "slide_onset": _cf("s", "time at which a slide begins"),
+    "slide_peak": _cf("s", "time of the largest table acceleration within a slide"),
+    "slide_stop": _cf("s", "time at which a slide stops; missing where the record ends before"),
+    "onset_acceleration": _cf("m s-2", "acceleration of the table where a slide begins"),
+    "peak_acceleration": _cf("m s-2", "largest acceleration of the table within a slide"),
+    "peak_block_acceleration": _cf("m s-2", "largest acceleration of the block within a slide"),
+    "least_friction": _cf("1", "least friction coefficient by Eq. 1 within a slide"),
+    "slide_free_body_friction": _cf("1", "median friction coefficient by statics within a slide"),
 }
 
 #: Results of `calibrate` that have no other name here.
 CALIBRATION: dict[str, dict[str, Any]] = {
-    "correlation": _described("1", "correlation of two parameters as estimated"),
-    "cycle_start": _described("s", "time at which a cycle begins"),
-    "cycle_peak_acceleration": _described("m s-2", "largest acceleration of the table in a cycle"),
+    "correlation": _cf("1", "correlation of two parameters as estimated"),
+    "cycle_start": _cf("s", "time at which a cycle begins"),
+    "cycle_peak_acceleration": _cf("m s-2", "largest acceleration of the table in a cycle"),
     "cycle_sliding_mode": _coded("sliding mode of a cycle", SlidingMode),
-    "cycle_attenuation_coefficient": _described("1", "attenuation coefficient Kd of a cycle (Eq. 12)"),
+    "cycle_attenuation_coefficient": _cf("1", "attenuation coefficient Kd of a cycle (Eq. 12)"),
     **{
-        f"cycle_{name}{suffix}": _described(
+        f"cycle_{name}{suffix}": _cf(
             PARAMETERS[name]["units"], f"{what}{PARAMETERS[name]['long_name']} from a cycle alone"
         )
         for name in ("yield_acceleration", "decay_rate", "delta_mu")

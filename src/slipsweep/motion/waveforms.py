@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: Largest multiple of a harmonic, and longest ramp in cycles (each of its cycles has pieces of its own).
+#: Largest multiple of a harmonic.
 MOST_MULTIPLE = 100
-MOST_RAMP = 100
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,8 @@ class Waveform(Choice):
     """
 
     cycles: int = option("cycles of shaking", 10, least=1, most=MOST_CYCLES)
-    ramp_in: float = option("cycles over which the shaking grows", 0.0, least=0.0, most=MOST_RAMP)
-    ramp_out: float = option("cycles over which the shaking decreases", 0.0, least=0.0, most=MOST_RAMP)
+    ramp_in: float = option("cycles over which the shaking grows", 0.0)
+    ramp_out: float = option("cycles over which the shaking decreases", 0.0)
 
     def check(self) -> None:
         """Refuse ramps longer than the shaking."""

@@ -5,10 +5,9 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import shown
-from slipsweep.model.variables import FLAG_KINDS, VALIDITY_TEXT, FlagKind
+from slipsweep.model.variables import FlagKind, Validity
 
-_TEXT = {(flag.name or "").lower(): text for flag, text in VALIDITY_TEXT.items()}
-_KINDS = {(flag.name or "").lower(): kind for flag, kind in FLAG_KINDS.items()}
+_KNOWN = {(flag.name or "").lower(): flag for flag in Validity}
 _ORDER = list(FlagKind)
 
 
@@ -69,16 +68,15 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     if mask.dtype.kind not in "iu":
         raise InputError(f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)")
     # a flag of no kind, of another program's file, goes last
-    ordered = sorted(
-        zip(names, bits, strict=True), key=lambda one: _ORDER.index(_KINDS[one[0]]) if one[0] in _KINDS else len(_ORDER)
-    )
+    order = {name: _ORDER.index(_KNOWN[name].kind) if name in _KNOWN else len(_ORDER) for name in names}
+    ordered = sorted(zip(names, bits, strict=True), key=lambda one: order[one[0]])
     return xr.Dataset({name: _flag(mask, bit, name) for name, bit in ordered}, coords=data.coords)
 
 
 def _flag(mask: xr.Variable, bit: int, name: str) -> xr.Variable:
     # the bit in the type of the mask: a wider one would widen all cells with it
     values = (mask & mask.dtype.type(bit)) != 0
-    values.attrs = {"long_name": _TEXT.get(name, name.replace("_", " "))}
-    if name in _KINDS:
-        values.attrs["kind"] = str(_KINDS[name])
+    values.attrs = {"long_name": name.replace("_", " ")}
+    if name in _KNOWN:
+        values.attrs = {"long_name": _KNOWN[name].text, "kind": str(_KNOWN[name].kind)}
     return values

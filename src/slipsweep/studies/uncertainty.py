@@ -24,8 +24,7 @@ from slipsweep.grid.plans import aligned, check_dimensions, cost_of, grid_sizes,
 from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory, grid_text
 from slipsweep.grid.tally import Indices, Tally
-from slipsweep.model.estimates import friction_inputs
-from slipsweep.model.options import MODELS, Model, Newmark
+from slipsweep.model.options import MODELS, Model, Newmark, friction_inputs
 from slipsweep.model.parameters import BOUNDS, check_progress, shown
 from slipsweep.model.variables import (
     DRAWN,
