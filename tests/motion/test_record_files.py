@@ -95,7 +95,7 @@ def test_baseline() -> None:
         ("a.csv", "t,a (g)\n0,1\n1,2\n", {"units": "gal"}, "the file itself says 'g'"),
         ("a.csv", "0,1\n1,x\n", {"units": "g"}, "line 2: '1,x'"),
         ("a.csv", "0,1\n1,\n", {"units": "g"}, "first at t = 1 s"),
-        ("a.csv", "0,1\n1,1\n1,2\n", {"units": "g"}, "line 3: time 1: must be greater than 1"),
+        ("a.csv", "0,1\n1,1\n1,2\n", {"units": "g"}, "time of sample 3 = 1: must be greater than 1"),
         ("a.csv", "0,1\n1,2,3\n", {"units": "g"}, "line 2"),
         ("a.csv", "no numbers\n", {"units": "g"}, "no line of a time and an acceleration"),
         ("a.csv", "0,1\n1,2\n", {"units": "g", "channel": 1}, "channel = 1: only COSMOS files hold several"),

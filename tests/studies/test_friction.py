@@ -158,7 +158,7 @@ ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no line of names"),
+        ("", "no column time: must name its columns"),
         (ROWS, "no column time"),
         (HEAD.replace(" (m/s2),", ","), r"'table acceleration': must give its unit in brackets"),
         (HEAD.replace("(m/s2),", "(mm),") + ROWS, r"must be a unit that converts to m s-2"),
@@ -167,7 +167,7 @@ ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
         (HEAD + "0,1,one\n", "line 2: block_acceleration = 'one': must be a number"),
         (HEAD + "0,,1\n", "line 2: ground_acceleration = '': must be a number"),
         (HEAD + "0,1,1\n", "1 samples: must be at least 16"),
-        (HEAD.replace("block", "table") + ROWS, "2 columns are ground_acceleration: must be one"),
+        (HEAD.replace("block", "table") + ROWS, "two columns are ground_acceleration: must be one"),
         (HEAD.replace(",block acceleration", ",temperature") + ROWS, "block_acceleration: missing: Eq. 1 needs"),
     ],
 )

@@ -199,7 +199,7 @@ def test_a_file_of_openquake(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "has no line of names"),
+        ("", "no column PGA: must name its columns, such as PGA (g)"),
         ("PGA (mm), annual rate\n1,2\n", 'unit = "mm": must be a unit that converts to m s-2'),
         ("PGA (g), annual probability\n1,2\n", "must be an annual rate, -ln(1 - p)"),
         ("PGA (g), PGA (m/s2), annual rate\n1,2,3\n", "line 1: two columns are PGA: must be one"),

@@ -1,73 +1,76 @@
 """Files of columns that have names and units in their first line: tests on a shaking table, hazard curves."""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import shown
 
 
-@dataclass(frozen=True)
-class Columns:
-    """What such a file holds.
+def read_columns(
+    path: Path,
+    lines: Sequence[str],
+    holds: Callable[[str, set[str], str], tuple[str, float] | None],
+    needed: Sequence[str],
+    example: str,
+    may_be_blank: Collection[str] = (),
+) -> dict[str, NDArray[np.float64]]:
+    """Columns of numbers, by what they hold and in its unit.
 
-    Attributes
+    The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
+    or commas: the first of these that is in it.  Commas that do not separate are decimal.
+
+    Parameters
     ----------
     path : Path
-    number : int
-        Of the line of names.
-    names : list of str
-    body : list of (int, str)
-        The other lines and their numbers.
-    separator : str
-    """
-
-    path: Path
-    number: int
-    names: list[str]
-    body: list[tuple[int, str]]
-    separator: str
-
-    def rows(self) -> Iterator[tuple[int, list[str]]]:
-        """The number and the cells of each line (InputError: not as many as there are names)."""
-        for number, line in self.body:
-            cells = [cell.strip() for cell in line.split(self.separator)]
-            if len(cells) != len(self.names):
-                raise InputError(
-                    f"{self.path}: line {number}: {len(cells)} cells, where {len(self.names)} columns are named"
-                )
-            yield number, cells
-
-    def value(self, number: int, cell: str, what: str) -> float:
-        """A cell of a line as a number, with a decimal point or comma (InputError: it is none)."""
-        try:
-            return float(cell if self.separator == "," else cell.replace(",", "."))
-        except ValueError:
-            raise InputError(f"{self.path}: line {number}: {what} = {shown(cell)}: must be a number") from None
-
-
-def columns_of(path: Path, lines: Sequence[str], without: str) -> Columns:
-    """Take lines apart: the first that is not blank and does not begin with ``#`` names the columns.
-
-    Separators are tabs, semicolons or commas: the first of these that is in the line of names.
+        What the file is called in errors.
+    lines : sequence of str
+    holds : callable
+        ``holds(name, words, unit)``: what the column of a name holds, from its words and the unit in brackets behind
+        them, and the factor to its unit; None where the column is left out.
+    needed : sequence of str
+        What there must be.
+    example : str
+        A line of names, for errors.
+    may_be_blank : collection of str
+        What may have blank cells, NaN then.
 
     Raises
     ------
     InputError
-        There is no line of names: `without` says so.
+        A column is missing or there twice, or a cell holds no number: with the number of the line.
     """
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    if not rows:
-        raise InputError(f"{path}: {without}")
-    (number, header), *body = rows
+    number, header = rows[0] if rows else (1, "")
     separator = next((one for one in ("\t", ";", ",") if one in header), ",")
-    return Columns(path, number, [cell.strip() for cell in header.split(separator)], body, separator)
+    names = [cell.strip() for cell in header.split(separator)]
+    columns: dict[str, tuple[int, float]] = {}
+    for at, name in enumerate(names):
+        matched = re.fullmatch(r"(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*", name.strip('"'))
+        text, unit = (matched[1], matched[2]) if matched else (name.strip('"'), "")
+        found = holds(name, {*re.split(r"[\s_\-]+", text.lower())}, unit)
+        if found is not None and found[0] in columns:
+            raise InputError(f"{path}: line {number}: two columns are {found[0]}: must be one")
+        if found is not None:
+            columns[found[0]] = at, found[1]
+    for what in needed:
+        if what not in columns:
+            raise InputError(f"{path}: line {number}: no column {what}: must name its columns, such as {example}")
 
-
-def words_and_unit(name: str) -> tuple[set[str], str]:
-    """The words of a column's name, and the unit in brackets behind them, if there is one."""
-    matched = re.fullmatch(r"(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*", name.strip('"'))
-    text, unit = (matched[1], matched[2]) if matched else (name.strip('"'), "")
-    return {*re.split(r"[\s_\-]+", text.lower())}, unit
+    values = {what: np.full(len(rows) - 1, np.nan) for what in columns}
+    for row, (number, line) in enumerate(rows[1:]):
+        cells = [cell.strip() for cell in line.split(separator)]
+        if len(cells) != len(names):
+            raise InputError(f"{path}: line {number}: {len(cells)} cells, where {len(names)} columns are named")
+        for what, (at, factor) in columns.items():
+            cell = cells[at] if separator == "," else cells[at].replace(",", ".")
+            try:
+                if cell or what not in may_be_blank:
+                    values[what][row] = factor * float(cell)
+            except ValueError:
+                raise InputError(f"{path}: line {number}: {what} = {shown(cell)}: must be a number") from None
+    return values

@@ -27,16 +27,11 @@ from slipsweep.motion.reading import UNITS, Reading
 
 Floats = NDArray[np.float64]
 
-#: A day of acceleration at 100 samples a second; what is larger is no record.
-MOST_BYTES = 200_000_000
-
-#: Codes of units in COSMOS files that are accelerations (Table 2 of the format).
-_COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
-
 #: Other spellings of units in headers.
 _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_COUNT = r"(\d{1,9})"
 
 
 class Samples(NamedTuple):
@@ -47,17 +42,14 @@ class Samples(NamedTuple):
     unit: str | None
 
 
-def read_lines(path: Path, what: str) -> tuple[bytes, list[str]]:
-    """The content of a file that is to hold a record or a test, and its lines."""
+def read_lines(path: Path) -> tuple[bytes, list[str]]:
+    """The content of a file, and its lines (InputError: it cannot be read)."""
     try:
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
+        content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a name that no system has
         raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
-    if len(content) > MOST_BYTES:
-        raise InputError(f"{path}: more than {MOST_BYTES} bytes: a {what} must have that many at most")
     # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
     return content, content.decode("utf-8-sig", errors="replace").splitlines()
 
@@ -69,12 +61,8 @@ def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, S
         raise InputError(f"{path}: channel = {reading.channel}: only COSMOS files hold several; this one is {kind}")
     if kind != "values" and reading.interval is not None:
         raise InputError(f"{path}: interval = {reading.interval:g}: only for a file without times; this one is {kind}")
-    if kind == "cosmos":
-        return kind, _read_cosmos(path, lines, reading.channel)
-    if kind == "values":
-        return kind, _read_values(path, lines, reading.interval)
-    readers = {"csv": _read_csv, "at2": _read_at2, "esm": _read_esm, "knet": _read_knet}
-    return kind, readers[kind](path, lines)
+    read = {"csv": _csv, "values": _values, "at2": _at2, "esm": _esm, "knet": _knet, "cosmos": _cosmos}[kind]
+    return kind, read(path, lines, reading)
 
 
 def _format_of(lines: list[str], reading: Reading) -> str:
@@ -88,14 +76,14 @@ def _format_of(lines: list[str], reading: Reading) -> str:
     if lines and lines[0].startswith("Origin Time"):
         return "knet"
     header, body = _header(lines)
-    alone = bool(body) and len(_cells(body[0][1])) == 1
-    return "values" if alone or reading.interval is not None or _interval_in(header) else "csv"
+    has_times = not body or len(_cells(body[0][1])) > 1
+    return "csv" if has_times and reading.interval is None and not _interval_in(header) else "values"
 
 
 # ------------------------------------------------------------------------------------- columns
 
 
-def _read_csv(path: Path, lines: list[str]) -> Samples:
+def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     if not body:
         raise InputError(f"{path}: no line of a time and an acceleration")
@@ -105,29 +93,20 @@ def _read_csv(path: Path, lines: list[str]) -> Samples:
         return [time, value or "nan"]
 
     times, values = _numbers(path, body, two, "a time and an acceleration").reshape(-1, 2).T
-    for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
-        raise InputError(
-            f"{path}: line {body[at + 1][0]}: time {times[at + 1]:.15g}: must be greater than {times[at]:.15g}, "
-            "the time before it"
-        )
     return Samples(times, values, _unit_in(header))
 
 
-def _read_values(path: Path, lines: list[str], interval: float | None) -> Samples:
+def _values(path: Path, lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     own = _interval_in(header)
-    if interval is not None and own is not None and interval != own:
-        raise InputError(f"{path}: interval = {interval:g}: the file itself says {own:g}; leave interval out")
-    step = interval or own
+    step = reading.interval or own
     if step is None:
         raise InputError(f"{path}: interval: must be given, s: the file has accelerations alone, without times")
+    if own and step != own:
+        raise InputError(f"{path}: interval = {step:g}: the file itself says {own:g}; leave interval out")
     # commas are decimal where no number has a point and none has two of them, as 0,123 has
-    is_decimal = not any("." in line or re.search(r",[^\s,]*,", line) for _, line in body)
-
-    def values(line: str) -> list[str]:
-        return (line.replace(",", ".") if is_decimal else line.replace(",", " ")).replace(";", " ").split()
-
-    found = _numbers(path, body, values)
+    comma = " " if any("." in line or re.search(r",[^\s,]*,", line) for _, line in body) else "."
+    found = _numbers(path, body, lambda line: line.replace(",", comma).replace(";", " ").split())
     if found.size == 2 * len(body) and (np.diff(found[::2]) > 0.0).all() and len(body) > 1:
         raise InputError(f"{path}: interval = {step:g}: the first of two columns is that of times; leave interval out")
     return Samples(_even(path, found, step), found, _unit_in(header))
@@ -135,13 +114,12 @@ def _read_values(path: Path, lines: list[str], interval: float | None) -> Sample
 
 def _header(lines: list[str]) -> tuple[str, list[tuple[int, str]]]:
     """The text before the numbers, and the numbered lines from the first that begins with one; no comments."""
-    for at, line in enumerate(lines):
-        if any(re.fullmatch(_NUMBER, cell) for cell in _cells(line)[:1]):
-            numbered = enumerate(lines[at:], at + 1)
-            return "\n".join(lines[:at]), [
-                (number, one) for number, one in numbered if one.strip() and not one.startswith("#")
-            ]
-    return "\n".join(lines), []
+    numbered = enumerate(lines, 1)
+    first = next((at for at, line in numbered if any(re.fullmatch(_NUMBER, cell) for cell in _cells(line)[:1])), None)
+    if first is None:
+        return "\n".join(lines), []
+    rows = [(first, lines[first - 1]), *numbered]
+    return "\n".join(lines[: first - 1]), [row for row in rows if row[1].strip() and not row[1].startswith("#")]
 
 
 def _cells(line: str) -> list[str]:
@@ -167,94 +145,93 @@ def _unit_in(header: str) -> str | None:
 
 def _interval_in(header: str) -> float | None:
     """The sampling interval that a header gives: ``dt = 0.01``."""
-    found = re.search(rf"\b(?:dt|interval)\s*[=:]\s*({_NUMBER})", header, re.IGNORECASE)
+    found = re.search(rf"\b(?:dt|interval)\s*[=:]\s*{_NUMBER}", header, re.IGNORECASE)
     return float(found[1]) if found else None
 
 
 # -------------------------------------------------------------------- one header, then accelerations
 
 
-def _read_at2(path: Path, lines: list[str]) -> Samples:
+def _at2(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), 0)
-    header = "\n".join(lines[:at]).upper()
-    if "VELOCITY" in header or "DISPLACEMENT" in header:
+    if re.search("VELOCITY|DISPLACEMENT", "\n".join(lines[:at]), re.IGNORECASE):
         raise InputError(f"{path}: its header speaks of velocity or displacement: must be an acceleration (.AT2)")
+    line = lines[at] if lines else ""
     # in files of the first database "4096  0.0100  NPTS, DT"
-    before = re.match(rf"\s*(\d{{1,9}})\s+({_NUMBER})\s+NPTS,\s*DT", lines[at] if lines else "", re.IGNORECASE)
-    points, interval = (
-        before.groups()
-        if before
-        else (
-            _in_header(path, lines[at : at + 1], name, pattern)[0]
-            for name, pattern in (("NPTS=", r"NPTS\s*=\s*(\d{1,9})\b"), ("DT=", rf"DT\s*=\s*({_NUMBER})"))
-        )
-    )
+    old = re.match(rf"\s*{_COUNT}\s+{_NUMBER}\s+NPTS,\s*DT", line, re.IGNORECASE)
+    points = old[1] if old else _in_header(path, line, "NPTS=", rf"NPTS\s*=\s*{_COUNT}\b")
+    interval = old[2] if old else _in_header(path, line, "DT=", rf"DT\s*=\s*{_NUMBER}")
     values = _numbers(path, enumerate(lines[at + 1 :], at + 2))
     return Samples(_even(path, values, float(interval), int(points)), values, "g")
 
 
-def _read_esm(path: Path, lines: list[str]) -> Samples:
-    body = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
+def _esm(path: Path, lines: list[str], reading: Reading) -> Samples:
+    at = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
     interval, points, unit = (
-        _in_header(path, lines[:body], name, rf"^{name}:\s*({pattern})\s*$")[0]
-        for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", r"\d{1,9}"), ("UNITS", r"\S+"))
+        _in_header(path, "\n".join(lines[:at]), name, rf"^{name}:\s*{pattern}\s*$")
+        for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", _COUNT), ("UNITS", r"(\S+)"))
     )
     unit = unit.lower().replace("^", "")
     if unit not in UNITS:
         raise InputError(f"{path}: UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
-    values = _numbers(path, enumerate(lines[body:], body + 1))
+    values = _numbers(path, enumerate(lines[at:], at + 1))
     return Samples(_even(path, values, float(interval), int(points)), values, unit)
 
 
-def _read_knet(path: Path, lines: list[str]) -> Samples:
-    memo = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
+def _knet(path: Path, lines: list[str], reading: Reading) -> Samples:
+    at = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
     frequency, duration, full_scale, counts = (
-        float(number)
+        float(_in_header(path, "\n".join(lines[:at]), name, rf"^{re.escape(name)}{pattern}"))
         for name, pattern in (
-            ("Sampling Freq(Hz)", rf"^Sampling Freq\(Hz\)\s*({_NUMBER})"),
-            ("Duration Time(s)", rf"^Duration Time\(s\)\s*({_NUMBER})"),
-            ("Scale Factor", rf"^Scale Factor\s*({_NUMBER})\(gal\)/({_NUMBER})"),
+            ("Sampling Freq(Hz)", rf"\s*{_NUMBER}"),
+            ("Duration Time(s)", rf"\s*{_NUMBER}"),
+            ("Scale Factor", rf"\s*{_NUMBER}\(gal\)/"),
+            ("Scale Factor", rf".*\(gal\)/{_NUMBER}"),
         )
-        for number in _in_header(path, lines[:memo], name, pattern)
     )
     if not (0.0 < frequency < 1e6 and 0.0 < counts < 1e100 and 0.0 < full_scale < 1e100):
         raise InputError(f"{path}: {frequency:g} Hz, {full_scale:g} gal, {counts:g} counts: must be > 0")
-    values = _numbers(path, enumerate(lines[memo + 1 :], memo + 2)) * (full_scale / counts)
+    values = _numbers(path, enumerate(lines[at + 1 :], at + 2)) * (full_scale / counts)
     return Samples(_even(path, values, 1.0 / frequency, round(min(duration * frequency, 1e9))), values, "gal")
 
 
-def _in_header(path: Path, header: list[str], name: str, pattern: str) -> tuple[str, ...]:
+def _in_header(path: Path, header: str, name: str, pattern: str) -> str:
     """What a pattern finds in a header (InputError: nothing)."""
-    found = re.search(pattern, "\n".join(header), re.MULTILINE | re.IGNORECASE | re.ASCII)
+    found = re.search(pattern, header, re.MULTILINE | re.IGNORECASE | re.ASCII)
     if found is None:
         raise InputError(f"{path}: no {name} in its header, or none that can be read: another format, or damaged")
-    return found.groups()
+    return found[1]
 
 
 # ----------------------------------------------------------------------------------- COSMOS
 
+#: Codes of units that are accelerations (Table 2 of the format).
+_COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
+
 _COSMOS_HEAD = re.compile(r"\(Format v\s*[\d.]+ with\s+(\d{1,4})\s+text lines\)", re.IGNORECASE)
-# of each section's first line: how many numbers (or lines) follow, and how many columns each of them has
-_COSMOS_HEADER = r"\s*(\d{1,9})\s+%s-header values follow on\s+\d+\s+lines\s*,\s*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
-_COSMOS_COMMENTS = r"\s*(\d{1,9})\s+Comment line"
-_COSMOS_DATA = r"\s*(\d{1,9})\s+\w+.*?\bpts?\b.*Format\s*=?\s*\(\d*[IFEG](\d{1,3})"
+# of each section's first line: how many numbers (or lines) follow, how many to a line, and columns of each of them
+_FORMAT = r".*Format\s*=?\s*\((\d{0,3})[IFEG](\d{1,3})"
+_COSMOS_HEADER = rf"\s*{_COUNT}\s+%s-header values follow on\s+\d+\s+lines\s*,{_FORMAT}"
+_COSMOS_COMMENTS = rf"\s*{_COUNT}\s+Comment line"
+_COSMOS_DATA = rf"\s*{_COUNT}\s+\w+.*?\bpts?\b{_FORMAT}"
 
 
-def _read_cosmos(path: Path, lines: list[str], channel: int | None) -> Samples:
+def _cosmos(path: Path, lines: list[str], reading: Reading) -> Samples:
     starts = [at for at, line in enumerate(lines) if _COSMOS_HEAD.search(line)]
     read = (_cosmos_channel(path, lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
     channels = [one for one in read if one is not None]
-    if channel is None and len(channels) > 1:
+    if reading.channel is None and len(channels) > 1:
         raise InputError(f"{path}: holds {len(channels)} channels of acceleration: give channel, from 1 on")
-    if not 1 <= (channel or 1) <= len(channels):
-        raise InputError(f"{path}: channel = {channel or 1}: it holds {len(channels)} channels of acceleration")
-    return channels[(channel or 1) - 1]
+    number = reading.channel or 1
+    if number > len(channels):
+        raise InputError(f"{path}: channel = {number}: it holds {len(channels)} channels of acceleration")
+    return channels[number - 1]
 
 
 def _cosmos_channel(path: Path, lines: list[str], start: int) -> Samples | None:
     """The channel that begins at a line and goes to the last one; None if it is no acceleration."""
-    head = _COSMOS_HEAD.search(lines[start])
-    at, whole = _cosmos_values(path, lines, start + int(head[1] if head else 0), _COSMOS_HEADER % "Integer")
+    at = start + int(_in_header(path, lines[start], "number of text lines", _COSMOS_HEAD.pattern))
+    at, whole = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Integer")
     at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
     if whole.size < 3 or reals.size < 62:
         raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
@@ -272,28 +249,26 @@ def _cosmos_channel(path: Path, lines: list[str], start: int) -> Samples | None:
 
 
 def _cosmos_line(path: Path, lines: list[str], at: int, pattern: str) -> re.Match[str]:
-    found = re.match(pattern, lines[at], re.IGNORECASE) if at < len(lines) else None
+    line = lines[at] if at < len(lines) else "the end of the file"
+    found = re.match(pattern, line, re.IGNORECASE)
     if found is None:
-        line = shown(lines[at]) if at < len(lines) else "the end of the file"
-        raise InputError(f"{path}: line {at + 1}: {line}: not what the COSMOS format has here: damaged?")
+        raise InputError(f"{path}: line {at + 1}: {shown(line)}: not what the COSMOS format has here: damaged?")
     return found
 
 
 def _cosmos_values(path: Path, lines: list[str], at: int, pattern: str) -> tuple[int, Floats]:
     """A section: a line that says how many values follow and in what columns, then these; and the line after it."""
     head = _cosmos_line(path, lines, at, pattern)
-    count, width = int(head[1]), max(int(head[2]), 1)
+    count, each, width = int(head[1]), int(head[2] or 1) or 1, int(head[3]) or 1
+    end = at + 1 + -(-count // each)
 
     def cells(line: str) -> list[str]:
         return [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
 
-    end, announced = at + 1, 0
-    while announced < count and end < len(lines) and not lines[end].lower().startswith("end-of-data"):
-        announced += len(cells(lines[end]))
-        end += 1
-    if announced != count:
-        raise InputError(f"{path}: line {end}: {announced} values, where {count} are announced")
-    return end, _numbers(path, enumerate(lines[at + 1 : end], at + 2), cells, f"numbers, {width} columns each")
+    values = _numbers(path, enumerate(lines[at + 1 : end], at + 2), cells, f"numbers, {width} columns each")
+    if values.size != count:
+        raise InputError(f"{path}: line {end}: {values.size} values, where {count} are announced")
+    return end, values
 
 
 # --------------------------------------------------------------------------------- all formats

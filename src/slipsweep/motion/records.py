@@ -57,19 +57,9 @@ class Record:
     attrs: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not isinstance(self.attrs, Mapping):
-            raise InputError(f"name = {shown(self.name)}, attrs = {shown(self.attrs)}: must be a text and a mapping")
-        name = self.name if self.name.isprintable() else repr(self.name)
-        times = check_numbers(f"{name}: times", self.times)
-        acceleration = check_numbers(f"{name}: acceleration", self.acceleration)
-        if times.ndim != 1 or times.shape != acceleration.shape:
-            raise InputError(
-                f"{name}: times {times.shape} and acceleration {acceleration.shape}: must be rows of equal length"
-            )
-        if times.size < 2:
-            raise InputError(f"{name}: {times.size} samples: must be at least 2")
-        check_finite_samples(name, "acceleration", acceleration)
-        check_increasing(name, times)
+        times = check_numbers(f"{self.name}: times", self.times)
+        acceleration = check_numbers(f"{self.name}: acceleration", self.acceleration)
+        check_samples(self.name, times, {"acceleration": acceleration}, least=2)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "acceleration", acceleration)
         object.__setattr__(self, "attrs", dict(self.attrs))
@@ -139,19 +129,18 @@ class Record:
         if np.asarray(data).dtype.kind in "iu":
             raise InputError(
                 f"{name or own}: its data are whole numbers, counts of a digitizer: must be accelerations, such as "
-                "trace.data * trace.stats.calib, or what trace.remove_response(output='ACC') leaves"
+                "what trace.remove_response(output='ACC') leaves"
             )
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         return _inspected(name or own, times, values, reading.units, reading, {"record_format": "obspy"})
 
-    def corrected(self, baseline: str) -> "Record":
+    def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
-        check_choice("baseline", baseline, ("none", "mean", "linear"))
+        degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
         shape = self.acceleration
         with np.errstate(all="ignore"):  # what is not finite then is refused
-            if baseline != "none":
-                degree = 0 if baseline == "mean" else 1
+            if degree is not None:
                 shape = shape - np.polynomial.Polynomial.fit(self.times, shape, degree)(self.times)
         return replace(self, acceleration=shape, attrs=self.attrs | {"baseline": baseline})
 
@@ -173,15 +162,15 @@ class Record:
         )
 
 
-def check_finite_samples(name: str, what: str, values: Floats) -> None:
-    """Refuse samples that are not finite, by their number."""
-    for at in np.flatnonzero(~np.isfinite(values))[:1]:
-        raise InputError(f"{name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
-
-
-def check_increasing(name: str, times: Floats) -> None:
-    """Refuse times of samples that do not increase."""
-    check_finite_samples(name, "time", times)
+def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least: int) -> None:
+    """Refuse fewer samples than `least`, columns of other lengths, numbers that are not finite, times that fall."""
+    for what, values in {"time": times, **columns}.items():
+        if values.ndim != 1 or values.shape != times.shape:
+            raise InputError(f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be rows")
+        for at in np.flatnonzero(~np.isfinite(values))[:1]:
+            raise InputError(f"{name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
+    if times.size < least:
+        raise InputError(f"{name}: {times.size} samples: must be at least {least}")
     for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
         raise InputError(
             f"{name}: time of sample {at + 2} = {times[at + 1]:.15g}: must be greater than {times[at]:.15g}, "
@@ -262,7 +251,7 @@ def read_record(
 
 def record_of(path: Path, reading: Reading) -> Record:
     """`read_record` of a file, as a `Reading` says."""
-    content, lines = read_lines(path, "record")
+    content, lines = read_lines(path)
     kind, samples = read_samples(path, lines, reading)
     if samples.unit and reading.units and UNITS[samples.unit] != UNITS[reading.units]:
         raise InputError(
@@ -273,13 +262,9 @@ def record_of(path: Path, reading: Reading) -> Record:
         raise InputError(
             f"{path}: units: must be given, one of {', '.join(map(repr, UNITS))}: the file does not name the unit"
         )
-    attrs = {
-        "record": path.name,
-        "record_format": kind,
-        "record_units": unit,
-        **({} if reading.channel is None else {"record_channel": str(reading.channel)}),
-        "record_sha256": hashlib.sha256(content).hexdigest(),
-    }
+    channel = {} if reading.channel is None else {"record_channel": str(reading.channel)}
+    attrs = {"record": path.name, "record_format": kind, "record_units": unit, **channel}
+    attrs["record_sha256"] = hashlib.sha256(content).hexdigest()
     return _inspected(str(path), samples.times, samples.values, unit, reading, attrs)
 
 

@@ -18,10 +18,10 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_choice, check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.columns import columns_of, words_and_unit
+from slipsweep.motion.columns import read_columns
 from slipsweep.motion.formats import read_lines
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
-from slipsweep.motion.records import check_finite_samples, check_increasing
+from slipsweep.motion.records import check_samples
 
 Floats = NDArray[np.float64]
 
@@ -78,17 +78,18 @@ class ShakingTest:
         if TABLE not in self.channels:
             raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
         times = check_numbers(f"{self.name}: time", self.times)
-        measured = [name for name in CHANNELS if name in self.channels]
-        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in measured}
+        kept = {
+            name: check_numbers(f"{self.name}: {name}", self.channels[name])
+            for name in CHANNELS
+            if name in self.channels
+        }
+        filled = {
+            name: values if name == TABLE else np.where(np.isnan(values), 0.0, values) for name, values in kept.items()
+        }
+        check_samples(self.name, times, filled, FEWEST_SAMPLES)
         for name, values in kept.items():
-            if times.ndim != 1 or values.shape != times.shape:
-                raise InputError(f"{self.name}: {name}: {values.shape} samples, where time has {times.shape}")
-            if np.isinf(values).any() or not np.isfinite(values).any():
-                raise InputError(f"{self.name}: {name}: must be finite numbers, or blank where there is no sample")
-        if times.size < FEWEST_SAMPLES:
-            raise InputError(f"{self.name}: {times.size} samples: must be at least {FEWEST_SAMPLES}")
-        check_increasing(self.name, times)
-        check_finite_samples(self.name, TABLE, kept[TABLE])
+            if np.isnan(values).all():
+                raise InputError(f"{self.name}: {name}: no sample")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "channels", kept)
 
@@ -181,43 +182,24 @@ def read_test(path: str | Path) -> ShakingTest:
         path = Path(path)
     except TypeError:
         raise InputError(f"test = {shown(path)}: must be the path of a file, a Dataset or a ShakingTest") from None
-    content, lines = read_lines(path, "test")
-    file = columns_of(path, lines, "has no line of names and no samples")
-    line = f"{path}: line {file.number}"
-    columns = {}
-    for at, cell in enumerate(file.names):
-        words, unit = words_and_unit(cell)
-        channel = "time" if words & {"time", "t"} else next((one for one in CHANNELS if _names(words, one)), None)
+
+    def channel_of(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
+        known = [one for one, (first, second) in _NAMES.items() if words & first and words & second]
+        channel = "time" if words & {"time", "t"} else known[0] if known else None
         if channel is None:
-            continue
-        if channel in columns:
-            raise InputError(f"{line}: 2 columns are {channel}: must be one")
+            return None
         if not unit:
-            raise InputError(f"{path}: column {shown(cell)}: must give its unit in brackets, such as (m/s2)")
-        columns[channel] = at, unit_factor(f"{path}: column {cell.strip()}: unit", channel, unit)
-    for channel, what in (("time", "time"), (TABLE, "table acceleration")):
-        if channel not in columns:
-            raise InputError(
-                f"{line}: no column {what}: must name its columns, such as time (s), table acceleration (m/s2), "
-                "block acceleration (m/s2)"
-            )
-    read: dict[str, list[float]] = {channel: [] for channel in columns}
-    for number, cells in file.rows():
-        for channel, (at, factor) in columns.items():
-            is_blank = cells[at] == "" and channel not in ("time", TABLE)
-            read[channel].append(np.nan if is_blank else factor * file.value(number, cells[at], channel))
-    values = {channel: np.array(column) for channel, column in read.items()}
+            raise InputError(f"{path}: column {shown(column)}: must give its unit in brackets, such as (m/s2)")
+        return channel, unit_factor(f"{path}: column {column}: unit", channel, unit)
+
+    content, lines = read_lines(path)
+    example = "time (s), table acceleration (m/s2), block acceleration (m/s2)"
+    values = read_columns(path, lines, channel_of, ("time", TABLE), example, may_be_blank=RESPONSES)
     attrs = {
         "test": path.name.encode(errors="backslashreplace").decode(),
         "test_sha256": hashlib.sha256(content).hexdigest(),
     }
     return ShakingTest(values.pop("time"), values, str(path), attrs)
-
-
-def _names(words: set[str], channel: str) -> bool:
-    """Whether the words of a column's name are those of a channel."""
-    first, second = _NAMES[channel]
-    return bool(words & first and words & second)
 
 
 def unit_factor(key: str, channel: str, unit: str) -> float:

@@ -1,12 +1,11 @@
 """Suites of recorded motions: read together, told apart by labels, of any length and sampling."""
 
 import glob
-import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import takewhile
+from itertools import chain, takewhile
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import check_list, check_single, shown
-from slipsweep.model.variables import INTENSITY_MEASURES, MOTION_COORDINATES
+from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.intensity import intensity_measures
 from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.records import Record, record_of
@@ -63,15 +62,11 @@ class Pair:
         for name in ("first", "second"):
             if not isinstance(getattr(self, name), Record):
                 raise InputError(f"{name} = {shown(getattr(self, name))}: must be a Record, one component of a motion")
-        one, other = self.first, self.second
-        count = min(one.times.size, other.times.size)
-        apart = np.abs(one.times[:count] - other.times[:count]).max()
-        if apart > _SAME_TIME * np.diff(one.times[:count]).min():
-            raise InputError(f"{one.name}, {other.name}: the components of a pair must be sampled at the same times")
-        times = one.times if one.times.size > count else other.times
-        for name in ("first", "second"):
-            own: Record = getattr(self, name)
-            filled = np.concatenate([own.acceleration, np.zeros(times.size - own.times.size)])
+        times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
+        if np.abs(times[: other.size] - other).max() > _SAME_TIME * np.diff(other).min():
+            raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
+        for name, own in (("first", self.first), ("second", self.second)):
+            filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
             object.__setattr__(self, name, Record(times, filled, own.name, own.attrs))
 
     @property
@@ -87,26 +82,17 @@ class Pair:
     @property
     def attrs(self) -> dict[str, str]:
         """How the components were read: what they have in common once, else one after the other."""
-        own = [self.first.attrs, self.second.attrs]
-        names = dict.fromkeys([*own[0], *own[1]])
-        values = {name: dict.fromkeys(one.get(name, "") for one in own) for name in names}
-        return {name: " ".join(found) for name, found in values.items()}
+        one, other = self.first.attrs, self.second.attrs
+        return {name: " ".join(dict.fromkeys((one.get(name, ""), other.get(name, "")))) for name in {**one, **other}}
 
     def rotated(self, azimuth: float) -> Record:
         """The component at an azimuth, degrees from the first towards the second, exact between samples as at them."""
+        from scipy.special import cosdg, sindg  # exact at the quarters of a turn
+
         degrees = check_single("azimuth", azimuth)
-        cosine, sine = _cosine(degrees), _cosine(degrees - 90.0)
         with np.errstate(over="ignore"):  # what is not finite then is refused
-            acceleration = cosine * self.first.acceleration + sine * self.second.acceleration
+            acceleration = cosdg(degrees) * self.first.acceleration + sindg(degrees) * self.second.acceleration
         return Record(self.times, acceleration, f"{self.name} at {degrees:g} degrees", self.attrs)
-
-
-def _cosine(degrees: float) -> float:
-    """cos, exact at the quarters of a turn."""
-    quarter, rest = divmod(degrees, 90.0)
-    if rest == 0.0:
-        return (1.0, 0.0, -1.0, 0.0)[int(quarter) % 4]
-    return math.cos(math.radians(degrees))
 
 
 Motion: TypeAlias = Record | Pair
@@ -150,7 +136,7 @@ class Suite:
     name: str = "suite"
 
     def __post_init__(self) -> None:
-        motions = tuple(self.motions) if isinstance(self.motions, Sequence) else (self.motions,)
+        motions = tuple(self.motions)
         for at, motion in enumerate(motions, 1):
             if not isinstance(motion, (Record, Pair)):
                 raise InputError(f"motions[{at}] = {shown(motion)}: must be a Record or a Pair")
@@ -158,23 +144,20 @@ class Suite:
             raise InputError("motions = []: must hold one motion at least")
         if len({type(motion) for motion in motions}) > 1:
             raise InputError("motions: must be all Records, or all Pairs")
-        labels = tuple(check_list("labels", self.labels, "texts")) or _labels(
-            [Path(_parts(one)[0].name) for one in motions]
-        )
+        labels = tuple(check_list("labels", self.labels, "texts"))
+        labels = labels or _labels([Path(_components(one)[0].name) for one in motions])
         for label in labels:
             if not isinstance(label, str) or not label.strip() or not label.isprintable():
                 raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
         if len(labels) != len(motions) or len({*labels}) < len(labels):
             raise InputError(f"labels = {shown(labels)}: must be one for each of {len(motions)}, and all different")
-        if not isinstance(self.name, str):
-            raise InputError(f"name = {shown(self.name)}: must be a text")
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "labels", labels)
 
     def __repr__(self) -> str:
-        shown_labels = self.labels if len(self.labels) <= 6 else (*self.labels[:3], "...", *self.labels[-2:])
+        labels = self.labels if len(self) <= 6 else (*self.labels[:3], "...", *self.labels[-2:])
         what = f"{'pair' if self.has_pairs else 'motion'}{'s' if len(self) > 1 else ''}"
-        return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(shown_labels)})"
+        return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(labels)})"
 
     def __len__(self) -> int:
         return len(self.motions)
@@ -207,14 +190,14 @@ class Suite:
     @property
     def components(self) -> tuple[Record, ...]:
         """All records: the motions, or the components of one after the other."""
-        return tuple(part for motion in self for part in _parts(motion))
+        return tuple(chain.from_iterable(map(_components, self)))
 
     @cached_property
     def duplicates(self) -> tuple[tuple[str, ...], ...]:
         """Labels of motions that have the same samples, such as one file under two names."""
         alike: dict[bytes, list[str]] = {}
         for label, motion in zip(self.labels, self, strict=True):
-            samples = b"".join(part.acceleration.tobytes() + part.times.tobytes() for part in _parts(motion))
+            samples = b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))
             alike.setdefault(samples, []).append(label)
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
@@ -225,13 +208,9 @@ class Suite:
             "motion_file": np.array([motion.attrs.get("record", "") for motion in self]),
             "motion_sha256": np.array([motion.attrs.get("record_sha256", "") for motion in self]),
             "motion_samples": np.array([motion.times.size for motion in self], np.int32),
-            "motion_interval": np.array(
-                [float(motion.times[-1] - motion.times[0]) / (motion.times.size - 1) for motion in self]
-            ),
+            "motion_interval": np.array([np.ptp(motion.times) / (motion.times.size - 1) for motion in self]),
         }
-        if not self.has_pairs:
-            found |= self.intensities(np.arange(len(self)), np.zeros(len(self)))
-        return {name: found[name] for name in MOTION_COORDINATES if name in found}
+        return found if self.has_pairs else found | self.intensities(np.arange(len(self)), np.zeros(len(self)))
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
@@ -320,66 +299,58 @@ def read_suite(
     return suite_in(Path(), paths, pairs, reading)
 
 
+#: What a motion is read from: one part, or the two components of a pair.
+_Source: TypeAlias = tuple[Path | Record, ...]
+
+
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
     """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
     sources = _sources(paths, folder)
     if pairs is not None:
         sources = _paired(sources, pairs)
-    files = dict.fromkeys(part for source in sources for part in _parts(source) if isinstance(part, Path))
-    records, reasons = {}, {}
-    for file in files:
+    records: dict[Path | Record, Record] = {}
+    reasons = {}
+    for part in dict.fromkeys(chain.from_iterable(sources)):
         try:
-            records[file] = record_of(file, reading)
+            records[part] = part if isinstance(part, Record) else record_of(part, reading)
         except InputError as error:
-            reasons[file] = str(error).removeprefix(f"{file}: ")
+            reasons[part] = str(error).removeprefix(f"{part}: ")
     if reasons:
-        names = ", ".join(file.name for file in reasons)
-        refused = InputError(f"{len(reasons)} of {len(files)} files cannot be read: {names}")
-        for file, reason in reasons.items():
-            refused.add_note(f"{file}: {reason}")
+        names = ", ".join(part.name for part in reasons)
+        refused = InputError(f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}")
+        for part, reason in reasons.items():
+            refused.add_note(f"{part}: {reason}")
         raise refused
-    motions, stems = [], []
-    for source in sources:
-        first, *second = _parts(source)
-        stem = first if isinstance(first, Path) else Path(first.name)
-        if pairs is not None:
-            stem = stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem)
-        stems.append(stem)
-        record = records.get(first, first)
-        motions.append(Pair(record, records.get(second[0], second[0])) if second else record)
+    stems = [source[0] if isinstance(source[0], Path) else Path(source[0].name) for source in sources]
+    if pairs is not None:
+        stems = [stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem) for stem in stems]
+    found = [[records[part] for part in source] for source in sources]
+    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
-    return Suite(tuple(motions), _labels(stems), str(entry) if isinstance(entry, (str, Path)) else "suite")
+    return Suite(motions, _labels(stems), str(entry) if isinstance(entry, (str, Path)) else "suite")
 
 
-_Source: TypeAlias = Path | Record | Pair | tuple[Path | Record, Path | Record]
-
-
-def _parts(source: _Source) -> tuple[Any, ...]:
+def _components(motion: Motion) -> tuple[Record, ...]:
     """The two components of a pair, or what is none."""
-    if isinstance(source, Pair):
-        return source.first, source.second
-    return source if isinstance(source, tuple) else (source,)
+    return (motion.first, motion.second) if isinstance(motion, Pair) else (motion,)
 
 
 def _sources(given: Any, folder: Path) -> list[_Source]:
-    """What entries name, each file once: files, records, pairs of either."""
-    if isinstance(given, Suite):
-        return list(given.motions)
+    """What entries name, each file once."""
     if isinstance(given, (str, Path, Record, Pair)):
         given = [given]
-    if not isinstance(given, (Sequence, Iterator)) or isinstance(given, bytes):
+    if not isinstance(given, Iterable) or isinstance(given, bytes):
         raise InputError(f"paths = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
     found: list[_Source] = []
     for entry in given:
         if isinstance(entry, (Record, Pair)):
-            found.append(entry)
+            found.append(_components(entry))
+        elif isinstance(entry, (str, Path)):
+            found += [(file,) for file in _matching(folder, entry) if (file,) not in found]
         elif isinstance(entry, (list, tuple)):
             if len(entry) != 2 or not all(isinstance(part, (str, Path, Record)) for part in entry):
                 raise InputError(f"paths: {shown(entry)}: must be two files, the components of one motion")
-            first, second = (part if isinstance(part, Record) else folder / part for part in entry)
-            found.append((first, second))
-        elif isinstance(entry, (str, Path)):
-            found += [file for file in _matching(folder, entry) if file not in found]
+            found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
         else:
             raise InputError(f"paths: {shown(entry)}: must be a file, a folder, a pattern or a Record")
     if not found:
@@ -389,8 +360,7 @@ def _sources(given: Any, folder: Path) -> list[_Source]:
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
     """The files that an entry names."""
-    text = str(entry)
-    if not text.strip():
+    if not str(entry).strip():
         raise InputError(f"paths: {shown(entry)}: must be a file, a folder or a pattern")
     path = folder / entry
     try:
@@ -400,9 +370,10 @@ def _matching(folder: Path, entry: str | Path) -> list[Path]:
         found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
         files = sorted(one for one in found if one.is_file())
     except (OSError, ValueError) as error:
-        raise InputError(f"paths: {text}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"paths: {entry}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not files:
-        raise InputError(f"paths: {text}: {'a folder without files' if path.is_dir() else 'no file fits this pattern'}")
+        what = "a folder without files" if path.is_dir() else "no file fits this pattern"
+        raise InputError(f"paths: {entry}: {what}")
     return files
 
 
@@ -412,15 +383,16 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]
     if len(set(map(str, endings))) != 2 or not all(isinstance(one, str) and one for one in endings):
         raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
     first, second = endings
+    parts = list(chain.from_iterable(sources))
     pairs = {
         one: one.with_name(one.stem.removesuffix(first) + second + one.suffix)
-        for one in sources
+        for one in parts
         if isinstance(one, Path) and one.stem.endswith(first)
     }
-    incomplete = [one for one in sources if one not in pairs and one not in pairs.values()]
-    incomplete += [one for one, other in pairs.items() if other not in sources]
+    incomplete = [one for one in parts if one not in pairs and one not in pairs.values()]
+    incomplete += [one for one, other in pairs.items() if other not in parts]
     if incomplete:
-        names = ", ".join(one.name if isinstance(one, (Path, Record)) else shown(one) for one in incomplete)
+        names = ", ".join(one.name for one in incomplete)
         raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
     return list(pairs.items())
 

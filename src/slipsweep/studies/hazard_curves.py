@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
-from slipsweep.motion.columns import columns_of, words_and_unit
-from slipsweep.motion.records import read_lines
+from slipsweep.motion.columns import read_columns
+from slipsweep.motion.formats import read_lines
 
 Floats = NDArray[np.float64]
 
@@ -120,49 +120,30 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
         path = Path(path)
     except TypeError:
         raise InputError(f"curve = {shown(path)}: must be the path of a CSV file, or a HazardCurve") from None
-    content, lines = read_lines(path, "hazard curve")
+    content, lines = read_lines(path)
     about = {"hazard_curve_sha256": hashlib.sha256(content).hexdigest()}
     named = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     if _POE.search(named):
         return _openquake_curve(path, lines, g, site, about)
     if site is not None:
         raise InputError(f"{path}: site = {site}: only for a file of OpenQuake with several sites")
-    file = columns_of(path, lines, "has no line of names, such as PGA (g), annual rate")
-    columns: dict[str, tuple[int, float]] = {}
-    for i, cell in enumerate(file.names):
-        what, factor = _column(f"{path}: line {file.number}", cell, g)
-        if what in columns:
-            raise InputError(f"{path}: line {file.number}: two columns are {what}: must be one")
-        if what:
-            columns[what] = i, factor
-    for what in ("PGA", "annual rate"):
-        if what not in columns:
-            raise InputError(
-                f"{path}: line {file.number}: no column {what}: must name them, such as PGA (g), annual rate"
-            )
-    values = {what: np.empty(len(file.body)) for what in columns}
-    for row, (number, cells) in enumerate(file.rows()):
-        for what, (i, factor) in columns.items():
-            values[what][row] = factor * file.value(number, cells[i], what)
+
+    def holds(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
+        where = f"{path}: column {shown(column)}"
+        if "probability" in words:
+            raise InputError(f"{where}: must be an annual rate, -ln(1 - p) of an annual probability p")
+        if words & _RATE:
+            if unit.lower() not in _ANNUAL:
+                raise InputError(f"{where}: must be a rate per year, such as annual rate (1/yr)")
+            return "annual rate", 1.0
+        if not words & _PGA:
+            return None
+        if not unit:
+            raise InputError(f"{where}: must give its unit in brackets, such as PGA (g)")
+        return "PGA", conversion(f"{where}: unit", "m s-2", unit, g)
+
+    values = read_columns(path, lines, holds, ("PGA", "annual rate"), "PGA (g), annual rate")
     return HazardCurve(values["PGA"], values["annual rate"], str(path), about)
-
-
-def _column(where: str, cell: str, g: float) -> tuple[str, float]:
-    """What a column holds, nothing if it is left out, and the factor to its unit."""
-    words, unit = words_and_unit(cell)
-    if "probability" in words:
-        raise InputError(
-            f"{where}: column {shown(cell)}: must be an annual rate, -ln(1 - p) of an annual probability p"
-        )
-    if words & _RATE:
-        if unit.lower() not in _ANNUAL:
-            raise InputError(f"{where}: column {shown(cell)}: must be a rate per year, such as annual rate (1/yr)")
-        return "annual rate", 1.0
-    if not words & _PGA:
-        return "", 1.0
-    if not unit:
-        raise InputError(f"{where}: column {shown(cell)}: must give its unit in brackets, such as PGA (g)")
-    return "PGA", conversion(f"{where}: column {shown(cell)}: unit", "m s-2", unit, g)
 
 
 def _openquake_curve(
