@@ -83,6 +83,9 @@ WRONG: list[tuple[type[Choice], dict[str, Any], str]] = [
     (Harmonics, {"amplitudes": [1, "a"], "multiples": [1, 2]}, "amplitudes[1] = 'a': must be a finite number"),
     (Harmonics, {"amplitudes": [1], "multiples": [101]}, "multiples[0] = 101: must be a whole number <= 100"),
     (Harmonics, {"amplitudes": [1, 2], "multiples": [1, 2], "phases": [0]}, "phases: 1 numbers; must be as many"),
+    (Harmonics, {"amplitudes": [1, 1], "multiples": [2, 2]}, "multiples = [2, 2]: must not be repeated"),
+    (Harmonics, {"amplitudes": [0.0], "multiples": [1]}, "amplitudes = [0.0]: must not all be 0"),
+    (Harmonics, {"amplitudes": [], "multiples": []}, "amplitudes = []: must not all be 0, and one at least"),
     (Step, {"rule": "euler"}, "rule = 'euler': must be one of 'rectangle', 'trapezoid', 'simpson'"),
     (Step, {"steps_per_cycle": 10}, "steps_per_cycle = 10: must be a multiple of 4"),
 ]
@@ -153,7 +156,7 @@ def test_attributes_give_the_choice_again(keyword: str, choice: Choice) -> None:
     assert family.from_attributes(family.attributes(choice)) == choice
 
 
-@each
+@pytest.mark.parametrize(("keyword", "choice"), [CHOSEN[1], CHOSEN[7], CHOSEN[10]])
 def test_a_file_gives_the_choice_again(keyword: str, choice: Choice, tmp_path: Path) -> None:
     """Written by `run`, read by netCDF4 and xarray, and run once more from the result."""
     family = FAMILIES[keyword]

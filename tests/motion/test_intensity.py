@@ -95,20 +95,12 @@ def test_a_strength_is_that_of_the_motion_that_shakes(strength: str, time_scale:
         assert shaken["pga" if strength == "amplitude" else strength] == pytest.approx(0.7, rel=1e-13)
 
 
-@pytest.mark.parametrize("peak", [1e-150, 1e150])
-@pytest.mark.parametrize("interval", [1e-6, 0.01, 10.0])
-def test_odd_numbers_give_numbers(peak: float, interval: float) -> None:
-    record = noise(3, 1000)
-    values = record.acceleration / record.peak * peak
-    found = intensity_measures(Record.sampled(values, interval))
-    assert found["significant_duration"] == pytest.approx(
-        intensity_measures(Record.sampled(values / peak, interval))["significant_duration"], rel=1e-12
-    )
+def test_motions_without_a_measure() -> None:
     still = intensity_measures(Record(np.arange(4.0), np.zeros(4)))
-    assert {name for name, value in still.items() if value != 0.0} == {"mean_period"}
-    assert all(value >= 0.0 for name, value in found.items() if name != "mean_period")
+    assert math.isnan(still.pop("mean_period"))
+    assert not any(still.values())
     # every frequency that samples 10 s apart resolve is below 0.25 Hz
-    assert math.isnan(found["mean_period"]) == (interval == 10.0)
+    assert math.isnan(intensity_measures(Record.sampled(noise(3).acceleration, 10.0))["mean_period"])
 
 
 def test_as_eqsig_has_them() -> None:

@@ -2,14 +2,12 @@
 
 import itertools
 from math import pi
-from typing import Any
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from slipsweep import Cosine, Cycle, Harmonics, InputError, Sine, Square, Step, Triangle, sweep
-from slipsweep.model.parameters import MOST_RAMP
+from slipsweep import Cosine, Cycle, Harmonics, Sine, Square, Step, Triangle, sweep
 from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.pieces import (
     BEGIN,
@@ -24,7 +22,7 @@ from slipsweep.motion.pieces import (
     TERM,
     TOP,
 )
-from slipsweep.motion.waveforms import WAVEFORMS, Waveform
+from slipsweep.motion.waveforms import Waveform
 
 CYCLES = 4
 RICH = Harmonics([1.0, 0.6, 0.35, 0.2], [1, 2, 5, 50], [0.0, 40.0, 100.0, 7.0], cycles=CYCLES)
@@ -216,30 +214,3 @@ def test_one_plain_cycle_stands_for_all() -> None:
     long = wave_of(EVERY["ramped triangle"].but(cycles=10**9))
     assert long.repeats == 10**9 - long.lead - 3
     assert len(long.pieces) == 4 * (long.lead + 4)
-
-
-@pytest.mark.parametrize(
-    ("waveform", "given", "message"),
-    [
-        ("saw", {}, "excitation.waveform = 'saw': must be one of 'sine'"),
-        ("harmonics", {}, "excitation.amplitudes: must be given with excitation.waveform = 'harmonics'"),
-        ("sine", {"amplitudes": [1.0]}, "only with 'harmonics'"),
-        ("harmonics", {"amplitudes": [1.0]}, "excitation.multiples: must be given"),
-        ("harmonics", {"amplitudes": [1.0, 2.0], "multiples": [1]}, "excitation.multiples: 1 numbers; must be as many"),
-        ("harmonics", {"amplitudes": [1.0], "multiples": [1], "phases": [0, 1]}, "excitation.phases: 2 numbers"),
-        ("harmonics", {"amplitudes": [1.0], "multiples": [0]}, "excitation.multiples[0] = 0"),
-        ("harmonics", {"amplitudes": [1.0], "multiples": [1.5]}, "= 1.5"),
-        ("harmonics", {"amplitudes": [0.0], "multiples": [1]}, "must not all be 0"),
-        ("harmonics", {"amplitudes": [], "multiples": []}, "excitation.amplitudes = []"),
-        ("harmonics", {"amplitudes": [1, 1], "multiples": [2, 2]}, "not be repeated"),
-        ("harmonics", {"amplitudes": "1:1:0;2", "multiples": [1]}, "excitation.amplitudes = '1:1:0;2': must be a list"),
-        ("sine", {"ramp_in": -1}, "excitation.ramp_in = -1"),
-        ("sine", {"ramp_out": MOST_RAMP + 1}, f"excitation.ramp_out = {MOST_RAMP + 1}"),
-        ("sine", {"ramp_in": float("nan")}, "excitation.ramp_in = nan"),
-        ("sine", {"ramp_in": 6, "ramp_out": 5}, "must not exceed the 10 cycles"),
-    ],
-)
-def test_refused(waveform: str, given: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError) as error:
-        WAVEFORMS.made(waveform, given, lambda key: f"excitation.{key}")
-    assert message in str(error.value)

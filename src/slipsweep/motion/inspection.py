@@ -13,7 +13,8 @@ from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 
 Floats = NDArray[np.float64]
 
-#: An interval of more median ones than this is a gap; of fewer intervals the median says nothing.
+#: An interval of more median ones than this is a gap.  Of fewer samples than the second, typed by hand, nothing is said
+#: but of values that cannot be.
 _GAP, _FEWEST = 5.0, 16
 
 #: Magnitudes that programs write where they have no value.
@@ -41,24 +42,20 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     missing = _is_fill(values)
     findings = []
     if missing.any():
-        first, kinds = times[missing][0], np.unique(values[missing])[:3]
-        shown = ", ".join("blank" if np.isnan(value) else f"{value:g}" for value in kinds)
+        kinds = ", ".join("blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[missing])[:3])
         count = f"{missing.sum()} fill value{'s' if missing.sum() > 1 else ''}"
-        findings.append(f"{count} ({shown}), first at t = {first:.6g} s")
+        findings.append(f"{count} ({kinds}), first at t = {times[missing][0]:.6g} s")
     intervals = np.diff(times)
     if intervals.size >= _FEWEST and (intervals > 0.0).all():
         median = float(np.median(intervals))
-        gap = np.flatnonzero(intervals > _GAP * median)
-        more = f", and {gap.size - 1} more" if gap.size > 1 else ""
-        findings += [
-            f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
-            f"median interval of {median:.4g} s){more}"
-            for at in gap[:1]
-        ]
-        findings += [
-            f"the value {value:.6g} is held from t = {first:.6g} to {last:.6g} s"
-            for value, first, last in _held(times[~missing], values[~missing])[:1]
-        ]
+        wide = np.flatnonzero(intervals > _GAP * median)
+        more = f", and {wide.size - 1} more" if wide.size > 1 else ""
+        for at in wide[:1]:
+            findings.append(
+                f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
+                f"median interval of {median:.4g} s){more}"
+            )
+        findings += _held(times[~missing], values[~missing])
     found = "; ".join(findings)
     if found and gaps == "refuse":
         raise InputError(f"{name}: {found}: samples are missing; gaps = 'linear' interpolates between the others")
@@ -99,23 +96,23 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
     return missing
 
 
-def _held(times: Floats, values: Floats) -> list[tuple[float, float, float]]:
-    """Values that do not change while the ground shakes, and their first and last times."""
+def _held(times: Floats, values: Floats) -> list[str]:
+    """The first value that does not change while the ground shakes, in words."""
     peak = np.abs(values).max(initial=0.0)
-    starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
-    lasts = np.concatenate([starts[1:], [values.size]]) - 1
-    is_long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
-    found = []
-    for first, last in zip(starts[is_long], lasts[is_long], strict=True):
-        neighbours = values[[first - 1, last + 1]] if first > 0 and last < values.size - 1 else values[[first, last]]
-        jumps = np.abs(neighbours - values[first]).min() > 0.05 * peak
+    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    lasts = np.append(starts[1:], values.size) - 1
+    for first, last in zip(starts, lasts, strict=True):
+        if last - first < _HELD_SAMPLES or times[last] - times[first] < _HELD:
+            continue
+        within = first > 0 and last < values.size - 1
+        jumps = within and np.abs(values[[first - 1, last + 1]] - values[first]).min() > 0.05 * peak
         if abs(values[first]) > 0.01 * peak or jumps:  # else the ground is at rest
-            found.append((float(values[first]), float(times[first]), float(times[last])))
-    return found
+            return [f"the value {values[first]:.6g} is held from t = {times[first]:.6g} to {times[last]:.6g} s"]
+    return []
 
 
 def _odd_peak(record: Motion, unit: str) -> str:
-    """A peak that was never recorded, and the unit that would explain it; a few samples typed by hand may be weak."""
+    """A peak that was never recorded, and the unit that would explain it."""
     at = int(np.abs(record.acceleration).argmax())
     peak = record.peak / STANDARD_GRAVITY
     if (peak >= _WEAKEST or record.times.size <= _FEWEST) and peak <= _STRONGEST:
@@ -130,7 +127,7 @@ def _odd_peak(record: Motion, unit: str) -> str:
 
 
 def _drift(record: Motion) -> str:
-    """A ground that moves away, as the integral of an offset does; a few corners typed by hand may end in motion."""
+    """A ground that moves away, as the integral of an offset does."""
     if record.times.size <= _FEWEST:
         return ""
     with np.errstate(over="ignore", invalid="ignore"):

@@ -3,8 +3,7 @@
 Acceleration is interpolated linearly between samples, and v = d = 0 at the first one: velocity is then a parabola on
 each interval and displacement a cubic, and every integral and extreme below is theirs, exact to rounding, at any
 sampling, even or not.  (The mean period alone is defined by a discrete Fourier transform.)  Nothing is taken off the
-acceleration but what `baseline` took off when it was read: where it leaves a drift, the peak ground velocity and
-displacement have it.  "g" is standard gravity.
+acceleration but what `baseline` took off when it was read.  "g" is standard gravity.
 """
 
 import math
@@ -14,7 +13,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.reading import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -42,13 +40,10 @@ _LOWEST, _HIGHEST, _SPACING = 0.25, 20.0, 0.05
 #: Sampling of a motion whose own is not even, s, and the most samples of a transform.
 _RESAMPLED, _MOST_SAMPLES = 0.005, 2**22
 
-#: π/2g of the Arias intensity, s²/m.
-_ARIAS = math.pi / (2.0 * STANDARD_GRAVITY)
-
 
 def intensity_measures(record: Motion) -> dict[str, float]:
     """All measures of `variables.INTENSITY_MEASURES` of a record; NaN where one is not defined."""
-    found = {
+    return {
         "pga": record.peak,
         "pgv": peak_velocity(record),
         "pgd": peak_displacement(record),
@@ -57,7 +52,6 @@ def intensity_measures(record: Motion) -> dict[str, float]:
         "significant_duration": significant_duration(record),
         "mean_period": mean_period(record),
     }
-    return {name: found[name] for name in INTENSITY_MEASURES}
 
 
 def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
@@ -77,36 +71,33 @@ def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
             return given["amplitude"] / record.peak
         if "pgv" in given:
             return given["pgv"] / (peak_velocity(record) * given["time_scale"])
-        # root by root: the square of a peak may be too large
-        root = math.sqrt(_ARIAS * float(_energy(record)(record.times[-1]))) * record.peak
-        return np.sqrt(given["arias_intensity"]) / np.sqrt(given["time_scale"]) / root
+        return np.sqrt(given["arias_intensity"] / (np.float64(arias_intensity(record)) * given["time_scale"]))
 
 
 def peak_velocity(record: Motion) -> float:
     """Peak ground velocity, max |∫ Üg dt|, m/s."""
-    acceleration = _shape(record)
-    return record.peak * _largest(acceleration.antiderivative(), _zeros(acceleration))
+    acceleration = _lines(record)
+    return _largest(acceleration.antiderivative(), acceleration)
 
 
 def peak_displacement(record: Motion) -> float:
     """Peak ground displacement, max |∫∫ Üg dt dt|, m."""
-    velocity = _shape(record).antiderivative()
-    return record.peak * _largest(velocity.antiderivative(), _zeros(velocity))
+    velocity = _lines(record).antiderivative()
+    return _largest(velocity.antiderivative(), velocity)
 
 
 def arias_intensity(record: Motion) -> float:
     """Arias intensity π/(2g) ∫ Üg² dt, m/s (Arias 1970)."""
-    return _ARIAS * float(_energy(record)(record.times[-1])) * record.peak * record.peak
+    return math.pi / (2.0 * STANDARD_GRAVITY) * float(_energy(record)(record.times[-1]))
 
 
 def cumulative_absolute_velocity(record: Motion) -> float:
     """Cumulative absolute velocity ∫ |Üg| dt, m/s (EPRI 1988; Kramer 1996, section 3.3)."""
-    times = np.union1d(record.times, _zeros(_shape(record)))
-    size = np.abs(np.interp(times, record.times, record.acceleration))
-    return float(np.trapezoid(size, times))
+    times = np.union1d(record.times, _zeros(_lines(record)))
+    return float(np.trapezoid(np.abs(np.interp(times, record.times, record.acceleration)), times))
 
 
-def significant_duration(record: Motion, low: float = 0.05, high: float = 0.95) -> float:
+def significant_duration(record: Motion) -> float:
     """Time between 5 % and 95 % of the Arias intensity, s (Trifunac and Brady 1975)."""
     from scipy.optimize import brentq
 
@@ -115,8 +106,8 @@ def significant_duration(record: Motion, low: float = 0.05, high: float = 0.95) 
     if not total > 0.0:
         return 0.0
     begin, end = (
-        brentq(lambda time, share=share: float(energy(time)) - share * total, first, last, xtol=1e-15 * (last - first))
-        for share in (low, high)
+        brentq(lambda time, part=share * total: float(energy(time)) - part, first, last, xtol=1e-15 * (last - first))
+        for share in (0.05, 0.95)
     )
     return float(end - begin)
 
@@ -128,42 +119,45 @@ def mean_period(record: Motion) -> float:
     than 20 s is continued with zeros (Rathje et al. 2004).  One that is not evenly sampled is sampled anew, at its
     median interval or, if that is longer, every 0.005 s.  NaN of a motion without such frequencies.
     """
-    if not record.peak > 0.0:
-        return math.nan
     samples, step = _evenly_sampled(record)
-    if not math.isfinite(step):
-        return math.nan
     length = max(samples.size, math.ceil(1.0 / (_SPACING * step)))
     frequency = np.fft.rfftfreq(length, step)
     chosen = (frequency >= _LOWEST * (1.0 - 1e-12)) & (frequency <= _HIGHEST * (1.0 + 1e-12))
     power = np.abs(np.fft.rfft(samples, length)[chosen]) ** 2
-    total = power.sum()
-    return float((power / frequency[chosen]).sum() / total) if total > 0.0 else math.nan
+    return float((power / frequency[chosen]).sum() / power.sum()) if power.sum() > 0.0 else math.nan
 
 
 def _evenly_sampled(record: Motion) -> tuple[Floats, float]:
-    """A record of peak 1 at an even interval, and that."""
+    """The samples of a record at an even interval, and that."""
     duration = float(record.times[-1] - record.times[0])
     own = np.diff(record.times)
     mean = duration / own.size
     # times that are multiples of one interval are so to their rounding
     is_even = np.allclose(own, mean, rtol=1e-6, atol=4.0 * float(np.spacing(np.abs(record.times).max())))
-    step = max(
-        mean if is_even else min(float(np.median(own)), _RESAMPLED), max(duration, 1.0 / _SPACING) / _MOST_SAMPLES
-    )
-    if step == mean or not math.isfinite(step):
-        return record.acceleration / record.peak, step
+    step = mean if is_even else min(float(np.median(own)), _RESAMPLED)
+    step = max(step, max(duration, 1.0 / _SPACING) / _MOST_SAMPLES)
+    if step == mean:
+        return record.acceleration, step
     times = record.times[0] + step * np.arange(math.floor(duration / step) + 1)
-    return np.interp(times, record.times, record.acceleration) / record.peak, step
+    return np.interp(times, record.times, record.acceleration), step
 
 
-def _shape(record: Motion) -> "PPoly":
-    """The straight lines between the samples, of a motion of peak 1: its square may be too large."""
+def _lines(record: Motion) -> "PPoly":
+    """The straight lines between the samples."""
     from scipy.interpolate import PPoly  # here: a sweep under a waveform does not wait for it
 
-    values = record.acceleration / (record.peak or 1.0)
     with np.errstate(over="ignore"):
-        return PPoly(np.array([np.diff(values) / np.diff(record.times), values[:-1]]), record.times)
+        slope = np.diff(record.acceleration) / np.diff(record.times)
+    return PPoly(np.array([slope, record.acceleration[:-1]]), record.times)
+
+
+def _energy(record: Motion) -> "PPoly":
+    """∫ Üg² dt over time."""
+    from scipy.interpolate import PPoly
+
+    slope, first = _lines(record).c
+    with np.errstate(over="ignore"):
+        return PPoly(np.array([slope * slope, 2.0 * slope * first, first * first]), record.times).antiderivative()
 
 
 def _zeros(curve: "PPoly") -> Floats:
@@ -172,15 +166,6 @@ def _zeros(curve: "PPoly") -> Floats:
     return found[np.isfinite(found)]
 
 
-def _largest(curve: "PPoly", extremes: Floats) -> float:
-    """The largest magnitude of a curve whose derivative is zero at `extremes`."""
-    return float(np.abs(curve(np.concatenate([curve.x, extremes]))).max())
-
-
-def _energy(record: Motion) -> "PPoly":
-    """∫ Üg² dt over time, with the peak as the unit."""
-    from scipy.interpolate import PPoly
-
-    (slope, first), times = _shape(record).c, record.times
-    with np.errstate(over="ignore"):
-        return PPoly(np.array([slope * slope, 2.0 * slope * first, first * first]), times).antiderivative()
+def _largest(curve: "PPoly", derivative: "PPoly") -> float:
+    """The largest magnitude of a curve."""
+    return float(np.abs(curve(np.concatenate([curve.x, _zeros(derivative)]))).max())

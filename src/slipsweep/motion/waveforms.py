@@ -66,11 +66,12 @@ class Waveform(Choice):
 
     def __str__(self) -> str:
         """In words, as a caption has it: ``10 cycles of a triangle wave, ramp in 2 cycles``."""
-        text = f"{self.cycles} cycle{'s' if self.cycles > 1 else ''} of a {self._words()}"
-        for ramp, word in ((self.ramp_in, "in"), (self.ramp_out, "out")):
-            if ramp:
-                text += f", ramp {word} {number_text(ramp)} cycles"
-        return text
+        ramps = "".join(
+            f", ramp {word} {number_text(ramp)} cycles"
+            for ramp, word in ((self.ramp_in, "in"), (self.ramp_out, "out"))
+            if ramp
+        )
+        return f"{self.cycles} cycle{'s' if self.cycles > 1 else ''} of a {self._words()}{ramps}"
 
     def _words(self) -> str:
         return f"{self.name} wave" if self.name in ("triangle", "square") else self.name
@@ -163,9 +164,7 @@ class Square(Waveform):
 
 
 @dataclass(frozen=True)
-class _Terms:
-    """Terms a sin(mφ + p) of a sum."""
-
+class _Terms:  # a base of its own, as a field without a default comes first
     amplitudes: Sequence[float] = option("relative amplitudes of the harmonics")
     multiples: Sequence[int] = option("multiples of the frequency of the harmonics", least=1, most=MOST_MULTIPLE)
     phases: Sequence[float] | None = option("phases of the harmonics, degrees", None)
@@ -210,8 +209,6 @@ class Harmonics(Waveform, _Terms):
         count = len(self.amplitudes)
         if self.phases is None:
             object.__setattr__(self, "phases", (0.0,) * count)
-        if not count:
-            raise InputError("amplitudes = []: must hold at least one number")
         for key in ("multiples", "phases"):
             if len(getattr(self, key)) != count:
                 raise InputError(f"{key}: {len(getattr(self, key))} numbers; must be as many as amplitudes, {count}")
@@ -219,7 +216,7 @@ class Harmonics(Waveform, _Terms):
             raise InputError(f"multiples = {list(self.multiples)}: must not be repeated")
         # terms of different multiples cannot cancel: their sum is 0 only where all are
         if not any(self.amplitudes):
-            raise InputError(f"amplitudes = {list(self.amplitudes)}: must not all be 0")
+            raise InputError(f"amplitudes = {list(self.amplitudes)}: must not all be 0, and one at least")
 
     def _words(self) -> str:
         assert self.phases is not None
