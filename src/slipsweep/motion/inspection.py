@@ -50,7 +50,8 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
         median = float(np.median(intervals))
         wide = np.flatnonzero(intervals > _GAP * median)
         more = f", and {wide.size - 1} more" if wide.size > 1 else ""
-        for at in wide[:1]:
+        if wide.size:
+            at = wide[0]
             findings.append(
                 f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
                 f"median interval of {median:.4g} s){more}"
