@@ -57,37 +57,23 @@ def _from(low: float, high: float) -> Bound:
     return Bound(low, high, f"a finite number {'> 0, ' if low > 0.0 else ''}{least}")
 
 
-_AMOUNT, _FACTOR = _from(0.0, LARGEST), _from(0.0, LARGEST_FACTOR)
-_POSITIVE_AMOUNT, _POSITIVE_FACTOR = _from(1.0 / LARGEST, LARGEST), _from(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
 _ABOVE_0, _BELOW_1, _BELOW_90 = math.ulp(0.0), math.nextafter(1.0, 0.0), math.nextafter(90.0, 0.0)
 
 #: What each parameter may be (MODEL: what no physics allows is an error, not a NaN).
 BOUNDS: dict[str, Bound] = {
     "theta": Bound(0.0, _BELOW_90, "0 <= theta < 90 degrees"),
-    "mu_s": _POSITIVE_FACTOR,
     "phi": Bound(_ABOVE_0, _BELOW_90, "0 < phi < 90 degrees"),
-    "amplitude": _AMOUNT,
-    "displacement_amplitude": _AMOUNT,
-    "frequency": _POSITIVE_FACTOR,
-    "displacement": _POSITIVE_AMOUNT,
-    "maximum_amplitude": _POSITIVE_AMOUNT,
+    "azimuth": Bound(0.0, 360.0, "0 <= azimuth <= 360 degrees"),
+    "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
     "yield_acceleration": _from(-LARGEST, LARGEST),
     "yield_coefficient": _from(-LARGEST_FACTOR, LARGEST_FACTOR),
-    "decay_rate": _FACTOR,
-    "delta_mu": _FACTOR,
-    "minimum_friction": _POSITIVE_FACTOR,
-    "structure_frequency": _POSITIVE_FACTOR,
-    "scale": _POSITIVE_FACTOR,
-    "pgv": _AMOUNT,
-    "arias_intensity": _AMOUNT,
-    "time_scale": _POSITIVE_FACTOR,
-    "interval": _POSITIVE_AMOUNT,
-    "azimuth": Bound(0.0, 360.0, "0 <= azimuth <= 360 degrees"),
-    "g": _POSITIVE_AMOUNT,
-    "ramp_in": Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}"),
-    "ramp_out": Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}"),
-    "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
-    "threshold": _AMOUNT,
+    **dict.fromkeys(("ramp_in", "ramp_out"), Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}")),
+    **dict.fromkeys(("decay_rate", "delta_mu"), _from(0.0, LARGEST_FACTOR)),
+    **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale"), _from(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)),
+    **dict.fromkeys(("frequency", "structure_frequency"), _from(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)),
+    **dict.fromkeys(("amplitude", "displacement_amplitude", "pgv", "arias_intensity"), _from(0.0, LARGEST)),
+    **dict.fromkeys(("displacement", "maximum_amplitude", "g", "interval"), _from(1.0 / LARGEST, LARGEST)),
+    "threshold": _from(0.0, LARGEST),
 }
 
 #: Own units of all that may bring one.

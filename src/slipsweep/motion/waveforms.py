@@ -34,20 +34,7 @@ MOST_MULTIPLE = 100
 
 @dataclass(frozen=True)
 class Waveform(Choice):
-    """A waveform that is repeated for some cycles, with its ramps.
-
-    Parameters
-    ----------
-    cycles : int
-        Whole cycles of shaking, from rest.
-    ramp_in, ramp_out : float
-        Cycles at the beginning and at the end over which the shaking grows and fades linearly.
-
-    Raises
-    ------
-    InputError
-        A value that is not allowed.
-    """
+    """A waveform that is repeated for some cycles, with its ramps; its parameters are those of `Sine`."""
 
     cycles: int = option("cycles of shaking", 10, least=1, most=MOST_CYCLES)
     ramp_in: float = option("cycles over which the shaking grows", 0.0)
@@ -87,6 +74,11 @@ class Sine(Waveform):
         Whole cycles of shaking, from rest; 10 by default.
     ramp_in, ramp_out : float
         Cycles at the beginning and at the end over which the shaking grows and fades linearly.
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed; ramps longer than the shaking.
 
     See Also
     --------
