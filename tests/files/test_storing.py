@@ -129,7 +129,7 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
         write(self, number, arrays)
 
     monkeypatch.setattr(kind, "write", failing)
-    with pytest.raises(OSError, match="No space") as failure:
+    with pytest.raises(RunError, match="No space") as failure:
         stored(job_of(folder, "sweep"), path)
     assert failure.value.__notes__ == [f"3 of 24 chunks are kept in {path}.part: --resume goes on"]
     assert not path.exists()
@@ -169,14 +169,14 @@ def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyP
 
 def test_two_runs_on_one_output(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(storing, "CHUNK_CELLS", 6)
-    solve = storing._solve
+    solve = storing._solve_here
 
     def solve_and_run_again(target: Any, *arguments: Any) -> None:
         with pytest.raises(RunError, match=r"a\.nc: another run is writing it"):
             stored(job_of(folder, "sweep"), folder / "a.nc", overwrite=True)
         solve(target, *arguments)
 
-    monkeypatch.setattr(storing, "_solve", solve_and_run_again)
+    monkeypatch.setattr(storing, "_solve_here", solve_and_run_again)
     stored(job_of(folder, "sweep"), folder / "a.nc")
     assert read_result(folder / "a.nc").sizes["theta"] == 3
 
@@ -190,7 +190,7 @@ def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
             stored(job_of(folder, "large"), folder / name)
         assert not [*folder.glob(f"{name}*")]
     with pytest.raises(InputError, match=r"--memory = 100 MB: must be .* at least"):
-        stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(memory=100_000_000))
+        stored(job_of(folder, "sweep"), folder / "a.nc", memory=100_000_000)
 
 
 @pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
@@ -215,7 +215,7 @@ def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
 def test_workers_give_the_same_bits(folder: Path, output: str) -> None:
     pytest.importorskip("distributed")
     stored(job_of(folder, "sweep"), folder / "a.nc")
-    stored(job_of(folder, "sweep"), folder / output, means=storing.Means(workers=1))
+    stored(job_of(folder, "sweep"), folder / output, workers=1)
     xr.testing.assert_identical(without_time(read_result(folder / output)), without_time(read_result(folder / "a.nc")))
 
 
@@ -237,7 +237,7 @@ def test_a_store_at_an_address(folder: Path) -> None:
 )
 def test_clusters_that_are_none(folder: Path, means: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        stored(job_of(folder, "sweep"), folder / "a.nc", means=storing.Means(**means))
+        stored(job_of(folder, "sweep"), folder / "a.nc", **means)
 
 
 # --------------------------------------------------------------------------------- opening

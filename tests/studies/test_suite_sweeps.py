@@ -160,8 +160,8 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
         ('["motions/*.csv"]', "[]", r"excitation\.records = \[\]: must name one motion"),
         ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS"]', "excitation.pairs = "),
         ('records = ["motions/*.csv"]', 'record = "motions/m0.csv"\npairs = ["a", "b"]', "excitation.pairs: only"),
-        ("[axes.time_scale]", "[axes.frequency]", "axes.frequency: not allowed with excitation.records"),
-        ("[axes.time_scale]", "[axes.pgv]", "axes.pgv: not allowed beside amplitude"),
+        ("[axes.time_scale]", "[axes.frequency]", "frequency: not allowed with a Suite"),
+        ("[axes.time_scale]", "[axes.pgv]", "amplitude, pgv: must not both be given"),
     ],
 )
 def test_what_sweep_files_refuse(folder: Path, before: str, after: str, message: str) -> None:

@@ -206,13 +206,9 @@ def _write(paths: list[Path], table: "xr.Dataset", figure: Callable[[], "Figure"
 
     for path in paths:
         if path.suffix == ".nc":
-            netcdf.write_table(
-                netcdf.without_time_axis(table),
-                path,
-                title=table.attrs["title"],
-                command=typed_command(),
-                overwrite=overwrite,
-            )
+            plain = netcdf.without_time_axis(table)
+            named = netcdf.described(plain, title=table.attrs["title"], command=typed_command())
+            netcdf.write_table(named, path, overwrite)
             continue
         if path.suffix != ".toml":
             write_figure(figure(), path, overwrite)

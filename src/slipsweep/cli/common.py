@@ -254,6 +254,8 @@ class Chunks:
                 command=typed_command(),
                 overwrite=self.overwrite,
                 resume=self.resume,
-                means=storing.Means(memory, self.workers, self.scheduler),
+                memory=memory,
+                workers=self.workers,
+                scheduler=self.scheduler,
                 progress=progress,
             )

@@ -99,7 +99,7 @@ def limit(
             echo_found(report.path)
         table = read_result(report.path)
     else:
-        with job.named(), progress_bar(job.plan.cells, quiet) as progress:
+        with checked.named(), progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)
     if figures:
         from slipsweep.charts.limit_figures import limit_chart

@@ -80,6 +80,7 @@ def run(
     if isinstance(path, Path) and path.suffix not in (".nc", ".zarr"):
         raise InputError(f"{path}: the name must end in .nc or .zarr, the formats that are written")
     from slipsweep.files.jobs import sweep_job
+    from slipsweep.files.storing import nbytes_of
 
     job = sweep_job(checked)
     watch = Watch()
@@ -113,7 +114,7 @@ def run(
     if why := _why_nothing_slides(template, report.tally):
         typer.echo(why)
     echo_suite(read_result(report.path), most=20)
-    typer.echo(f"{report.path}  {size_text(report.nbytes)}")
+    typer.echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
 
 
 def _echo_inputs(table: "xr.Dataset") -> None:

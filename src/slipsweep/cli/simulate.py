@@ -187,14 +187,13 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
 def _write_netcdf(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
     from slipsweep.files import netcdf
 
-    netcdf.write_table(
+    named = netcdf.described(
         netcdf.without_time_axis(table),
-        path,
         title="Time history of a sliding block",
         command=typed_command(),
-        overwrite=overwrite,
         recorded=None if isinstance(motion, Waveform) else motion,
     )
+    netcdf.write_table(named, path, overwrite)
 
 
 def _write_csv(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:

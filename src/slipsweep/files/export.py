@@ -44,11 +44,11 @@ _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 #: Attributes that say where a result comes from; the others say what was computed.
 _PROVENANCE = ("source", "history", "references", "Conventions", "sweep", "friction_inputs", RUN)
 
-#: Told how many rows there are, yields what to call with a number of rows just written.
+#: Given how many rows there are, yields what to call with a number of rows just written.
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None] | None]]
 
-#: Writes a piece of a table, given by its number; the first has the header.
-_Write = Callable[["Table", "pd.DataFrame", int], None]
+#: Writes a piece of a table; the first has the header.
+_Write = Callable[["Table", "pd.DataFrame", bool], None]
 
 
 def export(
@@ -130,7 +130,7 @@ def export(
         ):
             for table in tables:
                 for number, frame in enumerate(table.frames(chunk_cells)):
-                    write(table, frame, number)
+                    write(table, frame, number == 0)
                     if done is not None:
                         done(len(frame))
     return total
@@ -139,9 +139,7 @@ def export(
 def _check_format(path: Path) -> None:
     if path.suffix not in SUFFIXES:
         raise InputError(f"{path}: the name must end in one of {', '.join(SUFFIXES)}")
-    if (needed := SUFFIXES[path.suffix]) is None:
-        return
-    module, extra = needed
+    module, extra = SUFFIXES[path.suffix] or ("csv", "")
     try:
         importlib.import_module(module)
     except ImportError:
@@ -153,11 +151,10 @@ def _check_format(path: Path) -> None:
 
 def _in_g(table: xr.Dataset) -> xr.Dataset:
     """The same with accelerations in g."""
-    g = float(table.attrs.get("g", math.nan))
     found = table.copy()
     for name, one in table.variables.items():
         if one.attrs.get("units") == "m s-2":
-            found[name] = (one.dims, one.values / g, {**one.attrs, "units": "g"})
+            found[name] = (one.dims, one.values / float(table.attrs["g"]), {**one.attrs, "units": "g"})
     return found
 
 
@@ -171,9 +168,8 @@ class Table:
     Attributes
     ----------
     part : Dataset
-        The results, cut to what is asked for.
+        The results, cut to what is exported.
     name : str
-    results : list of str
     words : bool
         Codes as words.
     rows : list of str
@@ -184,10 +180,14 @@ class Table:
 
     part: xr.Dataset
     name: str
-    results: list[str]
     words: bool
     rows: list[str]
     columns: str | None = None
+
+    @property
+    def results(self) -> list[str]:
+        """The results; of a pivoted table one."""
+        return [str(name) for name in self.part.data_vars]
 
     @property
     def count(self) -> int:
@@ -197,12 +197,14 @@ class Table:
     @cached_property
     def left(self) -> list[str]:
         """Coordinates along the rows; of a long table also those of one value."""
-        rows = {*self.rows}
-        axes = [name for name in PARAMETERS if name in self.part.coords]
+        first = [name for name in PARAMETERS if name in self.part.coords]
+        names = dict.fromkeys((*first, *map(str, self.part.coords)))
         return [
-            str(name)
-            for name, one in {name: self.part[name] for name in (*axes, *self.part.coords)}.items()
-            if rows.issuperset(one.dims) and (one.dims or not self.columns) and name not in MOTION_FILES
+            name
+            for name in names
+            if {*self.part[name].dims} <= {*self.rows}
+            and (self.part[name].dims or not self.columns)
+            and name not in MOTION_FILES
         ]
 
     def check_size(self, source: object) -> None:
@@ -228,47 +230,41 @@ class Table:
         across = self.part.sizes[self.columns] if self.columns else 1
         for chunk in grid_chunks({dim: self.part.sizes[dim] for dim in self.rows}, max(1, cells // across)):
             part = self.part.isel(chunk).load()
-            shape = tuple(part.sizes[dim] for dim in self.rows)
-
-            def flat(one: xr.DataArray, shape: tuple[int, ...] = shape) -> Any:
-                missing = [dim for dim in self.rows if dim not in one.dims]
-                ordered = one.expand_dims(missing).transpose(*self.rows).values
-                return np.broadcast_to(ordered, shape).ravel()
-
-            found: dict[str, Any] = {header(part[name]): flat(part[name]) for name in self.left}
+            shape = {dim: part.sizes[dim] for dim in self.rows}
+            found = {header(part[name]): part[name].variable.set_dims(shape).values.ravel() for name in self.left}
             if self.columns is None:
-                found |= {header(part[name]): self._codes(part[name], flat(part[name])) for name in self.results}
+                found |= {
+                    header(part[name]): self._column(part[name], part[name].variable.set_dims(shape).values.ravel())
+                    for name in self.results
+                }
                 yield pd.DataFrame(found)
                 continue
-            (name,) = self.results
+            one = part[self.results[0]]
+            values = one.variable.set_dims({**shape, self.columns: across}).values.reshape(-1, across)
             last = header(part[self.left[-1]]) if self.left else ""
-            corner = f"{self._axis_header}: {header(part[name])}{self._constants}"
-            found[f"{last} \\ {corner}"] = found.pop(last, np.arange(1, math.prod(shape) + 1))
+            found[f"{last} \\ {self._corner}"] = found.pop(last, np.arange(1, len(values) + 1))
             for place, value in enumerate(axis_values(self.part, self.columns)):
-                one = part[name].isel({self.columns: place}, missing_dims="ignore")
-                found[value] = self._codes(part[name], flat(one))
+                found[value] = self._column(one, values[:, place])
             yield pd.DataFrame(found)
 
     @property
-    def _axis_header(self) -> str:
+    def _corner(self) -> str:
+        """What a pivoted table is of, and what it has one value of."""
         assert self.columns is not None
-        return header(self.part[self.columns]) if self.columns in self.part.coords else self.columns
-
-    @property
-    def _constants(self) -> str:
-        """What a pivoted table has one value of."""
         fixed = {str(dim): axis_values(self.part, str(dim))[0] for dim, size in self.part.sizes.items() if size == 1}
-        single = {str(name): one.values[()] for name, one in self.part.coords.items() if not one.dims}
+        fixed |= {str(name): one.values[()] for name, one in self.part.coords.items() if not one.dims}
         texts = []
-        for name, value in {**fixed, **single}.items():
+        for name, value in fixed.items():
             if name not in (*self.rows, self.columns):
                 units = self.part[name].attrs.get("units", "1") if name in self.part.coords else "1"
                 number = value if isinstance(value, str) else f"{value:.10g}"
                 texts.append(f"{name} = {number}" + ("" if units == "1" else f" {units}"))
-        return f" at {', '.join(texts)}" if texts else ""
+        across = header(self.part[self.columns]) if self.columns in self.part.coords else self.columns
+        at = f" at {', '.join(texts)}" if texts else ""
+        return f"{across}: {header(self.part[self.results[0]])}{at}"
 
-    def _codes(self, one: xr.DataArray, values: Any) -> Any:
-        """Values of a result as a table has them: codes that stand for no value missing, others in words if asked."""
+    def _column(self, one: xr.DataArray, values: Any) -> Any:
+        """Values of a result as a table has them: codes that stand for no value missing, or in words."""
         import pandas as pd
 
         if values.dtype.kind not in "iu":
@@ -276,11 +272,8 @@ class Table:
         missing = (values == -1) if one.name in WITH_MISSING else np.zeros(values.shape, bool)
         about = {**RESULTS.get(str(one.name), LIMIT_RESULTS.get(str(one.name), {})), **one.attrs}
         if self.words and "flag_meanings" in about:
-            values = pd.Series(values, dtype=object).map(_spelled(about, np.unique(values)))
-            return values.mask(missing)
-        if not missing.any():
-            return values
-        return pd.Series(values, dtype=values.dtype.name.capitalize()).mask(missing)
+            return pd.Series(values, dtype=object).map(_spelled(about, np.unique(values))).mask(missing)
+        return pd.Series(values, dtype=values.dtype.name.capitalize()).mask(missing) if missing.any() else values
 
 
 def header(one: xr.DataArray) -> str:
@@ -307,7 +300,7 @@ def _tables(
     rows: Sequence[str],
     columns: str | None,
 ) -> list[Table]:
-    """The tables asked for: a long one, or pivoted ones of a result each."""
+    """The tables that are wanted: a long one, or pivoted ones of a result each."""
     known = [str(name) for name in table.data_vars]
     chosen = list(dict.fromkeys(result_names(table) if wanted is None else wanted))
     for name in chosen:
@@ -321,12 +314,10 @@ def _tables(
     if columns is None:
         if rows:
             raise InputError(f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns")
-        return [Table(part, Path(str(source)).stem, chosen, words, dims)]
-    for option, names in (("--rows", rows), ("--columns", [columns])):
-        for name in names:
-            if name not in dims:
-                advice = did_you_mean(name, dims) if dims else "the result has none"
-                raise InputError(f"{source}: {option} {name}: no such axis here; {advice}")
+        return [Table(part, Path(str(source)).stem, words, dims)]
+    for option, name in (*(("--rows", name) for name in rows), ("--columns", columns)):
+        if name not in dims:
+            raise InputError(f"{source}: {option} {name}: no such axis here; {did_you_mean(name, dims)}")
     if columns in rows or len({*rows}) < len(rows):
         raise InputError(f"--rows {','.join(rows)} --columns {columns}: must be different axes")
     wide = [dim for dim in dims if dim not in (*rows, columns) and part.sizes[dim] > 1]
@@ -337,9 +328,7 @@ def _tables(
         raise InputError(f"{source}: neither in --rows nor in --columns: {texts}; take one value of it with --at")
     along = list(rows) or wide
     fixed = {dim: 0 for dim in dims if dim not in (*along, columns)}
-    return [
-        Table(part[[name]].isel(fixed, missing_dims="ignore"), name, [name], words, along, columns) for name in chosen
-    ]
+    return [Table(part[[name]].isel(fixed, missing_dims="ignore"), name, words, along, columns) for name in chosen]
 
 
 # --------------------------------------------------------------------------------- formats
@@ -349,12 +338,12 @@ def _tables(
 def _csv(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
     with path.open("w", encoding="utf-8", newline="") as file:
 
-        def write(table: Table, frame: "pd.DataFrame", number: int) -> None:
+        def write(table: Table, frame: "pd.DataFrame", is_first: bool) -> None:
             for name in frame.select_dtypes(["object", "string"]):
                 texts = frame[name].astype(object)
                 risky = texts.map(lambda text: isinstance(text, str) and text.startswith(_FORMULAS))
                 frame[name] = texts.where(~risky, "'" + texts.astype(str))
-            frame.to_csv(file, index=False, header=number == 0, lineterminator="\n")
+            frame.to_csv(file, index=False, header=is_first, lineterminator="\n")
 
         yield write
 
@@ -373,7 +362,7 @@ def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write
     schema = pyarrow.schema(fields, {name: str(value) for name, value in table.part.attrs.items()})
     with parquet.ParquetWriter(path, schema) as writer:
 
-        def write(table: Table, frame: "pd.DataFrame", number: int) -> None:
+        def write(table: Table, frame: "pd.DataFrame", is_first: bool) -> None:
             writer.write_table(pyarrow.Table.from_pandas(frame.rename(columns=str), schema, preserve_index=False))
 
         yield write
@@ -389,12 +378,12 @@ def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Writ
     try:
         with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
 
-            def write(table: Table, frame: pd.DataFrame, number: int) -> None:
+            def write(table: Table, frame: pd.DataFrame, is_first: bool) -> None:
                 for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
                     frame[name] = frame[name].astype(str).astype(float)
                 start = below.get(table.name, 0)
-                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=number == 0, index=False)
-                below[table.name] = start + len(frame) + (number == 0)
+                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=is_first, index=False)
+                below[table.name] = start + len(frame) + is_first
 
             yield write
             about = pd.DataFrame(_about(tables, source))
@@ -418,14 +407,11 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
             )
             for flag, count in (tally.flags or {}).items()
         ]
-    results = {name: table.part[name] for table in tables for name in table.results}
-
-    def lines(name: str) -> list[tuple[str, str]]:
-        # line by line: a cell does not hold a long text
-        return [("" if at else name, line) for at, line in enumerate(attrs.get(name, "").splitlines())]
-
+    results = [one for table in tables for one in table.part.data_vars.values()]
+    # line by line: a cell does not hold a long text
+    texts = [(name, attrs.get(name, "").splitlines()) for name in ("history", "sweep")]
     sections: dict[str, list[tuple[str, str]]] = {
-        "Results": [(header(one), str(one.attrs.get("long_name", ""))) for one in results.values()],
+        "Results": [(header(one), str(one.attrs.get("long_name", ""))) for one in results],
         "Inputs": [
             *((str(one.attrs.get("long_name", name)), values_text(one)) for name, one in part.coords.items()),
             *((name, text) for name, text in attrs.items() if name not in _PROVENANCE),
@@ -437,8 +423,7 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
             ("solved by", attrs.get("source", "not known")),
             ("table written by", f"slipsweep {__version__}"),
             ("reference", attrs.get("references", "")),
-            *lines("history"),
-            *lines("sweep"),
+            *((name if at == 0 else "", line) for name, lines in texts for at, line in enumerate(lines)),
         ],
     }
     return [row for heading, rows in sections.items() for row in ((heading, ""), *rows, ("", ""))]

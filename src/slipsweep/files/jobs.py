@@ -2,25 +2,21 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import dask.array as da
 import numpy as np
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.errors import InputError
 from slipsweep.files.motions import samples_of
-from slipsweep.files.netcdf import described, history_of
-from slipsweep.files.outputs import Read
+from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.model.variables import RESULT_DTYPES
-from slipsweep.motion.records import Record
-from slipsweep.motion.suites import Suite
 
 #: Attribute by which a run knows whether a file is its own.
 RUN = "slipsweep_run"
@@ -28,41 +24,28 @@ RUN = "slipsweep_run"
 
 @dataclass(frozen=True)
 class Job:
-    """A plan that is not made before it is needed, and what belongs to it.
+    """A sweep file, the plan that a command makes of it, and what the command's output says of itself.
 
     Attributes
     ----------
-    source : str
-        The sweep file, as the user named it.
-    files : tuple of Path or int
-        The files that were read for it.
+    spec : SweepSpec
     make : callable
-        Makes the plan.
+        Makes the plan, when it is needed.
     title : str
-    inputs : dict of str to object
-        All that the results depend on, by what users know it by.
-    names : tuple of str
-        Names of the cases.
-    recorded : Record or Suite, optional
-        The motion, whose samples are written with the results.
-    attrs : dict of str to str
-        Further attributes of the file: `sweep`, the text that repeats the run.
+    options : dict of str to object
+        What the results depend on further to the sweep file, by what users know it by.
     floats : str
         Data type of floating-point results in the file.
-    compression : int
-        Level at which the output is compressed; 0 for not.
+    attrs : dict of str to str
+        Further attributes of the file.
     """
 
-    source: str
-    files: tuple[Read, ...]
+    spec: SweepSpec
     make: Callable[[], AnyPlan]
     title: str
-    inputs: dict[str, Any]
-    names: tuple[str, ...] = ()
-    recorded: Record | Suite | None = None
-    attrs: dict[str, str] = field(default_factory=dict)
+    options: Mapping[str, Any]
     floats: str = "float64"
-    compression: int = 0
+    attrs: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def plan(self) -> AnyPlan:
@@ -72,7 +55,7 @@ class Job:
     @property
     def labels(self) -> tuple[str, ...]:
         """Names of the cases, where they are a dimension of the results."""
-        return self.names if "case" in self.plan.sizes else ()
+        return self.spec.labels if "case" in self.plan.sizes else ()
 
     @cached_property
     def dtypes(self) -> dict[str, np.dtype[Any]]:
@@ -82,7 +65,13 @@ class Job:
     @cached_property
     def identity(self) -> dict[str, Any]:
         """By what two runs know that they compute the same."""
-        return {"version of slipsweep": __version__, "data type": self.floats, **self.inputs}
+        found = {"version of slipsweep": __version__, "data type": self.floats, "sweep file": self.spec.text}
+        if self.spec.recorded is not None:
+            digest = hashlib.sha256()
+            for name, values in samples_of(self.spec.recorded).items():
+                digest.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values).tobytes())
+            found["recorded motion"] = digest.hexdigest()
+        return {**found, **self.options}
 
     @cached_property
     def digest(self) -> str:
@@ -90,41 +79,28 @@ class Job:
         return hashlib.sha256(json.dumps(self.identity, sort_keys=True).encode()).hexdigest()
 
     def described(self, table: xr.Dataset, command: str) -> xr.Dataset:
-        """Results (or a template of them) with all that the file says."""
+        """Results with all that the file says, in the file's types."""
         return described(
-            table,
+            table.assign({name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()}),
             title=self.title,
-            history=history_of(command),
+            command=command,
             labels=self.labels,
-            recorded=self.recorded,
-            **self.attrs,
-            **{RUN: self.digest},
+            recorded=self.spec.recorded,
+            attrs={**self.attrs, RUN: self.digest},
         )
 
-    @contextmanager
-    def named(self) -> Iterator[None]:
-        """Name the sweep file in front of what turns out, while it is solved, not to be allowed."""
-        try:
-            yield
-        except InputError as error:
-            # a plan that is made late names the file itself
-            raise InputError(f"{self.source}: {str(error).removeprefix(f'{self.source}: ')}") from None
+    def outline(self, command: str) -> xr.Dataset:
+        """As `described`, but with lazy arrays where the results will stand."""
+        template = self.plan.template()
+        for name, one in template.data_vars.items():
+            template[name] = (one.dims, da.zeros(one.shape, dtype=one.dtype, chunks=-1), one.attrs)
+        return self.described(template, command)
 
 
 def sweep_job(spec: SweepSpec) -> Job:
     """The job of `slipsweep run`: a sweep, or the statistics of samples."""
-    return Job(
-        spec.source,
-        spec.files,
-        spec.plan,
-        spec.output.title,
-        _inputs(spec) | {"solver": repr(spec.solver)},
-        spec.labels,
-        spec.recorded,
-        {"sweep": spec.text},
-        spec.output.dtype,
-        spec.output.compression,
-    )
+    options, attrs = {"solver": repr(spec.solver)}, {"sweep": spec.text}
+    return Job(spec, spec.plan, spec.output.title, options, spec.output.dtype, attrs)
 
 
 def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None) -> Job:
@@ -139,22 +115,8 @@ def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplit
         m/s².
     """
     return Job(
-        spec.source,
-        spec.files,
+        spec,
         lambda: spec.limits(displacement, maximum_amplitude),
         "Amplitudes at which a tolerable displacement is reached",
-        _inputs(spec) | {"--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
-        spec.labels,
-        spec.recorded,
-        compression=spec.output.compression,
+        {"--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
     )
-
-
-def _inputs(spec: SweepSpec) -> dict[str, Any]:
-    """What the results depend on: the text of the sweep file, and the numbers of its records."""
-    if spec.recorded is None:
-        return {"sweep file": spec.text}
-    digest = hashlib.sha256()
-    for name, values in samples_of(spec.recorded).items():
-        digest.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values).tobytes())
-    return {"sweep file": spec.text, "recorded motion": digest.hexdigest()}

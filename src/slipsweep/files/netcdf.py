@@ -1,4 +1,4 @@
-"""netCDF-4 files of results by the CF conventions: what stands in them, and how their values are written."""
+"""netCDF-4 files of results by the CF conventions: what stands in them, and how xarray is told to write it."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -12,7 +12,7 @@ import xarray as xr
 
 from slipsweep.files.motions import embedded
 from slipsweep.files.outputs import complete_or_absent, writing
-from slipsweep.model.variables import RECORD_COUNTS, SlidingMode
+from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 
@@ -25,31 +25,28 @@ def history_of(command: str) -> str:
     return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
 
 
-def storable(text: str) -> str:
-    """A text as a file can hold it: bytes of a name that are no UTF-8 are spelled out."""
-    return text.encode(errors="backslashreplace").decode()
-
-
 def described(
     table: xr.Dataset,
     *,
     title: str,
-    history: str,
+    command: str,
     labels: tuple[str, ...] = (),
     recorded: Record | Suite | None = None,
-    **attrs: str,
+    attrs: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
     """Results as a file holds them: with labels of cases, the samples of records, and global attributes.
 
     Parameters
     ----------
     table : Dataset
-    title, history : str
+    title : str
+    command : str
+        The command as typed, for the attribute `history`.
     labels : tuple of str
         Names of the cases.
     recorded : Record or Suite, optional
         The motion that the results are the response to.
-    attrs : str
+    attrs : mapping of str to str, optional
         Further global attributes.
     """
     found = table.copy()
@@ -63,145 +60,77 @@ def described(
             found[name].attrs.pop("ancillary_variables", None)
     if recorded is not None:
         found = found.assign(embedded(recorded))
-    return found.assign_attrs(title=title, Conventions="CF-1.11", history=history, **attrs)
+    found.attrs |= {"title": title, "Conventions": "CF-1.11", "history": history_of(command), **(attrs or {})}
+    return found
 
 
 def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
-    """What stands in a file for no value."""
-    if dtype.kind == "f":
+    """What stands in a file for no value of a result."""
+    if dtype.kind == "f" and name not in RECORD_SAMPLES:
         return float("nan")
     return int(SlidingMode.MISSING) if name in WITH_MISSING else None
 
 
 @contextmanager
 def new_file(
-    temporary: Path,
-    path: Path,
-    table: xr.Dataset,
-    dtypes: Mapping[str, np.dtype[Any]],
-    chunks: Mapping[str, int] | None = None,
-    compression: int = 0,
+    table: xr.Dataset, path: Path, lengths: Mapping[str, int] | None = None, compression: int = 0
 ) -> Iterator[netCDF4.Dataset]:
-    """Make a netCDF file with all that `table` has but its results, which the caller writes.
+    """Write a netCDF file; of variables that are dask arrays all but their values, which the caller writes into it.
 
     Parameters
     ----------
-    temporary, path : Path
-        The file, and what it is called in errors.
     table : Dataset
         As `described` gives it.
-    dtypes : mapping of str to dtype
-        The results, and their types in the file.
-    chunks : mapping of str to int, optional
-        Lengths that compressed results are cut into.
+    path : Path
+    lengths : mapping of str to int, optional
+        Lengths of the chunks along each dimension, if the results are compressed; by default all of it.
     compression : int
         Level of zlib, which every build of the library has; 0 for none.
-
-    Raises
-    ------
-    RunError
-        It cannot be written.
     """
-    with writing(path):
-        file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
-        file.set_fill_off()  # every value is written: filling the file first would write it twice
-        file.set_auto_maskandscale(False)
-        try:
-            _write_head(file, table, dtypes, chunks or {}, compression)
-            yield file
-        except BaseException:
-            with suppress(RuntimeError, OSError):  # the first error is the one to report
-                file.close()
-            raise
-        file.close()
-
-
-def _write_head(
-    file: netCDF4.Dataset,
-    table: xr.Dataset,
-    dtypes: Mapping[str, np.dtype[Any]],
-    chunks: Mapping[str, int],
-    compression: int,
-) -> None:
-    # in the order of the results, which that of the coordinates need not be
-    widest: Any = max((table[name].dims for name in dtypes), key=len, default=())
-    for dim in dict.fromkeys((*map(str, widest), *map(str, table.sizes))):
-        file.createDimension(dim, table.sizes[dim])
-    # texts along a dimension are labels, and no coordinate variable of it (CF 6.1)
-    auxiliary = [name for name, one in table.coords.items() if name not in table.sizes or one.dtype.kind in "OU"]
-    for name in (*table.coords, *dtypes, *(one for one in table.data_vars if one not in dtypes)):
-        one = table[name].variable
+    found = table.assign_attrs(_attributes(table.attrs))
+    encoding: dict[Any, dict[str, Any]] = {}
+    for name, one in table.variables.items():
+        found[name].attrs = _attributes(one.attrs, one.dtype)
         if one.dtype.kind in "OU":
-            _write_text(file, str(name), one)
+            encoding[name] = {"dtype": "S1"}  # characters, since few programs read netCDF strings
             continue
-        dtype, attrs = dtypes.get(str(name), one.dtype), dict(one.attrs)
-        how: dict[str, Any] = {"contiguous": True}
-        if name in dtypes and (own := [str(other) for other in auxiliary if {*table[other].dims} <= {*one.dims}]):
-            attrs["coordinates"] = " ".join(own)
-        if name in dtypes and compression and one.dims:
-            sizes = [min(chunks.get(str(dim), size), size) for dim, size in one.sizes.items()]
-            how = {"zlib": True, "complevel": compression, "shuffle": True, "chunksizes": sizes}
-        fill = fill_value(str(name), dtype) if name in dtypes else None
-        variable: Any = file.createVariable(name, dtype, one.dims, fill_value=fill, **how)
-        _describe(variable, attrs)
-        if name not in dtypes:
-            variable[...] = one.values
-    _describe(file, table.attrs)
+        is_result = name in table.data_vars
+        encoding[name] = {"_FillValue": fill_value(str(name), one.dtype) if is_result else None}
+        if compression and is_result and one.dims:
+            sizes = tuple((lengths or {}).get(str(dim), size) for dim, size in one.sizes.items())
+            encoding[name] |= {"zlib": True, "complevel": compression, "shuffle": True, "chunksizes": sizes}
+    file = netCDF4.Dataset(path, "w", format="NETCDF4")
+    file.set_fill_off()  # every value is written: to fill the file first would be to write it twice
+    try:
+        found.dump_to_store(xr.backends.NetCDF4DataStore(file), encoding=encoding)
+        file.set_auto_maskandscale(False)
+        yield file
+    except BaseException:
+        with suppress(RuntimeError, OSError):  # the first error is the one to report
+            file.close()
+        raise
+    file.close()
 
 
-def _write_text(file: netCDF4.Dataset, name: str, one: xr.Variable) -> None:
-    """Write texts as characters in UTF-8, since few programs read netCDF strings."""
-    encoded = np.array([str(text).encode() for text in one.values.flat])
-    characters = encoded.view("S1").reshape(*one.shape, -1)
-    file.createDimension(f"{name}_length", characters.shape[-1])
-    variable: Any = file.createVariable(name, "S1", (*map(str, one.dims), f"{name}_length"))
-    variable.set_auto_chartostring(False)
-    _describe(variable, {**one.attrs, "_Encoding": "utf-8"})
-    variable[...] = characters
-
-
-def _describe(target: netCDF4.Dataset | netCDF4.Variable, attributes: Mapping[Any, Any]) -> None:
-    """Set attributes: text as characters in UTF-8, flag values in the type of their variable."""
-    for name, value in attributes.items():
+def _attributes(attrs: Mapping[Any, Any], dtype: Any = np.int32) -> dict[Any, Any]:
+    """Attributes as every program reads them: text as characters, whole numbers of 32 bits, codes of their type."""
+    found: dict[Any, Any] = {}
+    for name, value in attrs.items():
         if isinstance(value, str):
-            # as bytes: the library would write text beyond ASCII as a netCDF string
-            target.setncattr(name, storable(value).encode())
+            # as bytes: the library writes text beyond ASCII as a netCDF string; bytes of a name that are no UTF-8 are
+            # spelled out
+            found[name] = value if value.isascii() else value.encode(errors="backslashreplace")
         elif name in ("flag_values", "flag_masks"):
-            target.setncattr(name, np.asarray(value, target.dtype))
-        elif np.asarray(value).dtype.kind == "i":
-            target.setncattr(name, np.int32(value))  # not every program reads 64-bit attributes
+            found[name] = np.asarray(value, dtype)
         else:
-            target.setncattr(name, value)
+            found[name] = np.int32(value) if np.asarray(value).dtype.kind == "i" else value
+    return found
 
 
-def write_table(
-    table: xr.Dataset,
-    path: Path,
-    *,
-    title: str,
-    command: str,
-    overwrite: bool = False,
-    recorded: Record | Suite | None = None,
-    labels: tuple[str, ...] = (),
-) -> None:
-    """Write a Dataset that is in memory (a time history) by the rules that sweeps are written by.
-
-    The `recorded` motion that it is the response to is written with it, and the `labels` of its cases.
-    """
-    whole = described(table, title=title, history=history_of(command), labels=labels, recorded=recorded)
-    write_whole(whole, path, {str(name): one.dtype for name, one in table.data_vars.items()}, overwrite)
-
-
-def write_whole(
-    table: xr.Dataset, path: Path, dtypes: Mapping[str, np.dtype[Any]], overwrite: bool, compression: int = 0
-) -> None:
-    """Write what `described` gives, with all of its values; the types of its results are those of `dtypes`."""
-    with (
-        complete_or_absent(path, overwrite) as temporary,
-        new_file(temporary, path, table, dtypes, compression=compression) as file,
-    ):
-        for name, dtype in dtypes.items():
-            file[name][...] = table[name].values.astype(dtype, copy=False)
+def write_table(table: xr.Dataset, path: Path, overwrite: bool = False, compression: int = 0) -> None:
+    """Write what `described` gives, with its values in memory, complete or not at all."""
+    with complete_or_absent(path, overwrite) as temporary, writing(path), new_file(table, temporary, None, compression):
+        pass
 
 
 def without_time_axis(table: xr.Dataset) -> xr.Dataset:
