@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from slipsweep.errors import InputError
-from slipsweep.files import shipped, spec
+from slipsweep.files import spec
 from tests.support.commands import command
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -45,8 +44,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
 
 def test_the_shipped_files_themselves_are_never_replaced(tmp_path: Path) -> None:
     (tmp_path / "paper.toml").symlink_to(SWEEPS / "paper.toml")
-    with pytest.raises(InputError, match="which this command reads"):
-        shipped.write("paper", tmp_path, overwrite=True)
+    assert "which this command reads" in command(tmp_path, "example", "paper", "--overwrite").stderr
 
 
 def test_a_name_that_is_not_there(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slipsweep import Cycle, Mendez, Newmark, Sine, Step
+from slipsweep import Cycle, Mendez, Sine, Step
 from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.model import variables
@@ -122,17 +122,6 @@ def test_options_reach_the_sweep() -> None:
     assert sweep.output.variables == ["validity"]
 
 
-def test_newmark_has_no_rise() -> None:
-    model = spec.parse(GOOD + '[model]\nfriction = "newmark"\n', "a.toml").model
-    assert model == Newmark()
-    assert not hasattr(model, "rise")
-
-
-def test_coulomb_is_the_default_that_an_axis_replaces() -> None:
-    text = GOOD + '[model]\nyield_acceleration = "coulomb"\n[axes.yield_acceleration]\nvalues = [0.5, 1]\n'
-    np.testing.assert_array_equal(spec.parse(text, "a.toml").inputs.given["yield_acceleration"], [0.5, 1])
-
-
 def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
     sweep = spec.parse(CASES, "a.toml")
     arguments = sweep.inputs.given
@@ -179,12 +168,6 @@ def test_units(name: str, units: str, factor: float) -> None:
 def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:
     arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").inputs.given
     assert arguments["amplitude"][-1] == 1.62
-
-
-def test_displacement_amplitude_in_millimetres() -> None:
-    text = GOOD.replace("axes.amplitude", "axes.displacement_amplitude").replace('"g"', '"mm"')
-    arguments = spec.parse(text, "a.toml").inputs.given
-    np.testing.assert_allclose(arguments["displacement_amplitude"], [1e-4, 4e-4, 7e-4, 1e-3])
 
 
 BAD = {

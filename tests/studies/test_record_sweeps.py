@@ -109,7 +109,7 @@ def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
         ('"motion.csv"', '"no.csv"', "no.csv: cannot be read"),
         ('units = "g"', 'units = "feet"', "excitation.units = 'feet': must be one of 'm/s2'"),
         ('"both"', "0", "polarity = 0: must be 1, -1, a list of these, or 'both'"),
-        ('record = "motion.csv"\n', "", "excitation.polarity: only beside excitation.record"),
+        ('record = "motion.csv"\n', "", "excitation.units: only beside excitation.record"),
         ("[axes.time_scale]", "[axes.amplitude]", "amplitude, scale: must not both be given"),
         ("axes.time_scale", "axes.frequency", "frequency: not allowed with a Record"),
         ("[axes.mu_s]\nvalues = [0.3, 0.4]", "", "mu_s: must be given"),

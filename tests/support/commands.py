@@ -1,16 +1,18 @@
-"""Commands run in this process: what they print, and that a refusal is one line."""
+"""Commands, in this process or as users start them."""
 
 import contextlib
 import io
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 from unittest import mock
 
 from slipsweep.cli import main
+
+SLIPSWEEP = (sys.executable, "-m", "slipsweep")
 
 
 class Ended(NamedTuple):
@@ -21,10 +23,10 @@ class Ended(NamedTuple):
     errors: str
 
 
-def run_command(*arguments: object, encoding: str = "utf-8") -> Ended:
-    """Run a command to its end; `encoding` is that of what it prints."""
+def run_command(*arguments: object) -> Ended:
+    """Run a command to its end in this process."""
     written = [io.BytesIO(), io.BytesIO()]
-    streams = [io.TextIOWrapper(one, encoding, errors="surrogateescape", write_through=True) for one in written]
+    streams = [io.TextIOWrapper(one, "utf-8", errors="surrogateescape", write_through=True) for one in written]
     words = [str(argument) for argument in arguments]
     with (
         contextlib.redirect_stdout(streams[0]),
@@ -36,45 +38,35 @@ def run_command(*arguments: object, encoding: str = "utf-8") -> Ended:
     return Ended(status, output, errors)
 
 
-def command(folder: Path, *arguments: object, encoding: str = "utf-8") -> "subprocess.CompletedProcess[str]":
-    """Run a command to its end in `folder`: what `processes.slipsweep` does, without a second of start-up."""
+def command(folder: Path, *arguments: object) -> "subprocess.CompletedProcess[str]":
+    """Run a command to its end in `folder`: what `slipsweep` does, without a second of start-up."""
     with working_folder(folder):
-        ended = run_command(*arguments, encoding=encoding)
+        ended = run_command(*arguments)
     return subprocess.CompletedProcess([*map(str, arguments)], ended.status, ended.output, ended.errors)
-
-
-def one_line(message: str, most: int = 700) -> str:
-    """Check that what is said of bad input is one line, of letters that a terminal shows, and not a long one."""
-    assert message.splitlines() == [message], ascii(message)
-    assert message.isprintable(), ascii(message)
-    assert 0 < len(message) < most, message
-    return message
-
-
-def is_served(*arguments: object) -> bool:
-    """Run a command, which may be refused for its input, or have no value to give; tell whether it was served."""
-    ended = run_command(*arguments)
-    valueless = ended.errors.startswith("slipsweep: error: the model gives no value: ")
-    assert ended.status == (1 if valueless else 2 if ended.errors else 0), (arguments, ended)
-    if ended.status == 0:
-        return True
-    assert ended.output == "", (arguments, ended)
-    start = "slipsweep: error: "
-    assert ended.errors.startswith(start), (arguments, ended)
-    assert ended.errors.endswith("\n"), (arguments, ended)
-    one_line(ended.errors.removeprefix(start)[:-1], 1010)
-    return False
 
 
 @contextlib.contextmanager
 def working_folder(folder: Path) -> Iterator[Path]:
     """Run what follows in a folder, with nothing on standard input."""
-    before, stdin = Path.cwd(), sys.stdin
-    os.chdir(folder)
-    try:
-        with open(os.devnull, encoding="utf-8") as nothing:
-            sys.stdin = nothing
-            yield folder
-    finally:
-        sys.stdin = stdin
-        os.chdir(before)
+    nothing = io.StringIO()
+    with contextlib.chdir(folder), mock.patch.object(sys, "stdin", nothing):
+        yield folder
+
+
+def slipsweep(
+    folder: Path,
+    *arguments: object,
+    environment: Mapping[str, str] | None = None,
+    preexec_fn: Callable[[], object] | None = None,
+) -> "subprocess.CompletedProcess[str]":
+    """Run a command in `folder` as a process, with `environment` on top of this one's, and wait for it."""
+    return subprocess.run(
+        [*SLIPSWEEP, *map(str, arguments)],
+        cwd=folder,
+        env={**os.environ, **(environment or {})},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=300,  # kernels may have to be compiled
+        check=False,
+        preexec_fn=preexec_fn,
+    )

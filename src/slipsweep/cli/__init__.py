@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from slipsweep._version import __version__
 from slipsweep.cli import calibrate, chart, example, explore, export, hazard, info, limit, report, run, simulate
-from slipsweep.cli.help import printable
+from slipsweep.cli.common import printable
 from slipsweep.errors import InputError, RunError
 
 

@@ -1,24 +1,25 @@
 """`slipsweep friction` and `slipsweep calibrate`: what a test on a shaking table measured."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from slipsweep.cli.common import (
+    BLOCK,
     FIGURES,
     OUTPUT,
     MuS,
     Overwrite,
+    Panel,
     Quiet,
     Theta,
-    check_ending,
-    typed_command,
-    write_figure,
+    check_outputs,
+    examples,
+    netcdf_writer,
+    write_outputs,
 )
-from slipsweep.cli.help import Panel, examples
-from slipsweep.cli.options import BLOCK, chooses
+from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
@@ -84,7 +85,7 @@ def friction(
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
     angle = quantity("--theta", theta, "degree", g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
-    paths = _checked(output, overwrite, [test], (".nc", *FIGURES))
+    paths = check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.motion.shaking import read_test
     from slipsweep.studies.friction import friction_dataset
 
@@ -93,8 +94,8 @@ def friction(
         angle,
         mu_s,
         g=g,
-        offset=_named(offset),
-        drift=_named(drift),
+        offset=_channels(offset),
+        drift=_channels(drift),
         rest=None if rest is None else _times(rest),
         threshold=least,
     )
@@ -104,7 +105,7 @@ def friction(
 
         return calibration_figures.friction(table)
 
-    _write(paths, table, figure, overwrite)
+    write_outputs(paths, overwrite, figure, {".nc": netcdf_writer(table, table.attrs["title"])})
     if quiet:
         return
     if table.attrs["constant_friction"]:
@@ -149,35 +150,40 @@ def calibrate(
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     angle = quantity("--theta", theta, "degree", model.g)
-    paths = _checked(output, overwrite, tests, (".nc", ".toml", *FIGURES))
+    paths = check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.motion.shaking import read_test
     from slipsweep.studies.calibration import calibration_dataset
+    from slipsweep.studies.findings import sweep_file_text
 
     table = calibration_dataset(
         [read_test(test) for test in tests],
         angle,
         mu_s,
         model=model,
-        offset=_named(offset),
-        drift=_named(drift),
+        offset=_channels(offset),
+        drift=_channels(drift),
         noise=None,
         cycles=cycles,
     )
+    text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
 
     def figure() -> "Figure":
         from slipsweep.charts import calibration_figures
 
         return calibration_figures.calibration(table)
 
-    _write(paths, table, figure, overwrite)
+    as_netcdf = netcdf_writer(table, table.attrs["title"])
+    as_toml = lambda path: path.write_text(text, encoding="utf-8")  # noqa: E731
+    write_outputs(paths, overwrite, figure, {".nc": as_netcdf, ".toml": as_toml})
     if quiet:
         return
     _summarize(table)
+    typer.echo(f"\n{text}")
     for path in paths:
         typer.echo(path)
 
 
-def _named(given: list[str] | None) -> str | list[str]:
+def _channels(given: list[str] | None) -> str | list[str]:
     return "all" if given == ["all"] else given or []
 
 
@@ -187,35 +193,6 @@ def _times(text: str) -> list[float]:
         return [float(first), float(last)]
     except ValueError:
         raise InputError(f"--rest {text}: must be two times, s, as FROM:TO") from None
-
-
-def _checked(output: list[Path] | None, overwrite: bool, tests: list[Path], allowed: tuple[str, ...]) -> list[Path]:
-    """The outputs, refused before anything is computed."""
-    from slipsweep.files import outputs
-
-    paths = output or []
-    for path in paths:
-        check_ending(path, allowed)
-    outputs.check_outputs(paths, overwrite, reads=tests)
-    return paths
-
-
-def _write(paths: list[Path], table: "xr.Dataset", figure: Callable[[], "Figure"], overwrite: bool) -> None:
-    from slipsweep.files import netcdf, outputs
-    from slipsweep.studies.findings import sweep_file_text
-
-    for path in paths:
-        if path.suffix == ".nc":
-            plain = netcdf.without_time_axis(table)
-            named = netcdf.described(plain, title=table.attrs["title"], command=typed_command())
-            netcdf.write_table(named, path, overwrite)
-            continue
-        if path.suffix != ".toml":
-            write_figure(figure(), path, overwrite)
-            continue
-        with outputs.complete_or_absent(path, overwrite) as temporary:
-            text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
-            temporary.write_text(text, encoding="utf-8")
 
 
 def _echo_coefficients(table: "xr.Dataset") -> None:
@@ -229,8 +206,6 @@ def _echo_coefficients(table: "xr.Dataset") -> None:
 
 def _summarize(table: "xr.Dataset") -> None:
     import numpy as np
-
-    from slipsweep.studies.findings import sweep_file_text
 
     constant = table.attrs["constant_friction"]
     if constant:
@@ -266,7 +241,6 @@ def _summarize(table: "xr.Dataset") -> None:
     for finding in table.attrs["findings"].splitlines():
         if finding != constant:
             typer.echo(f"note: {finding}")
-    typer.echo(f"\n{sweep_file_text(table.attrs['model_table'], table.attrs['uncertainty_table'])}")
 
 
 def _echo_cycles(table: "xr.Dataset") -> None:

@@ -6,14 +6,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, check_ending, cuts, write_figure
-from slipsweep.cli.help import Panel
+from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Panel, check_ending, cuts, examples, write_outputs
 from slipsweep.errors import InputError
 
 #: Groups of options.
 CHART, AXES, LOOK = Panel("Chart"), Panel("Axes"), Panel("Look")
 
-EXAMPLE = "Example: slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf"
+EXAMPLE = examples("slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf")
 
 
 def chart(
@@ -94,8 +93,8 @@ def chart(
                     book.write(temporary, result, figures.values())
                 typer.echo(path)
     for name, figure in {} if together else figures.items():
+        write_outputs(wanted[name], overwrite, lambda: figure)  # noqa: B023
         for path in wanted[name]:
-            write_figure(figure, path, overwrite)
             typer.echo(path)
     for name, reason in left_out.items():
         typer.echo(f"no {name}: {reason}")

@@ -1,35 +1,28 @@
-"""What several commands share: options, progress, the shares of modes and flags, the command as typed."""
+"""What several commands share: groups of options, outputs, progress, and what is printed of results."""
 
+import functools
 import io
 import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from slipsweep.cli.help import Panel, printable
-from slipsweep.cli.options import BLOCK
 from slipsweep.errors import InputError
-from slipsweep.model.variables import (
-    FLAG_KIND_TEXT,
-    PARAMETERS,
-    FlagKind,
-    SensitivityStatus,
-    Validity,
-    flags_of,
-)
+from slipsweep.model.variables import FLAG_KIND_TEXT, PARAMETERS, FlagKind, SensitivityStatus, Validity, flags_of
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
     from slipsweep.files.jobs import Job
     from slipsweep.files.storing import Place, Report
     from slipsweep.grid.tally import Indices, Tally
+    from slipsweep.motion.records import Record
 
 #: The largest displacement that a number without a unit is taken for, m: more is likely to be meant in millimetres.
 _MOST_WITHOUT_UNIT = 2.0
@@ -37,18 +30,185 @@ _MOST_WITHOUT_UNIT = 2.0
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
 
+
+class Panel(str):
+    """The name of a group of options in a command's help; called, it declares one of them."""
+
+    def __call__(self, about: str, *names: str, **more: Any) -> Any:
+        """An option of the group; names where its parameter does not give it, and what else typer takes."""
+        return typer.Option(*names, help=about.replace("[", r"\["), rich_help_panel=self, **more)
+
+
+SHAKING, BLOCK, OUTPUT, LARGE = Panel("Shaking"), Panel("Block"), Panel("Output"), Panel("Large runs")
+
+#: The group of options that few cases need.
+RARE = Panel("Rare options")
+
 Theta = Annotated[str, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")]
 MuS = Annotated[float, BLOCK("Static friction coefficient.")]
-#: Groups of options that several commands have.
-OUTPUT, LARGE = Panel("Output"), Panel("Large runs")
-
 Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrite")]
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
-
 Resume = Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", "--resume")]
 Memory = Annotated[str | None, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", metavar="SIZE")]
 Workers = Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", metavar="N")]
 Scheduler = Annotated[str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")]
+
+
+def examples(*lines: str) -> str:
+    """Commands that stand below a command's help, one line each."""
+    heading = "Example:" if len(lines) == 1 else "Examples:"
+    return "\n\n".join((heading, *(line.replace("[", r"\[") for line in lines)))
+
+
+# --------------------------------------------------------------------------- what is typed
+
+
+def cuts(given: Sequence[str] | None) -> dict[str, str]:
+    """Take apart what was typed with ``--at``: names and values."""
+    found: dict[str, str] = {}
+    for text in given or ():
+        name, separator, value = text.partition("=")
+        if not (separator and name and value):
+            raise InputError(f"--at {text}: must be NAME=VALUE, as in --at theta=12")
+        if name.strip() in found:
+            raise InputError(f"--at {text}: {name.strip()} is given twice")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def displacements(texts: Sequence[str], g: float) -> list[float]:
+    """Return the displacements given with ``-d``, in m, in order and each once.
+
+    Raises
+    ------
+    InputError
+        One is no length, not > 0, or a number so large that its unit is in doubt.
+    """
+    from slipsweep.model.parameters import check_values
+    from slipsweep.model.units import quantity
+
+    found = set()
+    for text in texts:
+        length = quantity("--displacement", text, "m", g)
+        if length > _MOST_WITHOUT_UNIT and not text.strip()[-1].isalpha():
+            raise InputError(
+                f"--displacement = {text}: without a unit that is {length:g} m; give the unit: -d {text.strip()}mm or "
+                f"-d {text.strip()}m"
+            )
+        found.add(length)
+    return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
+
+
+def typed_command() -> str:
+    """The command as typed, for the history of a file."""
+    return shlex.join(["slipsweep", *sys.argv[1:]])
+
+
+# ------------------------------------------------------------------------------- outputs
+
+
+def check_outputs(
+    output: Sequence[Path] | None, endings: Sequence[str], overwrite: bool, reads: Sequence[Path | int]
+) -> list[Path]:
+    """Refuse outputs that cannot be written, before anything is computed; return those that there are."""
+    from slipsweep.files import outputs
+
+    paths = list(output or ())
+    for path in paths:
+        check_ending(path, endings)
+    outputs.check_outputs(paths, overwrite, reads=reads)
+    return paths
+
+
+def check_ending(path: Path, endings: Sequence[str]) -> None:
+    """Refuse an output whose name ends in what the command cannot write."""
+    if path.suffix not in endings:
+        raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
+
+
+def write_outputs(
+    paths: Sequence[Path],
+    overwrite: bool,
+    figure: "Callable[[], Figure]",
+    writers: Mapping[str, Callable[[Path], object]] | None = None,
+) -> None:
+    """Write each output, complete or not at all: by the writer of its ending, or the figure, which is drawn once."""
+    from slipsweep.files.outputs import complete_or_absent
+
+    drawn = functools.cache(figure)
+    for path in paths:
+        with complete_or_absent(path, overwrite) as temporary:
+            if path.suffix not in FIGURES:
+                (writers or {})[path.suffix](temporary)
+                continue
+            content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+            drawn().savefig(content, format=path.suffix[1:], dpi=150)
+            temporary.write_bytes(content.getvalue())
+
+
+def netcdf_writer(table: "xr.Dataset", title: str, recorded: "Record | None" = None) -> Callable[[Path], None]:
+    """What writes a time history, and the `recorded` motion that it is the response to."""
+
+    def write(path: Path) -> None:
+        from slipsweep.files import netcdf
+
+        plain = netcdf.without_time_axis(table)
+        netcdf.write_table(netcdf.described(plain, title=title, command=typed_command(), recorded=recorded), path)
+
+    return write
+
+
+def write_fragility(table: "xr.Dataset", path: Path, lengths: Sequence[float] | None = None) -> None:
+    """Write P(u > d) along the axis amplitude as an .xml file of OpenQuake, for displacements in m."""
+    from slipsweep.studies.fragility import fragility, openquake_fragility
+
+    path.write_text(openquake_fragility(fragility(table, lengths)), encoding="utf-8")
+
+
+def run_job(
+    job: "Job",
+    path: "Place",
+    quiet: bool,
+    *,
+    overwrite: bool,
+    resume: bool,
+    memory: str | None,
+    workers: int | None,
+    scheduler: str | None,
+    unit: str = "cells",
+) -> "Report":
+    """Solve and write what a command computes, in chunks if need be."""
+    from slipsweep.files import storing
+    from slipsweep.grid.resources import parse_size
+
+    if resume and overwrite:
+        raise InputError(
+            "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
+        )
+    nbytes = None if memory is None else parse_size("--memory", memory)
+    with progress_bar(job.plan.cells, quiet, unit) as progress:
+        report = storing.run(
+            job,
+            path,
+            command=typed_command(),
+            overwrite=overwrite,
+            resume=resume,
+            memory=nbytes,
+            workers=workers,
+            scheduler=scheduler,
+            progress=progress,
+        )
+    if report.found and not quiet:
+        typer.echo(f"{path}: complete already, by the same sweep; nothing was computed")
+    return report
+
+
+# ----------------------------------------------------------------------- what is printed
+
+
+def printable(text: str) -> str:
+    """The text with control characters escaped, whatever a name or a label of a file has in it."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def echo(text: object = "") -> None:
@@ -90,72 +250,28 @@ def _echo_indices(indices: "Indices") -> None:
             typer.echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
     for status, count in indices.status.items():
         if count and status is not SensitivityStatus.COMPUTED:
-            text = status.text
-            typer.echo(f"  none at {count} ({status.name.lower()}): {text}")
+            typer.echo(f"  none at {count} ({status.name.lower()}): {status.text}")
 
 
-def place_of(text: str) -> "Place":
-    """An output as typed: a path, or the address of a store."""
-    from slipsweep.files.opening import is_address
+def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] = ()) -> None:
+    """Print median, 16 and 84 %, share of zeros and P(u > d) at each grid point of a result under a suite.
 
-    return text if is_address(text) else Path(text)
-
-
-def echo_found(path: Path | str) -> None:
-    """Say that there was nothing to go on with."""
-    typer.echo(f"{path}: complete already, by the same sweep; nothing was computed")
-
-
-def write_figure(figure: "Figure", path: Path, overwrite: bool) -> None:
-    """Write a figure in the format that the name ends in."""
-    from slipsweep.files import outputs
-
-    drawn = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
-    figure.savefig(drawn, format=path.suffix[1:], dpi=150)
-    with outputs.complete_or_absent(path, overwrite) as temporary:
-        temporary.write_bytes(drawn.getvalue())
-
-
-def check_ending(path: Path, endings: Sequence[str]) -> None:
-    """Refuse an output whose name ends in what the command cannot write."""
-    if path.suffix not in endings:
-        raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
-
-
-def cuts(given: Sequence[str] | None) -> dict[str, str]:
-    """Take apart what was typed with ``--at``: names and values."""
-    found: dict[str, str] = {}
-    for text in given or ():
-        name, separator, value = text.partition("=")
-        if not (separator and name and value):
-            raise InputError(f"--at {text}: must be NAME=VALUE, as in --at theta=12")
-        if name.strip() in found:
-            raise InputError(f"--at {text}: {name.strip()} is given twice")
-        found[name.strip()] = value.strip()
-    return found
-
-
-def displacements(texts: Sequence[str], g: float) -> list[float]:
-    """Return the displacements given with ``-d``, in m, in order and each once.
-
-    Raises
-    ------
-    InputError
-        One is no length, not > 0, or a number so large that its unit is in doubt.
+    Parameters
+    ----------
+    table : Dataset
+    most : int
+        Most grid points that are printed.
+    typed : sequence of str
+        Displacements d as typed.
     """
-    from slipsweep.model.parameters import check_values
-    from slipsweep.model.units import quantity
+    stored = {"permanent_displacement", "validity"} <= {*table.data_vars} and "limit_amplitude" not in table
+    if not stored or table["permanent_displacement"].sizes.get("motion", 1) < 2:
+        return
+    from slipsweep.studies.suite_statistics import summary_lines
 
-    found = set()
-    for text in texts:
-        length = quantity("--displacement", text, "m", g)
-        if length > _MOST_WITHOUT_UNIT and not text.strip()[-1].isalpha():
-            raise InputError(
-                f"--displacement = {text}: without a unit that is {length:g} m; give the unit: -d {text.strip()}mm or "
-                f"-d {text.strip()}m"
-            )
-        found.add(length)
-    return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
+    lengths = displacements(typed, float(table.attrs["g"])) if typed else None
+    for line in summary_lines(table, lengths, most):
+        echo(line)
 
 
 def taken_as(values: Mapping[str, float], g: float) -> str:
@@ -166,6 +282,9 @@ def taken_as(values: Mapping[str, float], g: float) -> str:
         in_g = f" ({value / g:.4g} g)" if unit == "m/s2" else ""
         texts.append(f"{name.replace('_', ' ')} {value:.6g} {unit}{in_g}")
     return ", ".join(texts)
+
+
+# ------------------------------------------------------------------------------ progress
 
 
 @contextmanager
@@ -214,48 +333,3 @@ class Watch:
         compiling = self._compiling() - self._before
         apart = f" ({compiling:.2f} s to compile, once)" if compiling > 0.0 else ""
         return f"{time.perf_counter() - self._started:.2f} s{apart}, {self.speed(count):.3g} {unit}/s"
-
-
-def typed_command() -> str:
-    return shlex.join(["slipsweep", *sys.argv[1:]])
-
-
-@dataclass(frozen=True)
-class Chunks:
-    """How a run is carried out in chunks: the options of that name."""
-
-    overwrite: bool
-    resume: bool
-    memory: str | None
-    workers: int | None
-    scheduler: str | None
-
-    def __post_init__(self) -> None:
-        if self.resume and self.overwrite:
-            raise InputError(
-                "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
-            )
-
-    def given(self) -> list[str]:
-        """Options that only make sense with an output in chunks."""
-        others = {**asdict(self), "overwrite": None}
-        return [f"--{name}" for name, value in others.items() if value not in (None, False)]
-
-    def run(self, job: "Job", path: "Place", quiet: bool, unit: str = "cells") -> "Report":
-        """Solve and write what a command asks for."""
-        from slipsweep.files import storing
-        from slipsweep.grid.resources import parse_size
-
-        memory = None if self.memory is None else parse_size("--memory", self.memory)
-        with progress_bar(job.plan.cells, quiet, unit) as progress:
-            return storing.run(
-                job,
-                path,
-                command=typed_command(),
-                overwrite=self.overwrite,
-                resume=self.resume,
-                memory=memory,
-                workers=self.workers,
-                scheduler=self.scheduler,
-                progress=progress,
-            )

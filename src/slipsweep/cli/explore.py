@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, check_ending, echo
-from slipsweep.cli.help import examples
+from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, check_ending, echo, examples
 
 EXAMPLE = examples("slipsweep explore design_chart.nc -o design_chart.html")
 

@@ -6,11 +6,18 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, cuts, progress_bar
-from slipsweep.cli.help import Panel, examples
-from slipsweep.cli.suite import write_fragility
+from slipsweep.cli.common import (
+    OUTPUT,
+    Overwrite,
+    Panel,
+    Quiet,
+    check_outputs,
+    cuts,
+    examples,
+    progress_bar,
+    write_fragility,
+)
 
-#: The group of options that only this command has.
 TABLE = Panel("Table")
 
 EXAMPLE = examples(
@@ -74,11 +81,13 @@ def export(
 
 def _export_fragility(file: str, output: Path, at: list[str] | None, overwrite: bool) -> None:
     """Write P(u > d) along the axis amplitude, of the values that --at takes of others."""
-    from slipsweep.files import outputs
     from slipsweep.files.opening import read_result
+    from slipsweep.files.outputs import complete_or_absent
     from slipsweep.files.selection import places_at
 
-    outputs.check_outputs([output], overwrite, reads=[Path(file)])
+    check_outputs([output], (".xml",), overwrite, [Path(file)])
     table = read_result(file)
     axes = [str(dim) for dim in table.sizes if dim not in ("motion", "quantile")]
-    write_fragility(table.isel(places_at(table, file, cuts(at), axes), missing_dims="ignore"), output, overwrite)
+    chosen = table.isel(places_at(table, file, cuts(at), axes), missing_dims="ignore")
+    with complete_or_absent(output, overwrite) as temporary:
+        write_fragility(chosen, temporary)

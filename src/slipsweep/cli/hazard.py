@@ -5,24 +5,31 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Quiet, check_ending, cuts, displacements, write_figure
-from slipsweep.cli.help import Panel
-from slipsweep.cli.suite import write_fragility
+from slipsweep.cli.common import (
+    FIGURES,
+    OUTPUT,
+    Overwrite,
+    Panel,
+    Quiet,
+    check_outputs,
+    cuts,
+    displacements,
+    examples,
+    write_fragility,
+    write_outputs,
+)
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from slipsweep.studies.hazard_curves import HazardCurve
-
 #: The part of a rate that is worth a sentence.
 _MUCH = 0.05
 
-#: The group of options that only this command has.
 HAZARD = Panel("Hazard")
 
-EXAMPLE = "Example: slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml"
+EXAMPLE = examples("slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml")
 
 
 def hazard(
@@ -55,24 +62,25 @@ def hazard(
 
     From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
     """
-    paths = output or []
-    for path in paths:
-        check_ending(path, (*FIGURES, ".xml"))
-    from slipsweep.files import outputs
     from slipsweep.studies.hazard import displacement_hazard
     from slipsweep.studies.hazard_curves import read_hazard_curve
 
-    outputs.check_outputs(paths, overwrite, reads=[file, curve])
+    paths = check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
     result = _read(file, at)
     g = float(result.attrs["g"])
     lengths = displacements(displacement, g)
     given = read_hazard_curve(curve, g, site)
     rates = displacement_hazard(result, given, lengths)
-    for path in paths:
-        if path.suffix == ".xml":
-            write_fragility(result, path, overwrite, lengths)
-        else:
-            write_figure(_figure(result, given, rates), path, overwrite)
+
+    def figure() -> "Figure":
+        from slipsweep.charts import hazard_figures
+
+        # of uncertain inputs through the displacements that the result has
+        stored = "exceedance_probability" in result
+        drawn = None if stored else hazard_figures.drawn_thresholds(result, rates["threshold"].values)
+        return hazard_figures.hazard_chart(displacement_hazard(result, given, drawn), marked=rates["threshold"].values)
+
+    write_outputs(paths, overwrite, figure, {".xml": lambda path: write_fragility(result, path, lengths)})
     if not quiet:
         _summarize(rates, g)
         for path in paths:
@@ -97,17 +105,6 @@ def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
     return table.isel({name: int(found[0]) for name, found in places.items()}, missing_dims="ignore")
 
 
-def _figure(result: "xr.Dataset", curve: "HazardCurve", rates: "xr.Dataset") -> "Figure":
-    """The rates over the displacement; of uncertain inputs through the displacements that the result has."""
-    from slipsweep.charts import hazard_figures
-    from slipsweep.studies.hazard import displacement_hazard
-
-    marked = rates["threshold"].values
-    stored = "exceedance_probability" in result
-    drawn = None if stored else hazard_figures.drawn_thresholds(result, marked)
-    return hazard_figures.hazard_chart(displacement_hazard(result, curve, drawn), marked=marked)
-
-
 def _summarize(rates: "xr.Dataset", g: float) -> None:
     import numpy as np
 
@@ -120,11 +117,11 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
     first, last = max(low, start), min(high, end)
     typer.echo(f"P(u > d | PGA): share over {attrs['suite_dimensions'].replace(' ', ' and ')}")
     typer.echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
-    points = list(np.ndindex(rates["valueless_share"].shape))
-    for index, point in zip(points, point_names(rates, rates["valueless_share"].sizes), strict=True):
+    sizes = rates["valueless_share"].sizes
+    for index, point in zip(np.ndindex(*sizes.values()), point_names(rates, sizes), strict=True):
         if point:
             typer.echo(point)
-        _summarize_point(rates.isel(dict(zip(rates["valueless_share"].dims, index, strict=True))), first, last)
+        _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
     if (rates["held_rate"] > _MUCH * rates["annual_rate"]).any():
         axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
         typer.echo(f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}")

@@ -5,9 +5,7 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import cuts, echo, echo_tally, place_of
-from slipsweep.cli.help import examples
-from slipsweep.cli.suite import echo_suite
+from slipsweep.cli.common import cuts, echo, echo_suite, echo_tally, examples
 from slipsweep.errors import InputError
 
 EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
@@ -27,7 +25,7 @@ def info(
     from slipsweep.files import contents
     from slipsweep.files.jobs import RUN
     from slipsweep.files.motions import read_embedded
-    from slipsweep.files.opening import read_result
+    from slipsweep.files.opening import place_of, read_result
     from slipsweep.files.selection import places_at
     from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import size_text

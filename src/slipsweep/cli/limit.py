@@ -1,5 +1,6 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
+from collections.abc import Hashable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,35 +9,31 @@ import typer
 from slipsweep.cli.common import (
     FIGURES,
     OUTPUT,
-    Chunks,
     Memory,
     Overwrite,
+    Panel,
     Quiet,
     Resume,
     Scheduler,
     Workers,
-    check_ending,
+    check_outputs,
     displacements,
-    echo_found,
-    place_of,
+    examples,
     progress_bar,
+    run_job,
     taken_as,
-    write_figure,
+    write_outputs,
 )
-from slipsweep.cli.help import Panel
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LimitStatus
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
-    from slipsweep.files.spec import SweepSpec
-    from slipsweep.files.storing import Place
-
-#: The group of options that only this command has.
 LIMIT = Panel("Limit")
 
-EXAMPLE = "Example: slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
+EXAMPLE = examples("slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png")
 
 #: Most grid points whose quantiles under a suite are printed, and limits that are printed one by one.
 _MOST_POINTS, _MOST_MOTIONS = 12, 60
@@ -68,63 +65,51 @@ def limit(
 
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
-    chunks = Chunks(overwrite, resume, memory, workers, scheduler)
-    results: list[Place] = []
-    figures: list[Path] = []
-    for text in output or []:
-        path = Path(text)
-        check_ending(path, (".nc", ".zarr", *FIGURES))
-        if path.suffix in FIGURES:
-            figures.append(path)
-        else:
-            results.append(place_of(text))
-    for option in chunks.given() if not results else []:
-        raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
-
-    from slipsweep.files import outputs, spec
+    from slipsweep.files import spec
     from slipsweep.files.jobs import limit_job
+    from slipsweep.files.opening import place_of, read_result
+    from slipsweep.model.units import quantity
 
+    results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
-        files = [one for one in results if isinstance(one, Path)]
-        outputs.check_outputs(files, overwrite, reads=())  # one name given twice is refused as such
         raise InputError(f"{results[1]}: a second result, beside {results[0]}; give one")
+    large = {"--resume": resume, "--memory": memory, "--workers": workers, "--scheduler": scheduler}
+    for option in [name for name, value in large.items() if value] if not results else ():
+        raise InputError(f"{option}: needs -o OUT.nc, whose chunks are solved and written one after the other")
     checked = spec.load(sweep)
-    outputs.check_outputs(figures, overwrite, reads=checked.files)
-    job = limit_job(checked, *_asked(checked, displacement, maximum_amplitude))
+    named = [Path(one) for one in output or () if one not in results]
+    figures = check_outputs(named, (*FIGURES, ".nc", ".zarr"), overwrite, checked.files)
+    g = checked.model.g
+    lengths = displacements(displacement, g)
+    highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
+    # one is one number; several are a dimension, in order and without repetition
+    job = limit_job(checked, lengths if len(displacement) > 1 else lengths[0], highest)
     if results:
-        from slipsweep.files.opening import read_result
-
-        report = chunks.run(job, results[0], quiet)
-        if report.found and not quiet:
-            echo_found(report.path)
+        report = run_job(
+            job,
+            place_of(results[0]),
+            quiet,
+            overwrite=overwrite,
+            resume=resume,
+            memory=memory,
+            workers=workers,
+            scheduler=scheduler,
+        )
         table = read_result(report.path)
     else:
         with checked.named(), progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)
-    if figures:
+
+    def figure() -> "Figure":
         from slipsweep.charts.limit_figures import limit_chart
 
-        labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
-        figure = limit_chart(labelled)
-        for path in figures:
-            write_figure(figure, path, overwrite)
+        return limit_chart(table.assign_coords(label=("case", list(job.labels))) if job.labels else table)
+
+    write_outputs(figures, overwrite, figure)
     if not quiet:
         _summarize(table)
-        for text in output or []:
+        for text in output or ():
             typer.echo(text)
-
-
-def _asked(
-    sweep: "SweepSpec", displacement: list[str], maximum_amplitude: str | None
-) -> tuple[float | list[float], float | None]:
-    """Tolerable displacements and the end of the search, in SI units."""
-    from slipsweep.model.units import quantity
-
-    g = sweep.model.g
-    lengths = displacements(displacement, g)
-    highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
-    # one is one number; several are a dimension, in order and without repetition
-    return (lengths if len(displacement) > 1 else lengths[0]), highest
 
 
 def _summarize(table: "xr.Dataset") -> None:
@@ -159,10 +144,10 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
 
     limits = table["limit_amplitude"]
     found = limit_quantiles(table, (0.16, 0.5, 0.84))
-    grid, suite = found["value_count"].sizes, [dim for dim in ("motion", "polarity") if dim in limits.dims]
-    order = [limits.dims.index(dim) for dim in (*grid, *suite)]
-    each = limits.values.transpose(order).reshape(found["value_count"].values.size, -1)
-    names = point_names(table, {dim: limits.sizes[dim] for dim in suite})
+    grid = found["value_count"].sizes
+    suite: dict[Hashable, int] = {dim: limits.sizes[dim] for dim in ("motion", "polarity") if dim in limits.dims}
+    each = limits.transpose(*grid, *suite).values.reshape(found["value_count"].size, -1)
+    names = point_names(table, suite)
     width = max(24, *map(len, names))
     typer.echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
     for number, point in enumerate(point_names(table, grid)[:_MOST_POINTS]):

@@ -5,13 +5,10 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
-from slipsweep.cli.help import RARE, Panel
+from slipsweep.cli.common import BLOCK, RARE, SHAKING
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Family, Option, declared
 from slipsweep.motion.reading import Reading
-
-#: Groups of options that say what shakes, and how it responds.
-SHAKING, BLOCK = Panel("Shaking"), Panel("Block")
 
 #: The group of the options of a choice, by what names it on the command line.
 PANELS = {"waveform": SHAKING, "model": BLOCK}

@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from slipsweep.cli.chart import chart
-from slipsweep.cli.common import OUTPUT, Overwrite, check_ending
-from slipsweep.cli.help import examples
+from slipsweep.cli.common import OUTPUT, Overwrite, check_ending, examples
 
 EXAMPLE = examples("slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite")
 

@@ -9,20 +9,20 @@ import typer
 
 from slipsweep.cli.common import (
     OUTPUT,
-    Chunks,
     Memory,
     Overwrite,
+    Panel,
     Quiet,
     Resume,
     Scheduler,
     Watch,
     Workers,
-    echo_found,
+    check_ending,
+    echo_suite,
     echo_tally,
-    place_of,
+    examples,
+    run_job,
 )
-from slipsweep.cli.help import Panel, examples
-from slipsweep.cli.suite import echo_suite
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
 from slipsweep.model.variables import PARAMETERS, SlidingMode
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from slipsweep.grid.tally import Tally
-
-#: The group of options that only this command has.
-SOLVER = Panel("Solver")
 
 EXAMPLE = examples(
     "slipsweep run sweeps/design_chart.toml",
@@ -46,7 +43,9 @@ def run(
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to repeat.")
     ],
-    solver: Annotated[Literal["auto", "step", "cycle"] | None, SOLVER("Solver, instead of solver.method.")] = None,
+    solver: Annotated[
+        Literal["auto", "step", "cycle"] | None, Panel("Solver")("Solver, instead of solver.method.")
+    ] = None,
     output: Annotated[
         str | None,
         OUTPUT(
@@ -62,54 +61,54 @@ def run(
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec
-    from slipsweep.files.opening import read_result
+    from slipsweep.files.jobs import sweep_job
+    from slipsweep.files.opening import place_of, read_result
+    from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import grid_text, size_text
 
-    chunks = Chunks(overwrite, resume, memory, workers, scheduler)
     checked = spec.load(sweep)
     if solver is not None and checked.recorded is not None:
         raise InputError(f"--solver {solver}: not allowed with recorded motions, to which the response is exact")
-    if solver is not None:
-        same = solver == checked.solver.name  # with the options that the sweep file gives it
-        checked = checked if same else replace(checked, solver=SOLVERS.of(solver))
-    if output is None and checked.output.path is None and spec.is_stream(sweep):
+    if solver is not None and solver != checked.solver.name:  # the same one keeps the options of the sweep file
+        checked = replace(checked, solver=SOLVERS.of(solver))
+    name = output or checked.output.path
+    if name is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
-    path = place_of(checked.output.path or f"{sweep.stem}.nc" if output is None else output)
-    if isinstance(path, str) and not path.rstrip("/").endswith(".zarr"):
-        raise InputError(f"{path}: the name of a store at an address must end in .zarr")
-    if isinstance(path, Path) and path.suffix not in (".nc", ".zarr"):
-        raise InputError(f"{path}: the name must end in .nc or .zarr, the formats that are written")
-    from slipsweep.files.jobs import sweep_job
-    from slipsweep.files.storing import nbytes_of
-
+    path = place_of(name or f"{sweep.stem}.nc")
+    check_ending(Path(path), (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
     job = sweep_job(checked)
-    watch = Watch()
-    unit = "cells" if checked.sampling is None else "samples"
-    report = chunks.run(job, path, quiet, unit)
+    watch, unit = Watch(), "cells" if checked.sampling is None else "samples"
+    report = run_job(
+        job,
+        path,
+        quiet,
+        overwrite=overwrite,
+        resume=resume,
+        memory=memory,
+        workers=workers,
+        scheduler=scheduler,
+        unit=unit,
+    )
     if quiet:
         return
-    grid = grid_text(job.plan.sizes) or "no axes"
-    template = job.plan.template()
-    about = template.attrs
-    if report.found:
-        echo_found(report.path)
-    else:
-        took = watch.text(report.tally.cells, unit)
+    grid, template = grid_text(job.plan.sizes) or "no axes", job.plan.template()
+    if not report.found:
+        cells, took = report.tally.cells, watch.text(report.tally.cells, unit)
         if checked.sampling is None:
-            typer.echo(f"{report.tally.cells} cells ({grid}) in {took}")
+            typer.echo(f"{cells} cells ({grid}) in {took}")
         else:
-            points = math.prod(job.plan.sizes.values())
             runs = checked.sampling.sensitivity_runs
-            beside = f", and {runs} runs each for Sobol indices" if runs else ""
-            pooled = f"{about['pooled']} x " if "pooled" in about else ""
-            typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{beside}")
-            typer.echo(f"{report.tally.cells} samples solved in {took}")
-    typer.echo(f"inputs: {about['friction_inputs']}")
+            more = f", and {runs} runs each for Sobol indices" if runs else ""
+            pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
+            points = math.prod(job.plan.sizes.values())
+            typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{more}")
+            typer.echo(f"{cells} samples solved in {took}")
+    typer.echo(f"inputs: {template.attrs['friction_inputs']}")
     _echo_inputs(template)
     if checked.recorded is not None:
         typer.echo(checked.recorded.summary())
-    if "duplicate_motions" in about:
-        typer.echo(f"the same motion under several labels: {about['duplicate_motions']}")
+    if "duplicate_motions" in template.attrs:
+        typer.echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     echo_tally(report.tally)
     if why := _why_nothing_slides(template, report.tally):
         typer.echo(why)
@@ -135,22 +134,20 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     import numpy as np
 
     modes = tally.modes or {}
-    still = modes.get(SlidingMode.STUCK, 0) + modes.get(SlidingMode.MISSING, 0)
-    if not modes or still < sum(modes.values()):
+    if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
     g, coords = float(table.attrs["g"]), table.coords
-    if modes[SlidingMode.MISSING] == still:
+    if not modes[SlidingMode.STUCK]:
         return (
             "no cell has a value: the flags above say why; statically_unstable: theta reaches the friction angle, "
             "atan(mu_s)"
         )
-    if "amplitude" not in coords or not {"theta", "mu_s"} <= {*coords}:
+    if not {"amplitude", "theta", "mu_s"} <= {*coords}:
         return "no cell slides"
     if "yield_acceleration" in coords:
         least = float(coords["yield_acceleration"].min())
     else:
-        slope = np.arctan(float(coords["mu_s"].min())) - np.radians(float(coords["theta"].max()))
-        least = g * float(np.tan(slope))
+        least = g * float(np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max())))
     largest = float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
     return (

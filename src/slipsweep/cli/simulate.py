@@ -1,24 +1,26 @@
 """`slipsweep simulate`: one time history."""
 
-import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from slipsweep.cli.common import (
+    BLOCK,
     FIGURES,
     OUTPUT,
+    RARE,
+    SHAKING,
     Overwrite,
     Quiet,
-    check_ending,
+    check_outputs,
+    examples,
+    netcdf_writer,
     taken_as,
-    typed_command,
-    write_figure,
+    write_outputs,
 )
-from slipsweep.cli.help import RARE, examples
-from slipsweep.cli.options import BLOCK, SHAKING, chooses, option_name, reads_record
+from slipsweep.cli.options import chooses, option_name, reads_record
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
@@ -36,6 +38,7 @@ from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from slipsweep.motion.records import Record
 
@@ -89,14 +92,7 @@ def simulate(
     quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    writers: dict[str, Callable[[xr.Dataset, Path, bool, Waveform | Record], None]] = {
-        ".nc": _write_netcdf,
-        ".csv": _write_csv,
-        **dict.fromkeys(FIGURES, _write_figure),
-    }
-    paths = output or []
-    for path in paths:
-        check_ending(path, tuple(writers))
+    paths = check_outputs(output, (".nc", ".csv", *FIGURES), overwrite, [record] if record else [])
     typed = {
         "theta": theta,
         "phi": phi,
@@ -113,44 +109,40 @@ def simulate(
         for name, text in typed.items()
         if text is not None
     }
-
     motion = _motion(record, reading, excitation)
 
-    from slipsweep.files import outputs
     from slipsweep.grid.inputs import Inputs
     from slipsweep.studies.history import time_history
 
-    outputs.check_outputs(paths, overwrite, reads=[record] if record else ())
     inputs = Inputs(
-        theta=given.get("theta"),
+        **given,
         mu_s=mu_s,
-        phi=given.get("phi"),
-        amplitude=given.get("amplitude"),
-        frequency=given.get("frequency"),
-        displacement_amplitude=given.get("displacement_amplitude"),
         scale=scale,
-        pgv=given.get("pgv"),
-        arias_intensity=given.get("arias_intensity"),
         time_scale=time_scale,
         polarity=None if polarity is None else int(polarity),
-        yield_acceleration=given.get("yield_acceleration"),
         yield_coefficient=yield_coefficient,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
-        structure_frequency=given.get("structure_frequency"),
     )
     table = time_history(inputs, excitation=motion, model=model, points_per_cycle=points)
     flags = Validity(table["validity"].item())
     if flags & VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags & VALUELESS)
         raise RunError(f"the model gives no value: {why} ({taken_as(given, model.g)})")
-    for path in paths:
-        writers[path.suffix](table, path, overwrite, motion)
+
+    def figure() -> "Figure":
+        from slipsweep.charts.history_figures import history
+
+        return history(table)
+
+    recorded = None if isinstance(motion, Waveform) else motion
+    as_netcdf = netcdf_writer(table, "Time history of a sliding block", recorded)
+    write_outputs(paths, overwrite, figure, {".nc": as_netcdf, ".csv": lambda path: _write_csv(table, path)})
     if quiet:
         return
-    if not isinstance(motion, Waveform):
-        typer.echo(f"record                  {motion.summary()}")
+    if recorded is not None:
+        typer.echo(f"record                  {recorded.summary()}")
     _summarize(table)
     typer.echo(f"{'taken as':<24}{taken_as(given, model.g)}")
     for path in paths:
@@ -184,32 +176,9 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
     return read_record(record, **reading)
 
 
-def _write_netcdf(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
-    from slipsweep.files import netcdf
-
-    named = netcdf.described(
-        netcdf.without_time_axis(table),
-        title="Time history of a sliding block",
-        command=typed_command(),
-        recorded=None if isinstance(motion, Waveform) else motion,
-    )
-    netcdf.write_table(named, path, overwrite)
-
-
-def _write_csv(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
-    from slipsweep.files import outputs
+def _write_csv(table: "xr.Dataset", path: Path) -> None:
+    import pandas as pd
 
     columns = {name: table[name] for name in ("time", *HISTORY) if name in table}
-    with (
-        outputs.complete_or_absent(path, overwrite) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(f"{name} ({array.attrs['units']})" for name, array in columns.items())
-        writer.writerows(zip(*(array.values.tolist() for array in columns.values()), strict=True))
-
-
-def _write_figure(table: "xr.Dataset", path: Path, overwrite: bool, motion: "Waveform | Record") -> None:
-    from slipsweep.charts.history_figures import history
-
-    write_figure(history(table), path, overwrite)
+    frame = pd.DataFrame({f"{name} ({one.attrs['units']})": one.values for name, one in columns.items()})
+    frame.to_csv(path, index=False)

@@ -28,13 +28,7 @@ _LOOK, _PATIENCE = 5.0, 60.0
 
 
 def check_cluster(workers: int | None, scheduler: str | None) -> None:
-    """Refuse options that name no cluster.
-
-    Raises
-    ------
-    InputError
-        Both are given, the number is none, or the package distributed is missing.
-    """
+    """Refuse options that name no cluster (InputError), or lack the package distributed."""
     if workers is not None and scheduler is not None:
         raise InputError("--workers, --scheduler: give one of them, not both")
     if workers is not None and not 1 <= workers <= MOST_WORKERS:

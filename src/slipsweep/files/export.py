@@ -18,7 +18,6 @@ import xarray as xr
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.contents import result_names, tally_in, values_text
-from slipsweep.files.jobs import RUN
 from slipsweep.files.netcdf import WITH_MISSING
 from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
@@ -40,9 +39,6 @@ MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384
 
 #: Beginnings of texts that a spreadsheet takes for formulas when it opens a CSV file.
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
-
-#: Attributes that say where a result comes from; the others say what was computed.
-_PROVENANCE = ("source", "history", "references", "Conventions", "sweep", "friction_inputs", RUN)
 
 #: Given how many rows there are, yields what to call with a number of rows just written.
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None] | None]]
@@ -72,22 +68,18 @@ def export(
     source : str or Path
         A netCDF file or a Zarr store that slipsweep wrote.
     path : Path
-        The table: .csv (UTF-8; every number has the digits that bring it back; missing values are empty; a text that
-        a spreadsheet would take for a formula has an apostrophe in front), .parquet, or .xlsx (the sheet "about" has
-        inputs, estimates, flags and provenance).
+        The table: .csv, .parquet, or .xlsx, whose sheet "about" says what it is of.  Numbers have the digits that bring
+        them back.
     variables : sequence of str, optional
-        Results to export, by default all; their coordinates come along.  Dimensions that none of
-        them has are left out, with their rows.
+        Results to export, by default all.  Dimensions that none of them has are left out, with their rows.
     words : bool
         Sliding modes and flags as words instead of codes.
     in_g : bool
         Accelerations in g, that of the model, instead of m/s².
     at : mapping of axis to text, optional
         Values to keep of an axis, see `slipsweep.files.selection.places_at`.
-    rows : sequence of str
-        With `columns`: the axes along the rows of a pivoted table, by default all others.
-    columns : str, optional
-        The axis along the columns of a pivoted table of one result; in .xlsx of a sheet for each.
+    rows, columns : sequence of str, str, optional
+        With `columns`, the axis along the columns of a pivoted table, `rows` are those along its rows.
     overwrite : bool
         Replace `path` if it exists.
     chunk_cells : int
@@ -103,10 +95,8 @@ def export(
     Raises
     ------
     InputError
-        `source` is not slipsweep's, `path` cannot be written or has another ending, a variable, axis or value is not
-        in the file, a spreadsheet cannot hold the table, or the package is missing that writes it.
-    RunError
-        Writing failed.
+        `source` is not slipsweep's, `path` cannot be written, a variable, axis or value is not in the file, a
+        spreadsheet cannot hold the table, or the package is missing that writes it.
     """
     _check_format(path)
     check_outputs([path], overwrite, reads=[Path(source)])
@@ -216,11 +206,10 @@ class Table:
                 f"{self.columns} with --at, another axis with --columns, or write .csv"
             )
         if self.count >= MOST_ROWS:
-            sizes = {dim: self.part.sizes[dim] for dim in self.rows if self.count // self.part.sizes[dim] < MOST_ROWS}
-            what = " or ".join(f"{dim} ({size})" for dim, size in sizes.items()) or "several axes"
+            sizes = " x ".join(f"{self.part.sizes[dim]} {dim}" for dim in self.rows)
             raise InputError(
-                f"{source}: the table has {self.count} rows, a sheet of .xlsx {MOST_ROWS} with its header; "
-                f"take one value of {what} with --at, or write .csv"
+                f"{source}: the table has {self.count} rows ({sizes}), a sheet of .xlsx {MOST_ROWS} with its header; "
+                "take fewer values with --at, or write .csv"
             )
 
     def frames(self, cells: int) -> "Iterator[pd.DataFrame]":
@@ -394,36 +383,20 @@ def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Writ
 
 
 def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
-    """Names and texts of what a table is of, under headings."""
+    """Names and texts of what a table is of: results, inputs, flags, and the attributes of the result."""
     part = tables[0].part
-    attrs = {str(name): str(value) for name, value in part.attrs.items()}
-    flags = [("validity", "not in the table")]
-    for flagged in [table.part for table in tables if "validity" in table.part.data_vars]:
-        tally = tally_in(flagged[["validity"]])
-        flags = [
-            (
-                f"{int(flag)} {(flag.name or '').lower()}",
-                f"{flag.kind}: {tally.share(count):.2%} of {tally.cells} cells; {flag.text}",
-            )
-            for flag, count in (tally.flags or {}).items()
-        ]
     results = [one for table in tables for one in table.part.data_vars.values()]
-    # line by line: a cell does not hold a long text
-    texts = [(name, attrs.get(name, "").splitlines()) for name in ("history", "sweep")]
-    sections: dict[str, list[tuple[str, str]]] = {
-        "Results": [(header(one), str(one.attrs.get("long_name", ""))) for one in results],
-        "Inputs": [
-            *((str(one.attrs.get("long_name", name)), values_text(one)) for name, one in part.coords.items()),
-            *((name, text) for name, text in attrs.items() if name not in _PROVENANCE),
-        ],
-        "Estimates": [("friction parameters", attrs.get("friction_inputs", "not known"))],
-        "Flags": flags,
-        "Provenance": [
-            ("file", str(source)),
-            ("solved by", attrs.get("source", "not known")),
-            ("table written by", f"slipsweep {__version__}"),
-            ("reference", attrs.get("references", "")),
-            *((name if at == 0 else "", line) for name, lines in texts for at, line in enumerate(lines)),
-        ],
-    }
-    return [row for heading, rows in sections.items() for row in ((heading, ""), *rows, ("", ""))]
+    rows = [("file", str(source)), ("table written by", f"slipsweep {__version__}")]
+    rows += [(header(one), str(one.attrs.get("long_name", ""))) for one in results]
+    rows += [(str(one.attrs.get("long_name", name)), values_text(one)) for name, one in part.coords.items()]
+    for table in tables:
+        if "validity" in table.part:
+            tally = tally_in(table.part[["validity"]])
+            for flag, count in (tally.flags or {}).items():
+                share = f"{tally.share(count):.2%} of {tally.cells} cells"
+                rows.append((f"{int(flag)} {(flag.name or '').lower()}", f"{flag.kind}: {share}; {flag.text}"))
+    for name, text in part.attrs.items():
+        # line by line: a cell does not hold a long text
+        lines = str(text).splitlines()
+        rows += [(str(name) if at == 0 else "", line) for at, line in enumerate(lines)]
+    return rows

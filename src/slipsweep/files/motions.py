@@ -24,28 +24,22 @@ RECORD_DIM, SUITE_DIM = "record_sample", "record"
 #: What is written of each record of a suite, beside how it was read.
 _LABEL, _COUNT, _COMPONENT = "record_label", "record_count", "record_component"
 
-#: How a record was read: a name in its attributes, and that of the variable.
+#: How a record was read: a name in its attributes, that of the variable, and what that is.
 _READING = {
-    "record": "record_file",
-    "record_format": "record_format",
-    "record_units": "record_units",
-    "record_channel": "record_channel",
-    "record_sha256": "record_sha256",
-    "record_accepted": "record_accepted",
-    "baseline": "record_baseline",
+    "record": ("record_file", "file of a record"),
+    "record_format": ("record_format", "format of the file of a record"),
+    "record_units": ("record_units", "unit of the file of a record"),
+    "record_channel": ("record_channel", "channel of the file of a record"),
+    "record_sha256": ("record_sha256", "SHA-256 of the file of a record"),
+    "record_accepted": ("record_accepted", "what is missing or implausible in a record, and was accepted"),
+    "baseline": ("record_baseline", "what was taken off a record"),
 }
 
 _ABOUT: dict[str, dict[str, Any]] = {
     _LABEL: {"long_name": "label of the motion of a record"},
     _COUNT: {"units": "1", "long_name": f"number of samples of a record, which follow one another along {RECORD_DIM}"},
     _COMPONENT: {"units": "1", "long_name": "horizontal component of the motion, 1 at azimuth 0 and 2 at 90 degrees"},
-    "record_file": {"long_name": "file of a record"},
-    "record_format": {"long_name": "format of the file of a record"},
-    "record_units": {"long_name": "unit of the file of a record"},
-    "record_channel": {"long_name": "channel of the file of a record"},
-    "record_sha256": {"long_name": "SHA-256 of the file of a record"},
-    "record_accepted": {"long_name": "what is missing or implausible in a record, and was accepted"},
-    "record_baseline": {"long_name": "what was taken off a record"},
+    **{name: {"long_name": about} for name, about in _READING.values()},
 }
 
 
@@ -66,7 +60,7 @@ def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     }
     if motion.has_pairs:
         columns[_COMPONENT] = np.tile(np.array([1, 2], np.int8), len(motion))
-    for key, name in _READING.items():
+    for key, (name, _) in _READING.items():
         texts = [one.attrs.get(key, "") for one in records]
         if any(texts):
             columns[name] = np.array(texts, dtype=object)
@@ -105,7 +99,7 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
     counts = file[_COUNT].values.astype(np.int64)
     columns: dict[str, list[str]] = {
         key: [str(text) for text in file[one].values]
-        for key, one in ({"label": _LABEL} | _READING).items()
+        for key, one in {"label": _LABEL, **{key: name for key, (name, _) in _READING.items()}}.items()
         if one in file and file[one].dtype.kind in "OU"
     }
     ends = np.cumsum(counts)

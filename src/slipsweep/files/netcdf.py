@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.files.motions import embedded
-from slipsweep.files.outputs import complete_or_absent, writing
 from slipsweep.model.variables import RECORD_COUNTS, RECORD_SAMPLES, SlidingMode
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
@@ -127,9 +126,9 @@ def _attributes(attrs: Mapping[Any, Any], dtype: Any = np.int32) -> dict[Any, An
     return found
 
 
-def write_table(table: xr.Dataset, path: Path, overwrite: bool = False, compression: int = 0) -> None:
-    """Write what `described` gives, with its values in memory, complete or not at all."""
-    with complete_or_absent(path, overwrite) as temporary, writing(path), new_file(table, temporary, None, compression):
+def write_table(table: xr.Dataset, path: Path, compression: int = 0) -> None:
+    """Write what `described` gives, with its values in memory."""
+    with new_file(table, path, None, compression):
         pass
 
 

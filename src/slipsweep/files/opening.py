@@ -28,6 +28,11 @@ def is_address(text: str | os.PathLike[str]) -> bool:
     return "://" in os.fspath(text)
 
 
+def place_of(text: str) -> Path | str:
+    """An output as typed: a path, or the address of a store."""
+    return text if is_address(text) else Path(text)
+
+
 def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a result of any size lazily: nothing is read before it is asked for.
 

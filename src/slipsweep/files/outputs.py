@@ -7,18 +7,18 @@ import itertools
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.grid.resources import size_text
 
-#: What a command reads: a file, or the number of an open one (0: standard input).
+#: What a command reads: a file, or 0, standard input.
 Read = Path | int
 
 
-def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Iterable[Read]) -> None:
+def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Read]) -> None:
     """Refuse outputs of a command that cannot be written, may not be replaced, or are what it reads.
 
     Every command that writes comes here before it computes anything.
@@ -29,53 +29,34 @@ def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Iterable[Rea
         All outputs of the command: files, or Zarr stores, which are folders.
     overwrite : bool
         Whether they may replace what exists.
-    reads : iterable of Path or int
+    reads : sequence of Path or int
         All that the command reads.  Files are compared, not their names: a link is what it points to.
 
     Raises
     ------
     InputError
     """
-    inputs = {found: read for read in reads if (found := _identity(read)) is not None}
     for path in paths:
         try:
-            if (found := _identity(path)) in inputs:
-                name = inputs[found] or "standard input"
-                raise InputError(
-                    f"{path}: writing it would replace {name}, which this command reads; give another name with -o"
-                )
-            _check_output(path, overwrite)
+            for read in reads:
+                if os.path.exists(path) and os.path.exists(read) and os.path.samestat(os.stat(path), os.stat(read)):
+                    raise InputError(
+                        f"{path}: writing it would replace {read or 'standard input'}, which this command reads; give "
+                        "another name with -o"
+                    )
+            if not path.parent.is_dir():
+                raise InputError(f"{path}: the folder {path.parent} does not exist")
+            if not os.access(path.parent, os.W_OK):
+                raise InputError(f"{path}: the folder {path.parent} is not writable")
+            if path.exists() and not path.is_file() and not (path / "zarr.json").is_file():
+                raise InputError(f"{path}: exists and is neither a file nor a Zarr store")
+            if os.path.lexists(path) and not overwrite:
+                raise InputError(f"{path}: exists already; give --overwrite to replace it, or another name with -o")
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-        except ValueError as error:  # a null byte, or what the file system cannot encode
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: no file can have this name: {error}") from None
     for path, other in itertools.combinations(paths, 2):
         if path.absolute() == other.absolute():
             raise InputError(f"{other}: is given twice as an output of this command; give each another name")
-
-
-def _check_output(path: Path, overwrite: bool) -> None:
-    """Refuse an output that cannot be written, or exists and may not be replaced."""
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: the folder {path.parent} is not writable")
-    if not os.path.lexists(path):
-        return
-    if not path.is_file() and not (path / "zarr.json").is_file():
-        raise InputError(f"{path}: exists and is neither a file nor a Zarr store")
-    if not overwrite:
-        raise InputError(f"{path}: exists already; give --overwrite to replace it, or another name with -o")
-
-
-def _identity(file: Read) -> tuple[int, int] | None:
-    """Device and number of a file, which all its names share."""
-    with suppress(OSError):  # it is not there (any more): nothing can be lost
-        found = os.stat(file)
-        return found.st_dev, found.st_ino
-    return None
 
 
 @contextmanager
@@ -100,27 +81,16 @@ def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
 
 
 def appear(temporary: Path, path: Path, overwrite: bool) -> None:
-    """Give a finished file, or folder of files, its name.
-
-    Raises
-    ------
-    RunError
-        It exists, and may not be replaced.
-    """
+    """Give a finished file, or folder of files, its name (RunError: it exists, and may not be replaced)."""
     if os.path.lexists(path) and not overwrite:
         raise RunError(f"{path}: was made by another process during the run; it is left alone")
     if temporary.is_dir():
         if path.is_dir():
             shutil.rmtree(path)
     else:
-        sync(temporary)
+        with temporary.open("r+b") as file:  # on the disk itself: a power cut does not take it back
+            os.fsync(file.fileno())
     os.replace(temporary, path)
-
-
-def sync(path: Path) -> None:
-    """Have a file on the disk itself, so that a power cut does not take it back."""
-    with path.open("r+b") as file:
-        os.fsync(file.fileno())
 
 
 @contextmanager

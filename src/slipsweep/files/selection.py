@@ -86,26 +86,22 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
     >>> find(result, {"amplitude": "0.3g"})
     {'amplitude': [Place(value=2.943, index=1)]}
     """
-    single = [str(name) for name, one in data.coords.items() if not one.dims and one.dtype.kind in "iuf"]
-    dims = [str(dim) for dim in data.sizes]
+    known = [*map(str, data.sizes), *(str(name) for name, one in data.coords.items() if one.ndim == 0)]
     found = {}
     for name, cut in at.items():
-        if name not in (*dims, *single):
-            raise InputError(f"{where}: {name} = {cut}: no such axis; {did_you_mean(name, [*dims, *single])}")
-        labels = axis_labels(data, name) if name in dims else []
-        texts: Sequence[float | str]
-        if isinstance(cut, str):
-            texts = [cut] if cut in labels else [one.strip() for one in cut.split(",")]
-        else:
-            texts = [cut] if np.ndim(cut) == 0 else list(cut)  # type: ignore[arg-type, list-item]
-        values = axis_numbers(data, name) if name in dims else np.atleast_1d(data[name].values)
-        units = str(data[name].attrs.get("units", "1")) if name in data.variables else "1"
-        g = float(data.attrs.get("g", math.nan))
-        places = [_place(f"{where}: {name}", one, labels, values, units, g) for one in texts]
-        if name in dims:
-            found[name] = list(dict.fromkeys(places))
+        if name not in known:
+            raise InputError(f"{where}: {name} = {cut}: no such axis; {did_you_mean(name, known)}")
+        labels = axis_labels(data, name) if name in data.sizes else []
+        texts: Any = [cut] if cut in labels or np.ndim(cut) == 0 else cut
+        if isinstance(cut, str) and cut not in labels:
+            texts = [one.strip() for one in cut.split(",")]
+        places = list(dict.fromkeys(_place(data, f"{where}: {name}", name, one, labels) for one in texts))
+        if name in data.sizes:
+            found[name] = places
         elif any(place.index is None for place in places):
-            raise InputError(f"{where}: {name} = {cut}: is {values[0]:.6g}{_unit(units)} in the whole result")
+            raise InputError(
+                f"{where}: {name} = {cut}: is {data[name].item():.6g}{_unit(data, name)} in the whole result"
+            )
     return found
 
 
@@ -124,10 +120,9 @@ def places_at(
     InputError
         As `find`, or a value lies between those of the result: the message names its neighbours.
     """
-    others = {str(dim) for dim in data.sizes if dim not in dims}
-    for name, cut in at.items():
-        if name in others:
-            raise InputError(f"{source}: {name} = {cut}: cannot be selected here; {did_you_mean(name, [*dims])}")
+    for name in at:
+        if name in data.sizes and name not in dims:
+            raise InputError(f"{source}: {name} = {at[name]}: cannot be selected here; {did_you_mean(name, [*dims])}")
     places = find(data, at, str(source))
     for name, found in places.items():
         for place in found:
@@ -140,14 +135,13 @@ def between(data: xr.Dataset, name: str, value: float) -> str:
     """That a value is not among those of a result, and between which it lies."""
     values = np.sort(axis_numbers(data, name))
     above = int(np.clip(np.searchsorted(values, value), 1, values.size - 1))
-    units = _unit(str(data[name].attrs.get("units", "1"))) if name in data.variables else ""
     return (
         f"{name} = {value:.6g}: not among the values of the result; "
-        f"its neighbours are {values[above - 1]:.6g} and {values[above]:.6g}{units}"
+        f"its neighbours are {values[above - 1]:.6g} and {values[above]:.6g}{_unit(data, name)}"
     )
 
 
-def _place(key: str, given: float | str, labels: list[str], values: np.ndarray, units: str, g: float) -> Place:
+def _place(data: xr.Dataset, key: str, name: str, given: float | str, labels: list[str]) -> Place:
     """The place of one value or label."""
     if given in labels:
         index = labels.index(str(given))
@@ -155,6 +149,9 @@ def _place(key: str, given: float | str, labels: list[str], values: np.ndarray, 
     text = str(given)
     if labels and not text.isdecimal():
         raise InputError(f"{key} = {text}: must be a number or one of {', '.join(labels)}")
+    values = axis_numbers(data, name) if name in data.sizes else np.atleast_1d(data[name].values)
+    units = str(data[name].attrs.get("units", "1")) if name in data.variables else "1"
+    g = float(data.attrs.get("g", math.nan))
     number = quantity(key, text, units, g) if isinstance(given, str) else float(given)
     slack = _SAME * float(np.abs(values).max())
     if isinstance(given, str):
@@ -170,9 +167,10 @@ def _place(key: str, given: float | str, labels: list[str], values: np.ndarray, 
     low, high = values.min(), values.max()
     if not low <= number <= high:
         there = f"{low:.6g} to {high:.6g}" if values.size > 1 else f"{low:.6g}"
-        raise InputError(f"{key} = {text}: outside the range of the result, {there}{_unit(units)}")
+        raise InputError(f"{key} = {text}: outside the range of the result, {there}{_unit(data, name)}")
     return Place(number, None)
 
 
-def _unit(units: str) -> str:
+def _unit(data: xr.Dataset, name: str) -> str:
+    units = str(data[name].attrs.get("units", "1")) if name in data.variables else "1"
     return "" if units == "1" else f" {units}"

@@ -33,7 +33,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files import cluster, netcdf
 from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import check_zarr, read_result
-from slipsweep.files.outputs import appear, check_outputs, writing
+from slipsweep.files.outputs import appear, check_outputs, complete_or_absent, writing
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, chunk_lengths, grid_chunks, places
 from slipsweep.grid.graph import chunk_at, solved_chunks
@@ -54,9 +54,6 @@ _BASE_MEMORY, _WORKER_MEMORY = 400_000_000, 250_000_000
 
 #: Chunks for each worker, so that all end at about the same time, and the least work of one, in cells of a sine.
 _CHUNKS_A_WORKER, _LEAST_WORK = 16, 500_000
-
-#: Cells of a finished result that are read at a time, to be counted.
-_READ_CELLS = 4_000_000
 
 #: Most cells of a chunk of a Zarr store within one of the run's, which is a shard of the store.
 _ZARR_CELLS = 500_000
@@ -92,21 +89,14 @@ def run(
         The netCDF file, or the Zarr store (a name that ends in .zarr), or the address of a store.
     command : str
         The command as typed, for the file's `history`.
-    overwrite : bool
-        Replace `path` and the chunks of an interrupted run, if they exist.
-    resume : bool
-        Go on with the chunks of an interrupted run, if there are any.  An output that is complete and of this very
-        sweep is left as it is.
+    overwrite, resume : bool
+        Replace `path` and the chunks of an interrupted run; or go on with these, and leave a complete output as it is.
     memory : int, optional
         Bytes that the run may take.
     workers, scheduler : int or str, optional
         Solve on so many processes of this machine, or on those of the scheduler at an address.
     progress : callable, optional
         Called with a number of cells just solved.
-
-    Returns
-    -------
-    Report
 
     Raises
     ------
@@ -126,21 +116,27 @@ def run(
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, memory, processes, workers or 0), plan.together)
     is_zarr = isinstance(path, str) or path.suffix == ".zarr"
     chunks = (_ZarrChunks if is_zarr else _NetcdfChunks)(job, path, lengths)
-    if chunks.count == 1 and not is_zarr and not processes and not Path(chunks.place).exists():
+    if math.prod(chunks.shape) == 1 and not is_zarr and not processes and not Path(chunks.place).exists():
         with job.spec.named():
             table = plan.solve(progress)
-        netcdf.write_table(job.described(table, command), Path(path), overwrite, job.spec.output.compression)
+        with complete_or_absent(Path(path), overwrite) as temporary:
+            netcdf.write_table(job.described(table, command), temporary, job.spec.output.compression)
         return Report(path, tally_of(table, plan))
+
+    def tell(number: int) -> None:
+        if progress is not None:
+            progress(plan.part(chunks.chunk(number)).cells)
+
     with chunks.locked():
         chunks.begin(resume, overwrite)
         with chunks.kept(), job.spec.named():
-            if progress is not None and chunks.done:
-                progress(plan.cells * len(chunks.done) // chunks.count)
             with writing(path), chunks.opened(command):
+                for number in chunks.done:
+                    tell(number)
                 if processes:
-                    _solve_elsewhere(chunks, workers, scheduler, progress)
+                    _solve_elsewhere(chunks, workers, scheduler, tell)
                 else:
-                    _solve_here(chunks, progress)
+                    _solve_here(chunks, tell)
             return Report(path, chunks.finish(command, overwrite))
 
 
@@ -153,7 +149,7 @@ def nbytes_of(path: Place) -> int:
 def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
     """Count the results of a plan, read in chunks."""
     tally = Tally()
-    for chunk in grid_chunks(plan.sizes, _READ_CELLS, plan.together):
+    for chunk in grid_chunks(plan.sizes, CHUNK_CELLS, plan.together):
         part = table[list(plan.names)].isel(chunk, missing_dims="ignore")
         tally.merge(plan.tally({name: part[name].values for name in plan.names}))
     tally.cells = plan.cells
@@ -204,22 +200,12 @@ def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int
 
 @dataclass
 class _Chunks:
-    """The chunks of a run, numbered in the order of the file, and where they are written.
-
-    Attributes
-    ----------
-    job : Job
-    path : Path or str
-    lengths : dict of str to int
-        Of a chunk, along each dimension of the grid.
-    done : set of int
-        Numbers of the chunks that an interrupted run has left.
-    """
+    """The chunks of a run, numbered in the order of the file, and where they are written."""
 
     job: Job
     path: Place
-    lengths: dict[str, int]
-    done: set[int] = field(default_factory=set)
+    lengths: dict[str, int]  # of a chunk, along each dimension of the grid
+    done: set[int] = field(default_factory=set)  # what an interrupted run has left
 
     @property
     def place(self) -> str:
@@ -236,11 +222,6 @@ class _Chunks:
     def shape(self) -> tuple[int, ...]:
         """How many chunks there are along each dimension."""
         return tuple(len(own) for own in self.cut.values())
-
-    @property
-    def count(self) -> int:
-        """How many chunks there are."""
-        return math.prod(self.shape)
 
     def missing(self) -> Iterator[tuple[int, tuple[int, ...]]]:
         """Number and place of every chunk to compute; one after the other: there may be more than memory holds."""
@@ -274,14 +255,7 @@ class _Chunks:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def begin(self, resume: bool, overwrite: bool) -> None:
-        """Take over the chunks of an interrupted run, or begin anew.
-
-        Raises
-        ------
-        InputError
-            There are chunks, which neither `resume` nor `overwrite` says what to do with, or of another sweep; or the
-            disk has no room for the results.
-        """
+        """Take over the chunks of an interrupted run, or begin anew (InputError: neither may be done)."""
         files, folder = url_to_fs(self.place)
         state = None
         with suppress(OSError, ValueError):
@@ -355,7 +329,7 @@ class _Chunks:
         except BaseException as error:
             kept = len(self.finished())
             if kept:
-                error.add_note(f"{kept} of {self.count} chunks are kept in {self.place}: --resume goes on")
+                error.add_note(f"{kept} of {math.prod(self.shape)} chunks are kept in {self.place}: --resume goes on")
             else:
                 self.clear()
                 error.add_note("nothing written")
@@ -398,12 +372,17 @@ class _NetcdfChunks(_Chunks):
             yield
 
     def write(self, number: int, arrays: Arrays) -> None:
+        with ThreadPoolExecutor(1) as other:  # both take as long, and neither needs the other
+            saved = other.submit(self._save, number, arrays)
+            self._place(number, arrays)
+            saved.result()
+
+    def _save(self, number: int, arrays: Arrays) -> None:
         temporary = Path(self.place, f"{number:06}.tmp")
         with temporary.open("wb") as file:
             for values in arrays.values():
                 np.save(file, values)
         os.replace(temporary, temporary.with_suffix(".chunk"))
-        self._place(number, arrays)
 
     def _read(self, number: int) -> Arrays:
         path = Path(self.place, f"{number:06}.chunk")
@@ -461,19 +440,19 @@ class _ZarrChunks(_Chunks):
             found["compressors"] = [ZstdCodec(level=level)]
         return found
 
-    def written(self, solved: Any) -> Any:
-        meta = np.empty((0,) * solved.ndim, bool)
-        return da.map_blocks(_write_block, solved, region=self.region, dtype=bool, meta=meta)
-
     @property
-    def region(self) -> "_Region":
+    def _about(self) -> dict[str, Any]:
         """What those who write chunks need to know."""
         template = self.job.plan.template()
-        dims = {name: template[name].dims for name in self.job.dtypes}
-        return _Region(self.store, self.place, self.cut, dims, self.job.dtypes)
+        results = {name: (template[name].dims, dtype) for name, dtype in self.job.dtypes.items()}
+        return {"store": self.store, "place": self.place, "cut": self.cut, "results": results}
+
+    def written(self, solved: Any) -> Any:
+        meta = np.empty((0,) * solved.ndim, bool)
+        return da.map_blocks(_write_region, solved, **self._about, dtype=bool, meta=meta)
 
     def write(self, number: int, arrays: Arrays) -> None:
-        self.region.write(tuple(map(int, np.unravel_index(number, self.shape))), arrays)
+        _write_region(arrays, **self._about, block_id=tuple(map(int, np.unravel_index(number, self.shape))))
 
     def finish(self, command: str, overwrite: bool) -> Tally:
         import zarr
@@ -489,39 +468,31 @@ class _ZarrChunks(_Chunks):
         return tally_of(read_result(self.path), self.job.plan)
 
 
-@dataclass(frozen=True)
-class _Region:
-    """Where the chunks of a run lie in a Zarr store; sent to workers, which write them themselves."""
-
-    store: str
-    place: str
-    cut: Mapping[str, tuple[int, ...]]
-    dims: Mapping[str, tuple[Any, ...]]
-    dtypes: Mapping[str, np.dtype[Any]]
-
-    def write(self, index: tuple[int, ...], arrays: Arrays) -> None:
-        """Write a chunk, then its mark."""
-        chunk = chunk_at(self.cut, index)
-        for name, dims in self.dims.items():
-            one = xr.Dataset({name: (dims, arrays[name].astype(self.dtypes[name], copy=False))})
-            region: Any = {dim: chunk[dim] for dim in dims if dim in chunk}
-            how: Any = {"region": region} if region else {"mode": "r+"}
-            one.to_zarr(self.store, zarr_format=3, consolidated=False, **how)
-        number = int(np.ravel_multi_index(index, [len(own) for own in self.cut.values()])) if index else 0
-        files, folder = url_to_fs(self.place)
-        files.pipe_file(f"{folder}/{number:06}.chunk", b"")
-
-
-def _write_block(solved: Any, region: _Region, block_id: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Write a chunk where it is computed."""
-    region.write(block_id, solved.item())
-    return np.ones(solved.shape, bool)
+def _write_region(
+    solved: Any,
+    store: str,
+    place: str,
+    cut: Mapping[str, tuple[int, ...]],
+    results: Mapping[str, tuple[Any, np.dtype[Any]]],
+    block_id: tuple[int, ...],
+) -> NDArray[np.bool_]:
+    """Write a chunk to its region of a Zarr store, then its mark, in this process or a worker."""
+    arrays, chunk = solved.item() if isinstance(solved, np.ndarray) else solved, chunk_at(cut, block_id)
+    for name, (dims, dtype) in results.items():
+        one = xr.Dataset({name: (dims, arrays[name].astype(dtype, copy=False))})
+        region: Any = {dim: chunk[dim] for dim in dims if dim in chunk}
+        how: Any = {"region": region} if region else {"mode": "r+"}
+        one.to_zarr(store, zarr_format=3, consolidated=False, **how)
+    number = int(np.ravel_multi_index(block_id, [len(own) for own in cut.values()])) if block_id else 0
+    files, folder = url_to_fs(place)
+    files.pipe_file(f"{folder}/{number:06}.chunk", b"")
+    return np.ones((1,) * len(block_id), bool)
 
 
 # ------------------------------------------------------------------------------- solving them
 
 
-def _solve_here(chunks: _Chunks, progress: Callable[[int], None] | None) -> None:
+def _solve_here(chunks: _Chunks, progress: Callable[[int], None]) -> None:
     """Compute the chunks that are missing; one thread writes each while the next is computed."""
     solved = solved_chunks(chunks.job.plan, chunks.cut)
     with ThreadPoolExecutor(1) as writer:
@@ -531,28 +502,23 @@ def _solve_here(chunks: _Chunks, progress: Callable[[int], None] | None) -> None
             if waiting is not None:
                 waiting.result()
             waiting = writer.submit(chunks.write, number, _stored(chunks.job, found))
-            _tell(chunks, index, progress)
+            progress(number)
         if waiting is not None:
             waiting.result()
 
 
 def _solve_elsewhere(
-    chunks: _Chunks, workers: int | None, scheduler: str | None, progress: Callable[[int], None] | None
+    chunks: _Chunks, workers: int | None, scheduler: str | None, progress: Callable[[int], None]
 ) -> None:
     """Have the chunks that are missing computed by workers, and written by them or here as they come back."""
     solved = solved_chunks(chunks.job.plan, chunks.cut)
     written = chunks.written(solved)
     with cluster.connected(workers, scheduler) as client:
-        blocks = ((one, (solved if written is None else written).blocks[one[1]]) for one in chunks.missing())
-        for (number, index), found in cluster.computed(client, blocks):
+        blocks = ((number, (solved if written is None else written).blocks[at]) for number, at in chunks.missing())
+        for number, found in cluster.computed(client, blocks):
             if written is None:
                 chunks.write(number, _stored(chunks.job, found.item()))
-            _tell(chunks, index, progress)
-
-
-def _tell(chunks: _Chunks, index: tuple[int, ...], progress: Callable[[int], None] | None) -> None:
-    if progress is not None:
-        progress(chunks.job.plan.part(chunk_at(chunks.cut, index)).cells)
+            progress(number)
 
 
 def _stored(job: Job, arrays: Arrays) -> Arrays:
