@@ -4,7 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -22,20 +22,22 @@ from slipsweep.kernels.block import (
     UNSOLVED,
     UPSLOPE,
     YIELD_GOVERNS,
+    Cell,
     Motion,
     Options,
 )
-from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.grid import CELL
 from slipsweep.kernels.sine.newmark import solve_newmark_sine
 from slipsweep.kernels.sine.solve import solve_sine
 from tests.support.cases import read_cases
 
 Array = NDArray[np.float64]
+Cells = NDArray[Any]
 G = 9.81
 PLAIN = Options(MONOTONE, EQ12, 1, True, G)
 FIELDS = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
 
-#: Cells that are left to the general kernel, of those in cases.csv: sharp decay, a block that comes to the next
+#: Array that are left to the general kernel, of those in cases.csv: sharp decay, a block that comes to the next
 #: pulse in motion and sticks there when at rest, the literal rise.
 LEFT = {"literal": 12, "near_failure": 7, "sharp_decay": 4, "given_friction": 2, "measured_yield": 1}
 
@@ -49,14 +51,17 @@ class Found(NamedTuple):
 
 
 def solve(cells: Cells, options: Options = PLAIN) -> Found:
-    results = np.full((len(Motion._fields), cells.amplitude.size), np.nan)
+    results = np.full((len(Motion._fields), cells.size), np.nan)
     left = (solve_newmark_sine if options.rise == NEWMARK else solve_sine)(cells, options, results)
     return Found(results[0], results[1], results[2], results[3].astype(int), left)
 
 
 def cells_of(theta: Array, mu_s: Array, amplitude: Array, **given: Array) -> Cells:
     rest = (np.broadcast_to(given.get(name, math.nan), amplitude.shape).astype(float) for name in FIELDS)
-    return Cells(np.tan(np.radians(theta)), mu_s, amplitude, *rest)
+    cells = np.empty(amplitude.shape, CELL)
+    for name, values in zip(Cell._fields, (np.tan(np.radians(theta)), mu_s, amplitude, *rest), strict=True):
+        cells[name] = values
+    return cells
 
 
 def random_cells(number: int, seed: int) -> Cells:
@@ -92,7 +97,7 @@ def test_reference_cases(category: str) -> None:
 
 def by_scipy(cells: Cells, j: int, mode: float, recoupling: int) -> tuple[float, float]:
     """W of a cycle and the largest V of a block that slides, by the rules of docs/model.md."""
-    tan_theta, mu_s, amplitude, onset, *_ = (values[j] for values in cells)
+    tan_theta, mu_s, amplitude, onset, *_ = cells[j].tolist()
     onset = G * (mu_s - tan_theta) / (1.0 + mu_s * tan_theta) if math.isnan(onset) else onset
     ratio = amplitude / ((onset + G * mu_s) / (1.0 - tan_theta * (mu_s - tan_theta)))
     at_zero, least = (mu_s * ratio, 0.01) if mode == 2 else (mu_s / ratio, mu_s**2 * ratio)
@@ -149,7 +154,7 @@ def test_every_kind_by_quadrature(recoupling: int) -> None:
     kinds: dict[tuple[float, bool], int] = defaultdict(int)
     for j in np.flatnonzero((found.mode > 0) & (found.displacement > 0.0) & (found.validity != UNSOLVED)):
         displacement, peak = by_scipy(cells, int(j), found.mode[j], recoupling)
-        assert found.displacement[j] == pytest.approx(displacement, rel=1e-9, abs=1e-10 * cells.amplitude[j]), j
+        assert found.displacement[j] == pytest.approx(displacement, rel=1e-9, abs=1e-10 * cells["amplitude"][j]), j
         assert found.peak_velocity[j] == pytest.approx(peak, rel=1e-6 if found.mode[j] == 2 else 1e-9), j
         kinds[found.mode[j], found.validity[j] & YIELD_GOVERNS > 0] += 1
     assert min(kinds[1, True], kinds[1, False], kinds[2, False]) >= 20
@@ -161,7 +166,7 @@ def test_cell_does_not_depend_on_others(cycles: int) -> None:
     cells, options = random_cells(500, 2), PLAIN._replace(cycles=cycles)
     whole, order = solve(cells, options), np.random.default_rng(3).permutation(500)
     for where in (order, order[:1], order[:33], np.arange(65)):
-        part = solve(Cells(*(values[where] for values in cells)), options)
+        part = solve(cells[where], options)
         for found, expected in zip(part[:4], whole[:4], strict=True):
             known = whole.validity[where] != UNSOLVED
             np.testing.assert_array_equal(found[known], expected[where][known])
@@ -170,7 +175,9 @@ def test_cell_does_not_depend_on_others(cycles: int) -> None:
 def test_accelerations_scale() -> None:
     """Twice all accelerations, g among them: twice W and V, bit by bit."""
     cells = random_cells(2000, 4)
-    twice = cells._replace(amplitude=2.0 * cells.amplitude, yield_acceleration=2.0 * cells.yield_acceleration)
+    twice = cells.copy()
+    for name in ("amplitude", "yield_acceleration"):
+        twice[name] *= 2.0
     found, double = solve(cells), solve(twice, PLAIN._replace(g=2.0 * G))
     np.testing.assert_array_equal(double.displacement, 2.0 * found.displacement)
     np.testing.assert_array_equal(double.peak_velocity, 2.0 * found.peak_velocity)

@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 import slipsweep
 from slipsweep.jit.decorators import inlined
 from slipsweep.kernels import block as physics
-from slipsweep.kernels.block import Motion, Options
-from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.block import Cell, Motion, Options
+from slipsweep.kernels.grid import CELL
 from slipsweep.kernels.step import solve_cell, solve_steps
 from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
@@ -61,9 +61,13 @@ def solve(
 ) -> Results:  # fmt: skip
     """The kernel's results, (4, cells), of columns of parameters."""
     columns["tan_theta"] = np.tan(np.radians(columns.pop("theta")))
-    values = np.broadcast_arrays(*(np.atleast_1d(np.float64(columns.get(name, np.nan))) for name in Cells._fields))
-    cells = Cells(*map(np.ascontiguousarray, values))
-    wave, results = wave_of(waveform), np.empty((len(Motion._fields), cells.mu_s.size))
+    cells = np.full((*np.broadcast_shapes((1,), *map(np.shape, columns.values())), len(Cell._fields)), np.nan).view(
+        CELL
+    )
+    cells = cells[:, 0]
+    for name, values in columns.items():
+        cells[name] = values
+    wave, results = wave_of(waveform), np.empty((len(Motion._fields), cells.size))
     steps = steps_of(wave, RULES[rule], steps_per_cycle)
     solve_steps(cells, options_of(model, rise, recoupling, waveform.cycles, g), wave, steps, results)
     return results[:4]
@@ -301,7 +305,7 @@ HYPERBOLIC = FrictionLaw(friction=hyperbolic_friction)
 
 
 @numba.njit(error_model="numpy")
-def solve_hyperbolic(cell: physics.Cell, options: Options, wave: Any, steps: Steps) -> Motion:
+def solve_hyperbolic(cell: Cell, options: Options, wave: Any, steps: Steps) -> Motion:
     return solve_cell(HYPERBOLIC, cell, options, wave, steps)
 
 
@@ -320,7 +324,7 @@ class Hyperbolic:
         return lag if x >= 0 else -lag
 
     def found(self, rule: str, steps_per_cycle: int, cycles: int, recoupling: str = "eq12") -> Motion:
-        cell = physics.Cell(self.tangent, self.mu_s, self.amplitude, self.least, self.decay_rate, 0.0, np.nan)
+        cell = Cell(self.tangent, self.mu_s, self.amplitude, self.least, self.decay_rate, 0.0, np.nan)
         wave = wave_of(Sine(cycles=cycles))
         steps = own_steps(steps_of(wave, RULES[rule], steps_per_cycle))
         return solve_hyperbolic(cell, options_of("mendez", "monotone", recoupling, cycles), wave, steps)

@@ -17,10 +17,11 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import Chunk, places
-from slipsweep.grid.engine import MOTION_RESULTS, Arrays, Request
+from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory, grid_text
+from slipsweep.grid.solvers import ROWS
 from slipsweep.grid.tally import Tally
 from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Step, friction_inputs
 from slipsweep.model.parameters import (
@@ -106,8 +107,7 @@ class Task:
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
         sizes = {dim: cut.stop - cut.start for dim, cut in zip(self.sizes, slices, strict=True)}
-        problem, inputs = engine.narrowed(self.problem, engine.cut(self.inputs, slices))
-        return replace(self, problem=problem, sizes=sizes, inputs=inputs)
+        return replace(self, sizes=sizes, inputs=engine.cut(self.inputs, slices))
 
 
 @dataclass(frozen=True)
@@ -340,7 +340,7 @@ def _plan_records(problem: Problem, coords: dict[str, xr.Variable], variables: A
     wanted = default if variables is None else check_choices("variables", variables, RECORD_RESULTS)
     inputs = inputs_of(problem, coords)
     sizes = grid_sizes(inputs)
-    tasks = list(_motion_tasks(problem, wanted, RECORD_RESULTS, sizes, aligned(inputs, sizes)))
+    tasks = _motion_tasks(problem, [name for name in RECORD_RESULTS if name in wanted], sizes, aligned(inputs, sizes))
     cost = cost_of(problem) * max(len(tasks), 1)
     if "motion_factor" in wanted:
         tasks.append(_factor_task(problem, inputs))
@@ -358,16 +358,14 @@ def _factor_task(problem: Problem, inputs: Mapping[str, xr.Variable]) -> Task:
     return Task(engine.factors, problem, ("motion_factor",), sizes, aligned(own, sizes))
 
 
-def _motion_tasks(
-    problem: Problem, wanted: Collection[str], results: Collection[str], sizes: dict[str, int], inputs: Arrays
-) -> tuple[Task, ...]:
-    """The motion of the block, and of Newmark's on the same cells; `results` are those of a motion, in order."""
-    motion = tuple(name for name in results if name in wanted and name not in ("newmark_displacement", "motion_factor"))
-    beside = tuple(name for name in ("newmark_displacement",) if name in wanted)
-    tasks = (Task(engine.solve, problem, motion, sizes, inputs),) if motion else ()
-    if beside:
+def _motion_tasks(problem: Problem, wanted: Collection[str], sizes: dict[str, int], inputs: Arrays) -> list[Task]:
+    """The motion of the block, and of Newmark's on the same cells."""
+    tasks = []
+    if motion := tuple(name for name in wanted if name in ROWS and name != "newmark_displacement"):
+        tasks.append(Task(engine.solve, problem, motion, sizes, inputs))
+    if "newmark_displacement" in wanted:
         classical = replace(problem, model=Newmark(problem.model.g))
-        tasks = (*tasks, Task(engine.newmark, classical, beside, sizes, inputs))
+        tasks.append(Task(engine.solve, classical, ("newmark_displacement",), sizes, inputs))
     return tasks
 
 
@@ -387,9 +385,7 @@ def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: 
             amplitudes = xr.Variable(tuple(dims), peak_acceleration(**both), PARAMETERS["amplitude"])
             coords = coords | {"amplitude": amplitudes}
 
-    tasks = list(_motion_tasks(problem, wanted, MOTION_RESULTS, sizes, aligned(inputs, sizes)))
-    if tasks and isinstance(problem.solver, Step):
-        _check_steps(problem.solver, problem.excitation)
+    tasks = _motion_tasks(problem, wanted, sizes, aligned(inputs, sizes))
     cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
     friction = tuple(name for name in FRICTION_PARAMETERS if name in wanted and name not in inputs)
@@ -409,14 +405,6 @@ def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: 
         about("Permanent displacement of a rigid block, swept", problem, coords),
         cost,
     )
-
-
-def _check_steps(solver: Step, excitation: Any) -> None:
-    """Refuse steps whose table memory cannot hold: w at every half step of a cycle, and of each with a ramp."""
-    own = 1 + math.ceil(excitation.ramp_in) + math.ceil(excitation.ramp_out)
-    # piece by piece, then together
-    needed = 2 * own * 2 * 8 * solver.steps_per_cycle
-    check_memory(f"steps_per_cycle = {solver.steps_per_cycle}", needed, "take fewer steps, or shorter ramps")
 
 
 def plan_friction_parameters(inputs: Inputs, *, model: Any = "mendez") -> Plan:

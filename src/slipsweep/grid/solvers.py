@@ -9,13 +9,14 @@ from slipsweep.grid.problem import Problem
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.block import UNSOLVED, Motion, Options
 from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.grid import Cells
+from slipsweep.kernels.grid import find_parameters
 from slipsweep.kernels.record import solve_record
 from slipsweep.kernels.sine.newmark import solve_newmark_sine
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.step import solve_steps
 from slipsweep.kernels.waves import solve_waves
 from slipsweep.model.options import Mendez, Newmark, Step
+from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.steps import RECTANGLE, SIMPSON, TRAPEZOID, own_steps, steps_of
@@ -28,9 +29,14 @@ RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 #: Results by their names: the row of a kernel's results that each is found in.
 _NAMES = {"displacement": "permanent_displacement", "peak_velocity": "peak_relative_velocity"}
 ROWS = {_NAMES.get(field, field): row for row, field in enumerate(Motion._fields)}
+# Newmark's block is solved as a problem of its own
+ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 
-#: Solves cells into rows of results, (fields of `Motion`, cells).
-Solve = Callable[[Cells, np.ndarray], Any]
+#: The same of `find_parameters`.
+PARAMETER_ROWS = {name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))}
+
+#: Solves cells, of dtype `kernels.grid.CELL`, into rows of results, (rows, cells).
+Solve = Callable[[np.ndarray, np.ndarray], Any]
 
 
 def options_of(problem: Problem, wants_peak: bool) -> Options:
@@ -45,13 +51,19 @@ def options_of(problem: Problem, wants_peak: bool) -> Options:
     )
 
 
+def find_friction_parameters(problem: Problem) -> Solve:
+    """What finds Eqs. 7-11 and λ of cells."""
+    options = options_of(problem, wants_peak=False)
+    return lambda cells, results: find_parameters(cells, options, results)
+
+
 def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solve, int]:
     """What solves the cells of a problem that one motion shakes, and the time of a cell in those of the sine's."""
     motion, options = problem.excitation, options_of(problem, wants_peak)
     if isinstance(motion, Record):
         recorded = wave_of_record(motion, polarity)
 
-        def under_record(cells: Cells, results: np.ndarray) -> None:
+        def under_record(cells: np.ndarray, results: np.ndarray) -> None:
             solve_record(cells, options, recorded, workspace_of(recorded), results)
 
         return under_record, max(64, recorded.pieces.shape[0] // 8)
@@ -59,12 +71,12 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solv
     if isinstance(problem.solver, Step):
         steps = steps_of(wave_of(motion), RULES[problem.solver.rule], problem.solver.steps_per_cycle)
 
-        def by_steps(cells: Cells, results: np.ndarray) -> None:
+        def by_steps(cells: np.ndarray, results: np.ndarray) -> None:
             solve_steps(cells, options, wave_of(motion), own_steps(steps), results)
 
         return by_steps, 1 + problem.solver.steps_per_cycle // 16
 
-    def under_wave(cells: Cells, results: np.ndarray) -> None:
+    def under_wave(cells: np.ndarray, results: np.ndarray) -> None:
         wave = wave_of(motion)
         solve_waves(cells, options, wave, workspace_of(wave), results)
 
@@ -72,11 +84,11 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solv
         return under_wave, 16
     in_batches = solve_newmark_sine if isinstance(problem.model, Newmark) else solve_sine
 
-    def under_sine(cells: Cells, results: np.ndarray) -> None:
+    def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
         if in_batches(cells, options, results):
             left = np.flatnonzero(results[ROWS["validity"]] == UNSOLVED)
             found = np.empty((len(Motion._fields), left.size))
-            under_wave(Cells(*(values[left] for values in cells)), found)
+            under_wave(cells[left], found)
             results[:, left] = found
 
     return under_sine, 1

@@ -85,7 +85,7 @@ kernel = Kernel
 
 
 def _jitted(function: Callable[..., Any], folder: Path | None) -> Callable[..., Any]:
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "arcp"}}
     if folder is None:
         return numba.njit(**options)(function)
     given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)

@@ -26,6 +26,10 @@ summed = _part(fastmath={"contract", "arcp", "reassoc", "nsz"})
 #: in it is inlined, which it does not do by itself with functions as long as these.
 inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
 
+#: The same for a function with one caller, whose body becomes a part of that: numba would compile it, with all that it
+#: calls, once more.
+single = _part(fastmath={"contract", "arcp"}, inline="always")
+
 #: The same for elementary functions, which have no division to share.
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar, uncounted
+from slipsweep.jit.decorators import scalar, single, uncounted
 from slipsweep.kernels import linear
 from slipsweep.kernels.block import (
     INTEGRATE,
@@ -45,8 +45,8 @@ _SLIVER, _ROUNDING = 1e-10, 4.5e-16
 #: More phases than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
 MOST_PHASES = 32
 
-#: Kinds of motion in a log of it; the last row that is used is followed by one of none.
-NOTHING, HOLD, FOLLOW, ATTENUATE = range(4)
+#: Kinds of motion in a log of it: b held, b by Eq. 4, Eq. 12.
+HOLD, FOLLOW, ATTENUATE = range(3)
 
 #: A log of the motion, for time histories: its kind, the piece, τ and phase where it starts, phase at the end, and b, V
 #: and W at the start.
@@ -65,35 +65,45 @@ GAINS = np.dtype([("first", "f8"), ("second", "f8"), ("first_x", "f8"), ("second
 class Workspace(NamedTuple):
     """What the exact kernels write into, one for all cells.
 
-    `log` has one row for each part of the motion if a history is requested, else none;
-    `gains` has a row for each piece of a cycle, and `zeros`, (2, MOST_PHASES), is for zeros of D on either side of
-    Üg = 0 (`continuous`); `known` is for pulses that come again (`train`).
+    `log` has one row for each part of a pulse if a history is requested, else none, and `logged`, (1,), is how many
+    are in use; `gains` has a row for each piece of a cycle, and `zeros`, (2, MOST_PHASES), is for zeros of D on either
+    side of Üg = 0 (`continuous`); `known` is for pulses that come again (`train`).
     """
 
     log: np.ndarray
+    logged: np.ndarray
     gains: np.ndarray
     zeros: np.ndarray
     known: np.ndarray
 
 
 class State(NamedTuple):
-    """The block in a pulse: V, W since its beginning, the acceleration b, the largest and the least V.
+    """The block in a pulse: V, W since its beginning, its acceleration b, and whether it slides.
 
-    `sliding` says whether it slides, `follows` whether b follows Eq. 4 as Üg rises, `least_held` is the least b with
-    which it slid at the end of a rise, `slips` counts slides that began from rest, `logged` the rows of the log.
+    Besides the largest and the least V, the phase at which it last came to rest, slides that began from rest, and the
+    rows of the log.
     """
 
     velocity: float
     displacement: float
     held: float
+    sliding: bool
     peak: float
     least: float
-    sliding: bool
-    follows: bool
     stopped_at: float
-    least_held: float
     slips: float
     logged: int
+
+
+class Part(NamedTuple):
+    """A part of a slide along a piece: τ at its end, V then, W gained, the extremes of V, and whether it stops."""
+
+    end: float
+    velocity: float
+    displacement: float
+    peak: float
+    least: float
+    stops: bool
 
 
 class RisePhase(NamedTuple):
@@ -110,79 +120,62 @@ def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
     logged = longest * MOST_PHASES + wave.pieces.shape[0] + 3 if keeps_log else 0
     return Workspace(
         log=np.empty(logged, LOG),
+        logged=np.zeros(1, np.int64),
         gains=np.empty(int(np.diff(wave.cycle).max()), GAINS),
         zeros=np.empty((2, MOST_PHASES)),
         known=np.empty((wave.height.size, 2)),
     )
 
 
-@inlined
+@single
 def uncounted_workspace(workspace: Workspace) -> Workspace:
     """The same workspace (`decorators.uncounted`)."""
     return Workspace(
-        uncounted(workspace.log), uncounted(workspace.gains), uncounted(workspace.zeros),
+        uncounted(workspace.log), uncounted(workspace.logged), uncounted(workspace.gains), uncounted(workspace.zeros),
         uncounted(workspace.known),
     )  # fmt: skip
 
 
 @scalar
-def moved(state: State, velocity: float, displacement: float, peak: float) -> State:
-    """The state after a part of the motion, up to which V was `peak` at most."""
+def with_held(state: State, held: float) -> State:
+    """The state with another b."""
     return State(
-        velocity, displacement, state.held, max(peak, velocity), min(state.least, velocity), state.sliding,
-        state.follows, state.stopped_at, state.least_held, state.slips, state.logged,
+        state.velocity, state.displacement, held, state.sliding, state.peak, state.least, state.stopped_at,
+        state.slips, state.logged,
     )  # fmt: skip
 
 
 @scalar
-def with_held(state: State, held: float, follows: bool) -> State:
-    """The state with another b, which follows Eq. 4 or does not."""
-    return State(
-        state.velocity, state.displacement, held, state.peak, state.least, state.sliding, follows, state.stopped_at,
-        state.least_held, state.slips, state.logged,
-    )  # fmt: skip
-
-
-@scalar
-def at_rest(state: State, phase: float) -> State:
-    """The state of a block that comes to rest."""
-    return State(
-        0.0, state.displacement, state.held, state.peak, min(state.least, 0.0), False, state.follows, phase,
-        state.least_held, state.slips, state.logged,
-    )  # fmt: skip
-
-
-@scalar
-def begun(state: State, held: float, follows: bool) -> State:
+def begun(state: State, held: float) -> State:
     """The state of a block at rest that begins to slide (t1)."""
     return State(
-        state.velocity, state.displacement, held, state.peak, state.least, True, follows, state.stopped_at,
-        state.least_held, state.slips + 1.0, state.logged,
+        0.0, state.displacement, held, True, state.peak, state.least, state.stopped_at, state.slips + 1.0,
+        state.logged,
     )  # fmt: skip
 
 
 @scalar
-def at_end_of_rise(state: State) -> State:
-    """The state with b noted: by Eq. 12 no block comes to rest with b ≤ 0."""
+def after(
+    state: State, part: Part, kind: int, pieces: np.ndarray, p: int, start: float, log: np.ndarray
+) -> State:  # fmt: skip
+    """The state after a part of a slide along piece p from τ = `start` on; the log has it, if one is kept."""
+    stop = phase_at(pieces, p, part.end) if part.stops or log.size else 0.0
+    logged = state.logged
+    if log.size:
+        note(log[logged], state, kind, p, start, phase_at(pieces, p, start), stop)
+        logged += 1
     return State(
-        state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
-        state.stopped_at, min(state.least_held, state.held), state.slips, state.logged,
+        part.velocity, state.displacement + part.displacement, state.held, not part.stops,
+        np.maximum(part.peak, state.peak), min(part.least, state.least),  # NaN is kept
+        stop if part.stops else state.stopped_at, state.slips, logged,
     )  # fmt: skip
 
 
 @scalar
-def logged(state: State, log: np.ndarray, kind: int, piece: int, tau: float, start: float, end: float) -> State:
-    """Add what follows to the log, if one is kept."""
-    if log.size == 0:
-        return state
-    row = log[state.logged]
+def note(row: np.record, state: State, kind: int, piece: int, tau: float, start: float, end: float) -> None:
+    """Write a part of the motion that begins with this state into a row of a log."""
     row["kind"], row["piece"], row["tau"], row["start"], row["end"] = kind, piece, tau, start, end
     row["held"], row["velocity"], row["displacement"] = state.held, state.velocity, state.displacement
-    log[state.logged + 1]["kind"] = NOTHING
-    return State(
-        state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
-        state.stopped_at, state.least_held, state.slips, state.logged + 1,
-    )  # fmt: skip
 
 
 # ------------------------------------------------------------------ Eq. 4 on the rise, as a function of Üg alone
@@ -298,21 +291,25 @@ _followed_stop = root_of(_followed_lost)
 
 
 @scalar
-def hold(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, log: np.ndarray
-) -> tuple[float, State]:
-    """Slide with b held, V' = Üg − b, along piece p from start to end, or to the stop: where that is."""
-    amplitude, held, velocity = block.amplitude, state.held, state.velocity
+def hold_integrals(
+    pieces: np.ndarray, p: int, amplitude: float, held: float, rate: float, start: float, end: float
+) -> tuple[float, float]:
+    """Gains of V and W with b held on a part of piece p, at whose start Üg − b is `rate`."""
+    if pieces[p, DEGREE] <= 1.0:
+        return linear.held_integrals(rate, amplitude * pieces[p, COEFFICIENTS], end - start)
+    return held_integrals(pieces, p, amplitude, held, start, end)
+
+
+@scalar
+def hold(pieces: np.ndarray, p: int, amplitude: float, held: float, velocity: float, start: float, end: float) -> Part:
+    """Slide with b held, V' = Üg − b, along piece p from start to end, or to the stop."""
     # most parts are whole pieces, whose ends are known
     x = amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
     x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else base_acceleration(pieces, p, amplitude, end)
     rate, rate_end = x - held, x_end - held
-    width, slope, straight = end - start, amplitude * pieces[p, COEFFICIENTS], pieces[p, DEGREE] <= 1.0
-    if straight:
-        gained, displaced = linear.held_integrals(rate, slope, width)
-    else:
-        gained, displaced = held_integrals(pieces, p, amplitude, held, start, end)
-    low, high, peak, least = start, end, state.peak, state.least
+    slope, straight = amplitude * pieces[p, COEFFICIENTS], pieces[p, DEGREE] <= 1.0
+    gained, displaced = hold_integrals(pieces, p, amplitude, held, rate, start, end)
+    low, high, peak, least = start, end, velocity, velocity
     stops = velocity + gained <= 0.0
     if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
         # nothing slows it: over a part so short that its gain is rounding, it does not stop
@@ -335,123 +332,50 @@ def hold(
         end = start
         if velocity > 0.0 or rate > 0.0:
             if straight:
-                end = start + min(linear.held_stop(velocity, rate, slope), width)
+                end = min(start + linear.held_stop(velocity, rate, slope), high)
             else:
                 where = (pieces, p, amplitude, held, velocity, start)
                 end = _held_stop(where, low, high, 0.5 * (low + high), start)
-        width = end - start
-        if straight:
-            gained, displaced = linear.held_integrals(rate, slope, width)
-        else:
-            gained, displaced = held_integrals(pieces, p, amplitude, held, start, end)
-    if log.size:
-        state = logged(state, log, HOLD, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end))
-    after = state.displacement + (velocity * width + displaced)
+        displaced = hold_integrals(pieces, p, amplitude, held, rate, start, end)[1]
+    last = 0.0 if stops else velocity + gained
+    return Part(end, last, velocity * (end - start) + displaced, max(peak, last), min(least, last), stops)
+
+
+@scalar
+def follow(block: Block, pieces: np.ndarray, p: int, velocity: float, start: float, end: float) -> Part:
+    """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop."""
+    gained, displaced = eq4_integrals(block, pieces, p, start, end)
+    last = velocity + gained
+    stops = last <= 0.0
     if stops:
-        state = at_rest(moved(state, velocity, after, peak), phase_at(pieces, p, end))
-    else:
-        state = moved(state, velocity + gained, after, peak)
-    return end, with_least(state, least)
+        end, last = _followed_stop((block, pieces, p, velocity, start), start, end, 0.5 * (start + end), start), 0.0
+        displaced = eq4_integrals(block, pieces, p, start, end)[1]
+    moved = velocity * (end - start) + displaced
+    return Part(end, last, moved, max(last, velocity), min(last, velocity), stops)
 
 
 @scalar
-def with_least(state: State, least: float) -> State:
-    """The state of a block whose V was as small as `least`."""
-    return State(
-        state.velocity, state.displacement, state.held, state.peak, min(state.least, least), state.sliding,
-        state.follows, state.stopped_at, state.least_held, state.slips, state.logged,
-    )  # fmt: skip
-
-
-@scalar
-def glide(block: Block, pieces: np.ndarray, p: int, end: int, state: State) -> tuple[int, State]:
+def glide(pieces: np.ndarray, p: int, end: int, amplitude: float, state: State) -> tuple[int, State]:
     """`hold` along whole straight pieces from p on, before `end`, as long as V neither turns nor vanishes on one.
 
     Most pieces of a record are such.  Returns the first piece that is not.
     """
-    amplitude, held, velocity, displacement = block.amplitude, state.held, state.velocity, state.displacement
-    peak, least = state.peak, state.least
+    held, velocity, displacement, peak, least = state.held, state.velocity, state.displacement, state.peak, state.least
     while p < end and pieces[p, DEGREE] <= 1.0:
         rate, rate_end = amplitude * pieces[p, FIRST] - held, amplitude * pieces[p, LAST] - held
         width = pieces[p, FINISH] - pieces[p, BEGIN]
-        after = velocity + 0.5 * (rate + rate_end) * width
-        if not after > 0.0 or opposite(rate, rate_end):
+        last = velocity + 0.5 * (rate + rate_end) * width
+        if not last > 0.0 or opposite(rate, rate_end):
             break
         displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * width) * width
-        velocity, peak, least = after, max(peak, after), min(least, after)
+        velocity, peak, least = last, max(peak, last), min(least, last)
         p += 1
     return p, State(
-        velocity, displacement, held, peak, least, state.sliding, state.follows, state.stopped_at, state.least_held,
-        state.slips, state.logged,
-    )  # fmt: skip
-
-
-@scalar
-def follow(
-    block: Block, pieces: np.ndarray, p: int, start: float, end: float, state: State, log: np.ndarray
-) -> tuple[float, State]:
-    """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop: where that is."""
-    velocity = state.velocity
-    gained, displaced = eq4_integrals(block, pieces, p, start, end)
-    stops = velocity + gained <= 0.0
-    if stops:
-        end = _followed_stop((block, pieces, p, velocity, start), start, end, 0.5 * (start + end), start)
-        gained, displaced = eq4_integrals(block, pieces, p, start, end)
-    if log.size:
-        state = logged(state, log, FOLLOW, p, start, phase_at(pieces, p, start), phase_at(pieces, p, end))
-    after = state.displacement + (velocity * (end - start) + displaced)
-    if stops:
-        return end, at_rest(moved(state, velocity, after, state.peak), phase_at(pieces, p, end))
-    return end, moved(state, velocity + gained, after, state.peak)
+        velocity, displacement, held, state.sliding, peak, least, state.stopped_at, state.slips, state.logged
+    )
 
 
 # ------------------------------------------------------------------ along the pieces of a pulse
-
-
-@scalar
-def rise(
-    block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
-) -> State:  # fmt: skip
-    """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
-    amplitude, top, p = block.amplitude, block.amplitude * pieces[last, LAST], first
-    for _ in range(MOST_PHASES * (1 + last - first)):
-        if not state.sliding:
-            began = top
-            if top > block.yield_acceleration:
-                began = onset(block, max(x, block.yield_acceleration), top)
-            if began >= top:
-                return state
-            if began > x:
-                p, tau = place_of(block, pieces, began, p, tau, last)
-            # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g μs
-            beyond = began > max(x, block.yield_acceleration)
-            b = began if beyond else min(starting_acceleration(block, began), began)
-            state, x = begun(state, b, block.rise == LITERAL), began
-        phase = phase_on_rise(block, x, top, state.held, state.follows)
-        until, tau_until = place_of(block, pieces, phase.end, p, tau, last)
-        while True:
-            end = tau_until if p == until else pieces[p, FINISH]
-            if phase.follows:
-                tau, state = follow(block, pieces, p, tau, end, state, log)
-            else:
-                tau, state = hold(block, pieces, p, tau, end, state, log)
-            if not state.sliding or p == until:
-                break
-            p += 1
-            if not phase.follows and log.size == 0:
-                p, state = glide(block, pieces, p, until, state)
-            tau = pieces[p, BEGIN]
-        if not state.sliding and (p < until or tau < tau_until):
-            if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
-                p, tau, x = until, tau_until, phase.end
-            else:
-                x = base_acceleration(pieces, p, amplitude, tau)
-            continue
-        x = phase.end
-        state = with_held(state, response(block, x) if phase.follows else state.held, phase.follows_after)
-        if x >= top:
-            return state
-    return moved(state, math.nan, math.nan, math.nan)
 
 
 @scalar
@@ -466,21 +390,67 @@ def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, las
 
 
 @scalar
+def rise(
+    block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
+) -> State:  # fmt: skip
+    """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
+    amplitude, top, p = block.amplitude, block.amplitude * pieces[last, LAST], first
+    follows = block.rise == LITERAL
+    for _ in range(MOST_PHASES * (1 + last - first)):
+        if not state.sliding:
+            began = top
+            if top > block.yield_acceleration:
+                began = onset(block, max(x, block.yield_acceleration), top)
+            if began >= top:
+                return state
+            if began > x:
+                p, tau = place_of(block, pieces, began, p, tau, last)
+            # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g μs
+            beyond = began > max(x, block.yield_acceleration)
+            b = began if beyond else min(starting_acceleration(block, began), began)
+            state, follows, x = begun(state, b), block.rise == LITERAL, began
+        phase = phase_on_rise(block, x, top, state.held, follows)
+        until, tau_until = place_of(block, pieces, phase.end, p, tau, last)
+        while True:
+            end = tau_until if p == until else pieces[p, FINISH]
+            if phase.follows:
+                part = follow(block, pieces, p, state.velocity, tau, end)
+            else:
+                part = hold(pieces, p, amplitude, state.held, state.velocity, tau, end)
+            state = after(state, part, FOLLOW if phase.follows else HOLD, pieces, p, tau, log)
+            tau = part.end
+            if not state.sliding or p == until:
+                break
+            p += 1
+            if not phase.follows and log.size == 0:
+                p, state = glide(pieces, p, until, amplitude, state)
+            tau = pieces[p, BEGIN]
+        if not state.sliding and (p < until or tau < tau_until):
+            if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
+                p, tau, x = until, tau_until, phase.end
+            else:
+                x = base_acceleration(pieces, p, amplitude, tau)
+            continue
+        x, follows = phase.end, phase.follows_after
+        state = with_held(state, response(block, x) if phase.follows else state.held)
+        if x >= top:
+            return state
+    return State(math.nan, math.nan, state.held, True, math.nan, math.nan, 0.0, state.slips, state.logged)
+
+
+@scalar
 def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State) -> State:
     """Reset b of a block that slides where piece p, Üg = x, begins, or begin a slide there (t1), if not by a rise."""
-    literal = block.rise == LITERAL
     if state.sliding:
-        held = state.held
-        if literal:
-            held = response(block, x)
-        elif block.rise != NEWMARK:
-            held = max(held, response(block, x))
-        return with_held(state, held, literal)
+        if block.rise == NEWMARK:
+            return state
+        eq4 = response(block, x)
+        return with_held(state, eq4 if block.rise == LITERAL else max(state.held, eq4))
     if x >= block.yield_acceleration and pieces[p, FIRST] >= pieces[p, LAST]:
         b = starting_acceleration(block, x)
         if b < x:
-            return begun(state, b, literal)
-    return with_held(state, state.held, literal)
+            return begun(state, b)
+    return state
 
 
 @scalar
@@ -493,25 +463,80 @@ def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
 
 @scalar
 def end_of_fall(pieces: np.ndarray, p: int, end: int) -> int:
-    """The first piece after piece p, up to piece `end`, on which the base's acceleration does not go on to fall."""
-    p += 1
+    """The first piece from p on, up to piece `end`, on which the base's acceleration does not go on to fall."""
     while p < end and pieces[p, FIRST] > pieces[p, LAST] and pieces[p, JUMPS] == 0.0:
         p += 1
     return p
 
 
-@inlined
-def through_interval(
-    block: Block, pieces: np.ndarray, p: int, tau: float, end: int, state: State, log: np.ndarray
+@scalar
+def hold_on(
+    pieces: np.ndarray, p: int, amplitude: float, start: float, end: float, state: State, log: np.ndarray
 ) -> State:
-    """From Üg = Üy, τ on piece p, to Üg = 0 (t5) at the beginning of piece `end`."""
-    q = p
+    """The state after `hold`."""
+    part = hold(pieces, p, amplitude, state.held, state.velocity, start, end)
+    return after(state, part, HOLD, pieces, p, start, log)
+
+
+@single
+def recouple(
+    block: Block, recoupling: int, pieces: np.ndarray, q: int, p: int, tau: float, state: State, log: np.ndarray
+) -> State:
+    """From Üg = 0 (t5) at the beginning of piece q to the next pulse, τ on piece p, or to the stop.
+
+    By Eq. 12 with Ümax = b, or with b held on.  p lies past the last piece if there is no next pulse.
+    """
+    count = pieces.shape[0]
+    started = pieces[q, START] if q < count else pieces[q - 1, END]
+    stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
+    if recoupling == INTEGRATE:
+        while state.sliding and q < min(p + 1, count):
+            if log.size == 0:
+                q, state = glide(pieces, q, min(p, count), block.amplitude, state)
+            end = tau if q == p else pieces[min(q, count - 1), FINISH]
+            if q < count and end > pieces[q, BEGIN]:
+                state = hold_on(pieces, q, block.amplitude, pieces[q, BEGIN], end, state, log)
+            q += 1
+        started, stopped_at = pieces[count - 1, END], math.inf
+    if not state.sliding or (p < count and recoupling == INTEGRATE):
+        return state
+    duration = math.inf if p >= count else phase_at(pieces, p, tau) - started
+    logged = state.logged
+    if log.size:
+        note(log[logged], state, ATTENUATE, 0, 0.0, started, started + min(duration, state.velocity / state.held))
+        logged += 1
+    velocity = eq.attenuated_velocity(state.velocity, state.held, duration)
+    displacement = state.displacement + eq.attenuated_displacement(state.velocity, state.held, duration)
+    return State(
+        velocity, displacement, state.held, state.sliding, state.peak, min(state.least, velocity), stopped_at,
+        state.slips, logged,
+    )  # fmt: skip
+
+
+@single
+def pulse(
+    block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
+) -> Pulse:
+    """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows.
+
+    Up to Üg = 0 (t5) the block sticks until t1, slides as `rise` says while Üg rises and with b held while it falls.
+    """
+    pieces, log, end = wave.pieces, workspace.log, wave.interval[k, 1]
+    q, tau = beginning(block, wave, k)
+    x = max(block.amplitude * pieces[q, FIRST], block.yield_acceleration)
+    state = State(
+        velocity=velocity,
+        displacement=0.0,
+        held=starting_acceleration(block, x),
+        sliding=velocity > 0.0,
+        peak=velocity,
+        least=velocity,
+        stopped_at=0.0,
+        slips=0.0,
+        logged=0,
+    )
+    least_held = math.inf  # at the end of a rise: by Eq. 12 no block comes to rest with b ≤ 0
     while q < end:
-        x = block.amplitude * pieces[q, FIRST]
-        if q == p:
-            x = max(x, block.yield_acceleration)
-        else:
-            tau = pieces[q, BEGIN]
         if rises_anew(pieces, q):
             state = reset_held(block, pieces, q, x, state)
         if pieces[q, FIRST] < pieces[q, LAST]:
@@ -520,106 +545,28 @@ def through_interval(
             q = last
         elif state.sliding:
             level = pieces[q, FIRST] == pieces[q, LAST]
-            if not level:
-                state = at_end_of_rise(state)
-            tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, log)
-            if level and not state.sliding:
+            least_held = least_held if level else min(least_held, state.held)
+            part = hold(pieces, q, block.amplitude, state.held, state.velocity, tau, pieces[q, FINISH])
+            state = after(state, part, HOLD, pieces, q, tau, log)
+            if level and part.stops:
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
-                    tau, state = hold(block, pieces, q, tau, pieces[q, FINISH], state, log)
+                    state = hold_on(pieces, q, block.amplitude, part.end, pieces[q, FINISH], state, log)
             elif state.sliding and log.size == 0:
-                q, state = glide(block, pieces, q + 1, end_of_fall(pieces, q, end), state)
-                continue
+                q, state = glide(pieces, q + 1, end_of_fall(pieces, q + 1, end), block.amplitude, state)
+                q -= 1
         q += 1
-    return state
-
-
-@scalar
-def attenuated(state: State, duration: float) -> State:
-    """Eq. 12 for `duration` of phase, or to the stop, with Ümax = b; V may have either sign."""
-    speed, side = abs(state.velocity), math.copysign(1.0, state.velocity)
-    displaced = side * eq.attenuated_displacement(speed, state.held, duration)
-    velocity = side * eq.attenuated_velocity(speed, state.held, duration)
-    return moved(state, velocity, state.displacement + displaced, state.peak)
-
-
-@scalar
-def recouple(
-    block: Block, recoupling: int, pieces: np.ndarray, q: int, p: int, tau: float, state: State, log: np.ndarray
-) -> State:
-    """From Üg = 0 (t5) at the beginning of piece q to the next pulse, τ on piece p, or to the stop.
-
-    p lies past the last piece if there is no next pulse.
-    """
-    count = pieces.shape[0]
-    last = p >= count
-    started = pieces[q, START] if q < count else pieces[q - 1, END]
-    stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
-    if recoupling == INTEGRATE:
-        stopped_at = math.inf
-        piece = q
-        while state.sliding and piece < min(p + 1, count):
-            if log.size == 0:
-                piece, state = glide(block, pieces, piece, min(p, count), state)
-            end = tau if piece == p else pieces[piece, FINISH]
-            if piece < count and end > pieces[piece, BEGIN]:
-                _, state = hold(block, pieces, piece, pieces[piece, BEGIN], end, state, log)
-            piece += 1
-        started = pieces[count - 1, END]
-    if state.sliding and (last or recoupling != INTEGRATE):
-        duration = math.inf if last else phase_at(pieces, p, tau) - started
-        if log.size:
-            until = started + min(duration, state.velocity / state.held)
-            state = logged(state, log, ATTENUATE, 0, 0.0, started, until)
-        state = attenuated(state, duration)
-        return State(
-            state.velocity, state.displacement, state.held, state.peak, state.least, state.sliding, state.follows,
-            stopped_at, state.least_held, state.slips, state.logged,
-        )  # fmt: skip
-    return state
-
-
-@inlined
-def pulse_between(
-    block: Block, recoupling: int, pieces: np.ndarray, p: int, tau: float, end: int, next_p: int, next_tau: float,
-    velocity: float, log: np.ndarray,
-) -> Pulse:  # fmt: skip
-    """From Üg = Üy, τ on piece p, through Üg = 0 (t5) at the beginning of piece `end`, to the next pulse."""
-    x = max(block.amplitude * pieces[p, FIRST], block.yield_acceleration)
-    state = State(
-        velocity=velocity,
-        displacement=0.0,
-        held=starting_acceleration(block, x),
-        peak=velocity,
-        least=velocity,
-        sliding=velocity > 0.0,
-        follows=block.rise == LITERAL,
-        stopped_at=0.0,
-        least_held=math.inf,
-        slips=0.0,
-        logged=0,
-    )
-    state = through_interval(block, pieces, p, tau, end, state, log)
+        x, tau = block.amplitude * pieces[min(q, end - 1), FIRST], pieces[min(q, end - 1), BEGIN]
     if state.sliding:
         if state.held <= 0.0:
             return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, KD_NOT_POSITIVE)
-        state = recouple(block, recoupling, pieces, end, next_p, next_tau, state, log)
-    validity = KD_NOT_POSITIVE if state.least_held <= 0.0 else 0
+        next_p, next_tau = pieces.shape[0], 0.0
+        if following < wave.height.size:
+            next_p, next_tau = beginning(block, wave, following)
+        state = recouple(block, options.recoupling, pieces, end, next_p, next_tau, state, log)
+    workspace.logged[0] = state.logged
+    validity = KD_NOT_POSITIVE if least_held <= 0.0 else 0
     return Pulse(
         state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.stopped_at,
         state.slips, validity,
-    )  # fmt: skip
-
-
-@inlined
-def pulse(
-    block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
-) -> Pulse:
-    """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows."""
-    p, tau = beginning(block, wave, k)
-    next_p, next_tau = wave.pieces.shape[0], 0.0
-    if following < wave.height.size:
-        next_p, next_tau = beginning(block, wave, following)
-    return pulse_between(
-        block, options.recoupling, wave.pieces, p, tau, wave.interval[k, 1], next_p, next_tau, velocity, workspace.log
     )  # fmt: skip

@@ -13,7 +13,7 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block, Cell, Options, block_of, response
 from slipsweep.kernels.eq4 import eq4_integrals
-from slipsweep.kernels.exact import ATTENUATE, FOLLOW, NOTHING, Workspace, pulse
+from slipsweep.kernels.exact import ATTENUATE, FOLLOW, Workspace, pulse
 from slipsweep.kernels.excitation import base_acceleration, held_integrals, phase_at
 from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.kernels.record import block_in_pulse, end_of_following, recorded_pulse, slides_continuously
@@ -136,14 +136,14 @@ def sample_pulse(
     row = 0
     while at < phases.size and phases[at] < until:
         phi = phases[at] - offset
-        while log[row]["kind"] != NOTHING and phi >= log[row]["end"]:
+        while row < log.size and phi >= log[row]["end"]:
             row += 1
         moved = 0.0
         if phases[at] >= start:
-            moved = gained if log[row]["kind"] == NOTHING else log[row]["displacement"]
+            moved = log[row]["displacement"] if row < log.size else gained
         found.displacement[at] = displacement + moved
         # a part that is entered with V follows the one before: what lies between them is rounding
-        if log[row]["kind"] != NOTHING and (phi >= log[row]["start"] or log[row]["velocity"] > 0.0):
+        if row < log.size and (phi >= log[row]["start"] or log[row]["velocity"] > 0.0):
             sample_part(block, wave, log, row, phi, displacement, at, found)
         at += 1
     return at
@@ -162,12 +162,9 @@ def stick_slip_history(
         following = first_pulse(block, wave, k + 1)
         offset = 2.0 * math.pi * repeat
         start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, following) + offset
-        workspace.log[0]["kind"] = NOTHING
         now = pulse(block, options, wave, workspace, k, following, velocity)
-        at = sample_pulse(
-            block, wave, workspace.log, start, until, offset, displacement, now.displacement, phases, at,
-            found,
-        )  # fmt: skip
+        log = workspace.log[: workspace.logged[0]]
+        at = sample_pulse(block, wave, log, start, until, offset, displacement, now.displacement, phases, at, found)
         velocity = now.velocity
         displacement += now.displacement
         again = following < intervals and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
@@ -274,17 +271,14 @@ def record_history(
     while at < times.size and k < wave.height.size:
         following, peak = first_pulse(block, wave, k + 1), cell.amplitude * wave.height[k]
         block = block_in_pulse(exponential(), cell, options, peak)
-        workspace.log[0]["kind"] = NOTHING
         now = recorded_pulse(block, options, wave, k, following, peak, velocity, workspace)
         if slides_continuously(block, peak):
             moving = Moving(velocity, displacement, at)
             at = sample_continuous_pulse(block, wave, k, following, peak, moving, times, found)
         else:
             start, until = begins_at(block, wave, k), begins_at(block, wave, following)
-            at = sample_pulse(
-                block, wave, workspace.log, start, until, 0.0, displacement, now.displacement, times, at,
-                found,
-            )  # fmt: skip
+            log = workspace.log[: workspace.logged[0]]
+            at = sample_pulse(block, wave, log, start, until, 0.0, displacement, now.displacement, times, at, found)
         velocity, displacement = now.velocity, displacement + now.displacement
         k = following
     fill_friction(block, found)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, registered, scalar, uncounted
+from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
@@ -35,24 +35,17 @@ from slipsweep.kernels.block import (
     response,
     settled,
     stays_below_yield,
+    store,
 )
 from slipsweep.kernels.continuous import zeros_of_relative_acceleration
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
 from slipsweep.kernels.excitation import offset_at, phase_at
-from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted_wave
+from slipsweep.kernels.grid import cell_at, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
 from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, LAST, TOP, Wave
-
-
-class Problem(NamedTuple):
-    """What all cells under a record share."""
-
-    options: Options
-    wave: Wave
-    workspace: Workspace
 
 
 class Following(NamedTuple):
@@ -224,10 +217,9 @@ def validity_of_record(law: FrictionLaw, cell: Cell, options: Options, wave: Wav
     return validity | (UPLIFT if (lowest <= 0.0) & (options.rise != NEWMARK) else 0)
 
 
-@scalar
-def respond(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
+@single
+def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, workspace: Workspace) -> Motion:
     """The response of a cell, pulse by pulse; `cell.amplitude` is the factor on the record."""
-    options, wave, workspace = problem
     scale = cell.amplitude
     validity = validity_of_record(law, cell, options, wave)
     block = block_in_pulse(law, cell, options, scale * wave.highest)
@@ -262,13 +254,9 @@ def respond(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
     return Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous)
 
 
-@registered
-def _solve(cell: Cell, problem: Problem) -> Motion:
-    return respond(exponential(), cell, problem)
-
-
 @kernel
-def solve_record(cells: Cells, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
+def solve_record(cells: np.ndarray, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
     """Solve the cells of a tile under a record exactly; `results` is (fields of `Motion`, cells)."""
-    problem = Problem(options, uncounted_wave(wave), uncounted_workspace(workspace))
-    solve_each(_solve, uncounted_cells(cells), problem, uncounted(results))
+    wave, workspace = uncounted_wave(wave), uncounted_workspace(workspace)
+    for j in range(cells.size):
+        store(solve_cell(exponential(), cell_at(cells, j), options, wave, workspace), j, results)

@@ -22,12 +22,12 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, registered, scalar
+from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
-from slipsweep.kernels.grid import Cells, solve_each
+from slipsweep.kernels.grid import cell_at
 from slipsweep.kernels.pulse import Pulse, beginning, motion_of, validity_before
 from slipsweep.kernels.series import series_of, yield_governs
 from slipsweep.kernels.train import train_of
@@ -335,7 +335,7 @@ def hold(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, unt
     return walk(block, pieces, steps, p, tau, until, HELD, state)
 
 
-@scalar
+@single
 def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
     """A pulse of the paper: t1 to t5 in interval k of Üg > 0, and Eq. 12 up to the `following` one (see `train`)."""
     pieces, end, validity = wave.pieces, wave.interval[k, 1], 0
@@ -394,7 +394,7 @@ def follow(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, l
 _slide_continuously = series_of(follow)
 
 
-@scalar
+@single
 def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps: Steps) -> Motion:
     """The response of a cell with any friction law."""
     block = physics.block_of(law, cell, options.rise, options.g)
@@ -408,12 +408,8 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps
     return motion_of(block, validity, found)
 
 
-@registered
-def _solve(cell: Cell, common: tuple[Options, Wave, Steps]) -> Motion:
-    return solve_cell(exponential(), cell, *common)
-
-
 @kernel
-def solve_steps(cells: Cells, options: Options, wave: Wave, steps: Steps, results: np.ndarray) -> None:
+def solve_steps(cells: np.ndarray, options: Options, wave: Wave, steps: Steps, results: np.ndarray) -> None:
     """Solve the cells of a tile by steps; `results` is (fields of `Motion`, cells)."""
-    solve_each(_solve, cells, (options, wave, steps), results)
+    for j in range(cells.size):
+        physics.store(solve_cell(exponential(), cell_at(cells, j), options, wave, steps), j, results)

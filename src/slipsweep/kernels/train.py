@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.block import (
     NO_VALUE,
     NOT_RECOUPLED,
@@ -70,7 +70,7 @@ def train_of(
                 break
         return Pulse(velocity, displacement, peak, least, 0.0, 0.0, validity), k
 
-    @scalar
+    @single
     def train(block: Block, options: Options, wave: Wave, table: Any, known: np.ndarray) -> Pulse:
         """All pulses of a stick-slip (or Newmark) block, as one; `known` is a workspace, (intervals, 2).
 

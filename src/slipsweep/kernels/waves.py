@@ -1,22 +1,22 @@
 """The exact kernel for waveforms: a block that sticks and slips, or slides continuously, through all cycles."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import registered, scalar, uncounted
+from slipsweep.jit.decorators import single
 from slipsweep.kernels.block import (
     YIELD_GOVERNS,
     Cell,
     Motion,
     Options,
     block_of,
+    store,
 )
 from slipsweep.kernels.continuous import slide_continuously
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace, yield_governs
-from slipsweep.kernels.grid import Cells, solve_each, uncounted_cells, uncounted_wave
+from slipsweep.kernels.grid import cell_at, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, motion_of, validity_before
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
@@ -26,18 +26,9 @@ from slipsweep.motion.pieces import Wave
 _train = train_of(pulse)
 
 
-class Problem(NamedTuple):
-    """What all cells under a waveform share."""
-
-    options: Options
-    wave: Wave
-    workspace: Workspace
-
-
-@scalar
-def solve_exactly(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
-    """The response of a cell of any law that gives what this kernel takes of it (`exact.check_law`)."""
-    options, wave, workspace = problem
+@single
+def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, workspace: Workspace) -> Motion:
+    """The response of a cell of any law that gives what this kernel takes of it (`FrictionLaw.missing`)."""
     block = block_of(law, cell, options.rise, options.g)
     mode, validity = block.sliding_mode, validity_before(block, wave)
     found = Pulse(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
@@ -51,13 +42,9 @@ def solve_exactly(law: FrictionLaw, cell: Cell, problem: Problem) -> Motion:
     return motion_of(block, validity, found)
 
 
-@registered
-def _solve(cell: Cell, problem: Problem) -> Motion:
-    return solve_exactly(exponential(), cell, problem)
-
-
 @kernel
-def solve_waves(cells: Cells, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
+def solve_waves(cells: np.ndarray, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
     """Solve the cells of a tile under a waveform exactly; `results` is (fields of `Motion`, cells)."""
-    problem = Problem(options, uncounted_wave(wave), uncounted_workspace(workspace))
-    solve_each(_solve, uncounted_cells(cells), problem, uncounted(results))
+    wave, workspace = uncounted_wave(wave), uncounted_workspace(workspace)
+    for j in range(cells.size):
+        store(solve_cell(exponential(), cell_at(cells, j), options, wave, workspace), j, results)

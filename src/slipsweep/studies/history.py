@@ -18,7 +18,6 @@ from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, check_problem, plan_sweep
 from slipsweep.grid.problem import Problem
 from slipsweep.grid.resources import check_memory
-from slipsweep.grid.served import check_served
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
 from slipsweep.kernels.exact import workspace_of
@@ -117,7 +116,7 @@ class _History:
     @cached_property
     def unit(self) -> float:
         """Seconds that a phase takes: 1/ω, or the factor on the time of a record."""
-        return float(engine.kernel_inputs(Request(self.problem, (), self.inputs, ()))[1])
+        return float(engine.phase_seconds(self.problem, self.inputs))
 
     @property
     def _valueless(self) -> bool:
@@ -127,8 +126,8 @@ class _History:
         """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
         motion, table = self.problem.excitation, np.empty((len(HISTORY), phases.size))
         wave = wave_of_record(motion, float(self.inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
-        given = engine.kernel_inputs(Request(self.problem, (), self.inputs, ()))[0]
-        cell = Cell(*(float(values) for values in given))
+        given = engine.cell_inputs(self.problem, self.inputs)
+        cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
         kernel = record_history if isinstance(motion, Record) else wave_history
         options = options_of(self.problem, wants_peak=True)
         arguments = cell, options, wave, workspace_of(wave, keeps_log=True), phases, History(*table)
@@ -151,9 +150,9 @@ class _History:
         with np.errstate(over="ignore"):
             table[:, 3] *= self.unit
             table[:, 4] *= self.unit * self.unit
-        if not self._valueless:
-            moved = {name: table[:, at] for name, at in known.items()}
-            check_served(self.problem.model.g, self.inputs, moved, np.zeros(len(table), np.int16))
+        if not self._valueless and not np.isfinite(table[:, list(known.values())]).all():
+            given = ", ".join(f"{name} = {number_text(float(values))}" for name, values in self.inputs.items())
+            raise InputError(f"{given}: the history is then no finite number in double precision; must be nearer to 1")
         return {name: xr.Variable(("time",), table[:, at].copy(), HISTORY[name]) for name, at in known.items()}
 
     def half_waves(self) -> dict[str, xr.Variable]:

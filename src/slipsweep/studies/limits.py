@@ -158,7 +158,7 @@ def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
             for name, values in results.items():
                 own: Any = values[(*where, ...)]  # type: ignore[arg-type]
                 own[(*slab, ...)] = solved[name]
-            request.tell(math.prod(part.shape))
+            request.count(math.prod(part.shape))
     return results
 
 

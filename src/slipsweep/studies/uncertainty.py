@@ -284,9 +284,7 @@ class SamplePlan:
     def part(self, chunk: Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
         coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
-        inputs = {name: one.values for name, one in inputs_of(self.problem, coords).items() if name == "motion"}
-        problem, _ = engine.narrowed(self.problem, inputs)
-        return SamplePlan(self.sampling, self.studies, problem, coords, self.attrs)
+        return SamplePlan(self.sampling, self.studies, self.problem, coords, self.attrs)
 
     def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
@@ -417,6 +415,6 @@ class SamplePlan:
             estimate = engine.coulomb_yield_acceleration(arrays["theta"], arrays["mu_s"], self.problem.model.g)
         else:
             dims = np.broadcast_shapes(*(values.shape for values in arrays.values()), (1,) * len(shape))
-            estimate = engine.estimates(Request(self.problem, dims, arrays, (name,)))[name]
+            estimate = engine.friction_parameters(Request(self.problem, dims, arrays, (name,)), finite=False)[name]
         values = one.applied(estimate, row)
         return np.where(BOUNDS[name].holds(values), values, np.nan)

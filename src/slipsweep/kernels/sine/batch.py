@@ -14,7 +14,6 @@ import numpy as np
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, versine
 from slipsweep.kernels.block import Cell, Motion
-from slipsweep.kernels.grid import Cells
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_derivatives
 
@@ -68,17 +67,17 @@ _MOST_STEPS = 32
 
 
 @inlined
-def load(cells: Cells, first: int, batch: Batch) -> None:
+def load(cells: np.ndarray, first: int, batch: Batch) -> None:
     """Fill a batch with cells, from the `first` on; fields of the block that have estimates are NaN where not given."""
-    batch.used = min(WIDTH, cells.amplitude.size - first)
+    batch.used = min(WIDTH, cells.size - first)
     for j in range(batch.used):
-        batch.tan_theta[j] = cells.tan_theta[first + j]
-        batch.mu_s[j] = cells.mu_s[first + j]
-        batch.amplitude[j] = cells.amplitude[first + j]
-        batch.yield_acceleration[j] = cells.yield_acceleration[first + j]
-        batch.decay_rate[j] = cells.decay_rate[first + j]
-        batch.delta_mu[j] = cells.delta_mu[first + j]
-        batch.minimum_friction[j] = cells.minimum_friction[first + j]
+        batch.tan_theta[j] = cells[first + j].tan_theta
+        batch.mu_s[j] = cells[first + j].mu_s
+        batch.amplitude[j] = cells[first + j].amplitude
+        batch.yield_acceleration[j] = cells[first + j].yield_acceleration
+        batch.decay_rate[j] = cells[first + j].decay_rate
+        batch.delta_mu[j] = cells[first + j].delta_mu
+        batch.minimum_friction[j] = cells[first + j].minimum_friction
 
 
 @inlined

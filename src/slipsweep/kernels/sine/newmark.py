@@ -11,7 +11,6 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import elementary
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import NEWMARK, Options, interface_of
-from slipsweep.kernels.grid import Cells
 from slipsweep.kernels.sine.batch import (
     BATCH,
     DISPLACEMENT,
@@ -66,13 +65,13 @@ def newmark_slide(yield_acceleration: float, amplitude: float) -> float:
 
 
 @kernel
-def solve_newmark_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
+def solve_newmark_sine(cells: np.ndarray, options: Options, results: np.ndarray) -> int:
     """Newmark's block under a sine, as `solve.solve_sine`; no cell is left.
 
     V rises up to Üg = Üy on the fall, and as much from the peak on as before it.
     """
     batch = np.empty(1, BATCH)[0]
-    for first in range(0, cells.amplitude.size, WIDTH):
+    for first in range(0, cells.size, WIDTH):
         load(cells, first, batch)
         for j in range(WIDTH):
             block = interface_of(given(batch, j), NEWMARK, options.g)

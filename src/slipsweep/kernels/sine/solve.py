@@ -8,7 +8,6 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels.block import UNSOLVED, Options, settled, without_estimates
 from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
-from slipsweep.kernels.grid import Cells
 from slipsweep.kernels.sine.batch import BATCH, DISPLACEMENT, PEAK_VELOCITY, VALIDITY, WIDTH, Batch, load
 from slipsweep.kernels.sine.continuous import find_peak_velocity, slide_on
 from slipsweep.kernels.sine.kinds import KINDS, OTHER, RESTS, SLIDES_ON, YIELD_GOVERNS, classify
@@ -60,7 +59,7 @@ def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) 
 
 
 @kernel
-def solve_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
+def solve_sine(cells: np.ndarray, options: Options, results: np.ndarray) -> int:
     """Solve cells under a sine into W, V, mode and validity, the first rows of `results`, (fields of `Motion`, cells).
 
     Returns how many are left to the kernel that solves any waveform: their validity is `UNSOLVED`.
@@ -70,7 +69,7 @@ def solve_sine(cells: Cells, options: Options, results: np.ndarray) -> int:
         batches[kind].used = 0
     loaded = batches[KINDS]
     unsolved = 0
-    for first in range(0, cells.amplitude.size, WIDTH):
+    for first in range(0, cells.size, WIDTH):
         load(cells, first, loaded)
         classify(loaded, first, options, results)
         for j in range(loaded.used):
