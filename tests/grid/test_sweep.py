@@ -364,8 +364,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"displacement_amplitude": 0.1}, "amplitude, displacement_amplitude: exactly one of them must be given"),
     ({"frequency": None}, "frequency: must be given"),
     (
-        {"amplitude": None, "displacement_amplitude": [1e300, 1.0], "frequency": [1.0, 9e4]},
-        "displacement_amplitude = 1e+300: with frequency = 90000 its amplitude A = (2 pi f)^2 d must be a finite",
+        {"amplitude": None, "displacement_amplitude": [1e30, 1.0], "frequency": [1.0, 9e4]},
+        "displacement_amplitude = 1e+30: with frequency = 90000 its amplitude A = (2 pi f)^2 d must be a finite",
     ),
     ({"cycles": 0}, "cycles = 0: must be a whole number >= 1"),
     ({"cycles": 2.5}, "cycles = 2.5: must be a whole number >= 1"),

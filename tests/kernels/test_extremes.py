@@ -24,25 +24,19 @@ def no_warnings() -> Iterator[None]:
         yield
 
 
-#: The smallest double is none of a range's ends, but has been known to come in.
-LEAST = 5e-324
-
-
-def wide(rng: random.Random, exponent: float) -> float:
+def wide(rng: random.Random, exponent: float = 30.0) -> float:
     return float(10.0 ** rng.uniform(-exponent, exponent))
 
 
-def extreme(rng: random.Random, name: str, g: float) -> float:
+def extreme(rng: random.Random, name: str) -> float:
     """A number within the bounds of a parameter, near their ends or anywhere between."""
     if name == "theta":
-        return rng.choice([0.0, LEAST, 1e-300, 1e-160, 89.9999, math.nextafter(90.0, 0.0), rng.uniform(0.0, 90.0)])
-    if name == "amplitude":
-        return rng.choice([0.0, LEAST, 1e-320, wide(rng, 300.0), wide(rng, 200.0), 1e300])
-    if name == "yield_acceleration":
-        return rng.choice([-1.0, 1.0, 1.0]) * rng.choice([LEAST, wide(rng, 300.0), 1e300])
-    if name in ("decay_rate", "delta_mu") and rng.random() < 0.3:
+        return rng.choice([0.0, 1e-300, 1e-10, 89.9999, math.nextafter(90.0, 0.0), rng.uniform(0.0, 90.0)])
+    if name in ("amplitude", "decay_rate", "delta_mu") and rng.random() < 0.2:
         return 0.0
-    return rng.choice([1e-100, 1e100, wide(rng, 100.0), wide(rng, 100.0)])
+    if name == "yield_acceleration":
+        return rng.choice([-1.0, 1.0, 1.0]) * wide(rng)
+    return rng.choice([1e-30, 1e30, wide(rng), wide(rng)])
 
 
 def common(rng: random.Random, name: str, g: float) -> float:
@@ -63,11 +57,12 @@ def common(rng: random.Random, name: str, g: float) -> float:
 
 def cell_of(rng: random.Random) -> dict[str, Any]:
     """Parameters, g among them, of which about half are extreme."""
-    g = rng.choice([9.81, 9.81, 1e-300, 1e300, wide(rng, 300.0)])
+    g = rng.choice([9.81, 9.81, 9.81, wide(rng)])
     names = ["theta", "mu_s", "amplitude", "frequency"]
     optional = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
     names += [name for name in optional if rng.random() < 0.3]
-    return {name: rng.choice([common, extreme])(rng, name, g) for name in names} | {"g": g}
+    drawn = {name: common(rng, name, g) if rng.random() < 0.5 else extreme(rng, name) for name in names}
+    return drawn | {"g": g}
 
 
 def assert_valued(found: xr.Dataset) -> None:
@@ -120,25 +115,25 @@ def simulate(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
 def record(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     own = {name: value for name, value in cell.items() if name not in ("amplitude", "frequency")}
     values = np.array([0.0, 1.0, -0.7, 0.4, 0.9, -1.0, 0.0])
-    peak = max(cell["amplitude"], 1e-300)
-    times = np.arange(values.size) / min(max(cell["frequency"], 1e-90), 1e90)
-    options: dict[str, Any] = {"rise": rng.choice(["monotone", "literal"]), "scale": rng.choice([1.0, 1e-90, 1e90])}
+    peak = max(cell["amplitude"], 1e-30)
+    times = np.arange(values.size) / cell["frequency"]
+    options: dict[str, Any] = {"rise": rng.choice(["monotone", "literal"]), "scale": rng.choice([1.0, wide(rng)])}
     motion = slipsweep.Record(times, peak * values)
-    return slipsweep.sweep(**choices(**own, **options, excitation=motion, time_scale=rng.choice([1.0, 1e-90, 1e90])))
+    return slipsweep.sweep(**choices(**own, **options, excitation=motion, time_scale=rng.choice([1.0, wide(rng)])))
 
 
 def limit(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     own: dict[str, Any] = {name: value for name, value in cell.items() if name != "amplitude"}
     highest = {"maximum_amplitude": cell["amplitude"]} if cell["amplitude"] > 0.0 else {}
     given = without(choices(**own), "solver")
-    found = slipsweep.limit_amplitude(rng.choice([1e-300, 0.1, 1e300]), **given, **highest, amplitude_steps=16)
+    found = slipsweep.limit_amplitude(rng.choice([1e-30, 0.1, 1e30]), **given, **highest, amplitude_steps=16)
     assert not np.isinf(found.limit_amplitude)
     return found[["validity"]]
 
 
 def sample(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     drawn = {"mu_s": {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"}}
-    found = slipsweep.sample(**choices(**cell), uncertain=drawn, samples=16, thresholds=[rng.choice([0.0, 0.1, 1e300])])
+    found = slipsweep.sample(**choices(**cell), uncertain=drawn, samples=16, thresholds=[rng.choice([0.0, 0.1, 1e30])])
     for name in ("displacement_quantile", "mean_displacement", "exceedance_probability"):
         assert not np.isinf(found[name]).any(), name
         assert bool((found.valueless_share == 1.0) | np.isfinite(found[name]).all()), name
@@ -180,28 +175,12 @@ def test_served_or_refused_by_name(way: str) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"amplitude": 1.7e308}, "amplitude = 1.7e+308: must be a finite number >= 0 and at most 1e+300"),
-        ({"frequency": 1e-160}, "frequency = 1e-160: must be a finite number > 0, from 1e-100 to 1e+100"),
+        ({"amplitude": 1.7e308}, "amplitude = 1.7e+308: must be a finite number >= 0 and at most 1e+30"),
+        ({"frequency": 1e-160}, "frequency = 1e-160: must be a finite number > 0, from 1e-30 to 1e+30"),
+        ({"yield_acceleration": -1e31}, "yield_acceleration = -1e+31: must be a finite number from -1e+30 to 1e+30"),
         (
-            {"yield_acceleration": -1e301},
-            "yield_acceleration = -1e+301: must be a finite number from -1e+300 to 1e+300",
-        ),
-        (
-            {"theta": 0.0, "amplitude": 1e300, "frequency": 1e-10, "model": "newmark"},
-            "amplitude = 1e+300: permanent_displacement is then no finite number; must be nearer to 1",
-        ),
-        (
-            {
-                "model": "newmark",
-                "amplitude": [1.0, 1e250],
-                "frequency": [1.0, 1e-90],
-                "variables": ["peak_relative_velocity"],
-            },
-            "amplitude = 1e+250, frequency = 1e-90: peak_relative_velocity is then no finite number",
-        ),
-        (
-            {"amplitude": None, "displacement_amplitude": [0.1, 1e200], "frequency": [1.0, 1e80]},
-            "displacement_amplitude = 1e+200: with frequency = 1e+80 its amplitude A = (2 pi f)^2 d must be a finite",
+            {"amplitude": None, "displacement_amplitude": [0.1, 1e20], "frequency": [1.0, 1e8]},
+            "displacement_amplitude = 1e+20: with frequency = 100000000 its amplitude A = (2 pi f)^2 d must be a finite",
         ),
         (
             {"amplitude": [0.0, 2.0], "variables": ["permanent_displacement", "decay_rate"]},
@@ -218,14 +197,14 @@ def test_refusals_name_what_is_too_much(given: dict[str, Any], message: str, sol
 
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 def test_ends_of_the_ranges_are_served(solver: str) -> None:
-    """u = W/ω² at any size: a block 1e300 times as large does what a common one does."""
+    """u = W/ω² at any size: a block 1e25 times as large does what a common one does."""
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "solver": solver, "cycles": 2, "yield_acceleration": 0.59}
     common_one = slipsweep.sweep(**choices(**block, amplitude=3.0, frequency=1.0))
-    for size in (1e-290, 1e290):
+    for size in (1e-25, 1e25):
         large = block | {"yield_acceleration": 0.59 * size, "g": 9.81 * size}
         found = slipsweep.sweep(**choices(**large, amplitude=3.0 * size, frequency=1.0))
         assert float(found.permanent_displacement) / size == pytest.approx(float(common_one.permanent_displacement))
-    for frequency in (1e-100, 1e100):
+    for frequency in (1e-30, 1e30):
         found = slipsweep.sweep(**choices(**block, amplitude=3.0, frequency=frequency))
         moved = float(found.permanent_displacement) * frequency * frequency
         assert moved == pytest.approx(float(common_one.permanent_displacement))
@@ -235,13 +214,13 @@ def test_ends_of_the_ranges_are_served(solver: str) -> None:
 @pytest.mark.parametrize("rise", ["monotone", "literal"])
 @pytest.mark.parametrize("wave", [*WAVES, {"waveform": "triangle"}, {"waveform": "sine", "ramp_out": 1.0}], ids=str)
 def test_size_changes_nothing(wave: dict[str, Any], rise: str, recoupling: str) -> None:
-    """All accelerations and g 1e±290 times as large: so is u.  Squares of accelerations are no doubles there."""
+    """All accelerations and g 1e±25 times as large: so is u."""
     block: dict[str, Any] = {"theta": 4.0, "mu_s": 0.6, "frequency": 1.0, "cycles": 4, "solver": "cycle"}
     block |= {**wave, "rise": rise, "recoupling": recoupling}
     accelerations = {"amplitude": 4.2, "yield_acceleration": 0.9, "g": 9.81}
     usual = float(slipsweep.sweep(**choices(**block, **accelerations)).permanent_displacement)
     assert usual > 0.0
-    for size in (1e-290, 1e-160, 1e160, 1e290):
+    for size in (1e-25, 1e25):
         scaled = {name: value * size for name, value in accelerations.items()}
         found = float(slipsweep.sweep(**choices(**block, **scaled)).permanent_displacement)
         assert found / size == pytest.approx(usual, rel=1e-11), f"{size:g}"
@@ -250,7 +229,7 @@ def test_size_changes_nothing(wave: dict[str, Any], rise: str, recoupling: str) 
     usual = float(
         slipsweep.sweep(**choices(**recorded, yield_acceleration=0.9, excitation=record)).permanent_displacement
     )
-    for size in (1e-290, 1e-160, 1e160, 1e290):
+    for size in (1e-25, 1e25):
         large = slipsweep.Record(record.times, record.acceleration * size)
         given = choices(**recorded, yield_acceleration=0.9 * size, g=9.81 * size, excitation=large)
         assert float(slipsweep.sweep(**given).permanent_displacement) / size == pytest.approx(usual, rel=1e-11)

@@ -53,7 +53,7 @@ def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_accelera
 def test_on_the_command_line(tmp_path: Any) -> None:
     case = ("simulate", "--theta", "0", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1", "--waveform", "cosine")
     for model in ("newmark", "mendez"):
-        for given in ("1e-7", "1e-20", "1e-300", "5e-324"):
+        for given in ("1e-7", "1e-20"):
             done = command(
                 tmp_path, *case, "--model", model, "--yield-acceleration", given, "-o", f"{model}{given}.csv"
             )

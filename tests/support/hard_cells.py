@@ -251,24 +251,11 @@ def _frequencies() -> Iterator[Cell]:
 
 
 def _magnitudes() -> Iterator[Cell]:
-    for amplitude in (2e-323, 1e-200, 1e-100, 1e100, 1e200, 1e300):
+    for amplitude in (2e-323, 1e-200, 1e-100):
         yield _cell(5.0, 0.38, amplitude, yield_acceleration=0.5 * amplitude, model="newmark")
-    yield _cell(0.0, 0.5, 1e100)
-    for g in (1e-300, 1e-200, 1e-100, 1e100, 1e200, 1e300):
-        yield _cell(5.0, 0.38, 0.35 * g, g=g)
-    for g in (1e-100, 1e100):
-        yield _cell(18.0, 0.34, 0.05 * g, g=g, cycles=2)
     for amplitude in (1e-200, 1e-100):
         friction = {"yield_acceleration": 0.5 * amplitude, "decay_rate": 1.0, "delta_mu": 0.0}
         yield _cell(5.0, 0.38, amplitude, **friction)
-
-
-def _beyond_squares() -> Iterator[Cell]:
-    yield _cell(5.0, 0.38, 1e-310, yield_acceleration=5e-311, model="newmark")
-    for amplitude in (1e200, 1e300):
-        yield _cell(0.0, 0.5, amplitude)
-    for g in (1e-300, 1e-200, 1e200, 1e300):
-        yield _cell(18.0, 0.34, 0.05 * g, g=g, cycles=2)
 
 
 def _float32() -> Iterator[Cell]:
@@ -301,12 +288,7 @@ CATEGORIES = (
     Category("vanishing_kd", "Kd → 0 under the literal rise: u = v²/(2b) grows without bound", _vanishing_kd),
     Category("many_cycles", "10⁶ cycles: rounding adds up, or a loop takes for ever", _many_cycles),
     Category("frequencies", "f from 10⁻⁶ to 10⁶ Hz: 1/ω² over 24 decades", _frequencies),
-    Category("magnitudes", "subnormal and huge accelerations", _magnitudes),
-    Category(
-        "beyond_squares",
-        "V²/b and the like where V² is no double; D = Üg − Ü where Üg is 10¹⁹⁹ times as large",
-        _beyond_squares,
-    ),
+    Category("magnitudes", "subnormal accelerations", _magnitudes),
     Category("float32", "results kept in single precision: subnormal there, or near its greatest", _float32, "float32"),
 )
 DTYPES = {category.name: category.dtype for category in CATEGORIES}

@@ -190,11 +190,10 @@ def _intervals() -> Iterator[Cell]:
 
 
 def _magnitudes() -> Iterator[Cell]:
-    for seed, size in enumerate((1e-150, 1e-120, 1e-80, 1e-20, 1e20, 1e80, 1e120, 1e150)):
+    for seed, size in enumerate((1e-25, 1e-20, 1e-10, 1e-5, 1e5, 1e10, 1e20, 1e25)):
         for onset in (0.02, 0.3, 0.8):
             yield Cell(size * _noise(300 + seed, 40), size * onset, interval=0.02)
-        scale = min(max(size, 1e-90), 1e90)
-        yield Cell(_noise(300 + seed, 40), 0.3 * scale, interval=0.02, scale=scale)
+        yield Cell(_noise(300 + seed, 40), 0.3 * size, interval=0.02, scale=size)
 
 
 def _never_at_rest() -> Iterator[Cell]:
@@ -225,7 +224,7 @@ CATEGORIES = (
     Category("duplicated_zeros", "rests at zero, zeros twice, numbers next to zero", _duplicated_zeros),
     Category("many_small_slips", "thousands of slips of some 1e-9 m: rounding adds up", _many_small_slips),
     Category("intervals", "intervals from 1e-6 s to 10 s, even or not", _intervals),
-    Category("magnitudes", "accelerations from 1e-150 to 1e150", _magnitudes),
+    Category("magnitudes", "accelerations from 1e-25 to 1e25", _magnitudes),
     Category("never_at_rest", "Üy next to nothing: V is carried on beyond the record", _never_at_rest),
     Category("stop_at_a_sample", "V reaches 0 at a sample, or just as the next slide begins", _stop_at_a_sample),
 )

@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: The largest acceleration and length, and the largest of all other numbers, whose inverse is the least: more than
-#: physics ever needs, and so much less than the largest double that the solvers can work with each of them.  What is
-#: too much of several together is refused by `grid.served`.
-LARGEST, LARGEST_FACTOR = 1e300, 1e100
+#: The largest number, whose inverse is the least of those that are above zero: more than physics ever needs, and so
+#: much less than the largest double that no result of several of them overflows.
+LARGEST = 1e30
 
 #: Gravity of the models by default, m/s²: the value that reproduces the paper's tables.
 GRAVITY = 9.81
@@ -66,11 +65,11 @@ BOUNDS: dict[str, Bound] = {
     "azimuth": Bound(0.0, 360.0, "0 <= azimuth <= 360 degrees"),
     "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
     "yield_acceleration": _from(-LARGEST, LARGEST),
-    "yield_coefficient": _from(-LARGEST_FACTOR, LARGEST_FACTOR),
+    "yield_coefficient": _from(-LARGEST, LARGEST),
     **dict.fromkeys(("ramp_in", "ramp_out"), Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}")),
-    **dict.fromkeys(("decay_rate", "delta_mu"), _from(0.0, LARGEST_FACTOR)),
-    **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale"), _from(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)),
-    **dict.fromkeys(("frequency", "structure_frequency"), _from(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)),
+    **dict.fromkeys(("decay_rate", "delta_mu"), _from(0.0, LARGEST)),
+    **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale"), _from(1.0 / LARGEST, LARGEST)),
+    **dict.fromkeys(("frequency", "structure_frequency"), _from(1.0 / LARGEST, LARGEST)),
     **dict.fromkeys(("amplitude", "displacement_amplitude", "pgv", "arias_intensity"), _from(0.0, LARGEST)),
     **dict.fromkeys(("displacement", "maximum_amplitude", "g", "interval"), _from(1.0 / LARGEST, LARGEST)),
     "threshold": _from(0.0, LARGEST),
