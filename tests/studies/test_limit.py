@@ -300,7 +300,7 @@ def test_command_names_what_is_wrong(tmp_path: Path) -> None:
         (("-d", "5kg"), '--displacement = "5kg"'),
         (("-d", "0"), "displacement = 0: must be a finite number > 0"),
         (("-d", "5cm", "--maximum-amplitude", "2m"), '--maximum-amplitude = "2m"'),
-        (("-d", "5cm", "-o", "small.csv"), "small.csv: the name must end in one of .nc, .zarr, .png, .svg, .pdf"),
+        (("-d", "5cm", "-o", "small.csv"), "small.csv: the name must end in one of .png, .svg, .pdf, .nc, .zarr"),
         (("-d", "5cm", "-o", "no/folder/l.nc"), "no/folder"),
     ):
         done = command(tmp_path, "limit", "small.toml", *arguments)

@@ -391,7 +391,11 @@ def test_a_result_is_repeated_from_itself(folder: Path) -> None:
         ("seed = 7", "sed = 7", 'uncertainty.sed: unknown key; did you mean "seed"?'),
         ("samples = 256", "samples = 100", "uncertainty.samples = 100: must be a power of 2"),
         ("s = 0.15", "q = 0.15", "uncertainty.yield_acceleration.q: unknown key; known here: distribution, kind"),
-        ("[axes.theta]", "[axes.mu_s]", "uncertainty.mu_s: is drawn, but mu_s is given as well"),
+        (
+            "[axes.theta]\nvalues = [0, 5]",
+            "[axes.mu_s]\nvalues = [0.3, 0.4]",
+            "uncertainty.mu_s: is drawn, but mu_s is given as well",
+        ),
         (
             "[excitation]",
             '[output]\nvariables = ["validity"]\n[excitation]',

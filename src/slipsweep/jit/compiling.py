@@ -1,6 +1,6 @@
 """Kernels: the functions that Python calls, compiled once and kept on disk for the processes that come after.
 
-* Of several processes that start at once the first compiles, under a lock; the others wait and load what it has kept.
+* Of several processes that start at once the first compiles, under a lock; the others load what it has kept.
 * What is kept lies in a folder whose name is a digest of all sources that kernels are made of: a changed equation is
   never served from an old one.
 * Machine code is loaded from a folder of this user only, in which nobody else may write.  Where there is none, kernels
@@ -59,25 +59,23 @@ class Kernel:
         return self._compiled(*args)
 
     def _call_first(self, args: tuple[Any, ...]) -> Any:
-        folder = cache_folder()
-        with warnings.catch_warnings(), contextlib.ExitStack() as stack:
+        with warnings.catch_warnings():
             # numba's advice is for us, not for those who run a sweep
             warnings.simplefilter("ignore", numba.NumbaWarning)
-            if folder is not None:
+            if (folder := cache_folder()) is not None:
                 # no lock to be had, as on some network folders, or a full disk: each process compiles for itself
-                with contextlib.suppress(OSError, NotImplementedError):
-                    stack.enter_context(filelock.FileLock(folder / "compiling.lock", timeout=_PATIENCE))
-                    compiled = _jitted(self._function, folder)
-                    if not any(folder.glob(f"**/*.{self._function.__name__}-*.nbi")):
-                        stack.enter_context(_noted(self._function.__name__))
-                    result = compiled(*args)
-                    self._compiled = compiled
-                    return result
-            stack.enter_context(_noted(self._function.__name__))
-            compiled = _jitted(self._function, None)
+                lock = filelock.FileLock(folder / "compiling.lock", timeout=_PATIENCE)
+                with contextlib.suppress(OSError, NotImplementedError), lock:
+                    return self._compile(args, folder)
+            return self._compile(args, None)
+
+    def _compile(self, args: tuple[Any, ...], folder: Path | None) -> Any:
+        compiled, name = _jitted(self._function, folder), self._function.__name__
+        kept = folder is not None and any(folder.glob(f"**/*.{name}-*.nbi"))
+        with contextlib.nullcontext() if kept else _noted(name):
             result = compiled(*args)
-            self._compiled = compiled
-            return result
+        self._compiled = compiled
+        return result
 
 
 #: Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.

@@ -26,8 +26,7 @@ summed = _part(fastmath={"contract", "arcp", "reassoc", "nsz"})
 #: in it is inlined, which it does not do by itself with functions as long as these.
 inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
 
-#: The same for a function with one caller, whose body becomes a part of that: numba would compile it, with all that it
-#: calls, once more.
+#: The same for a function with one caller and many callees, which numba would otherwise optimise once more.
 single = _part(fastmath={"contract", "arcp"}, inline="always")
 
 #: The same for elementary functions, which have no division to share.
