@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, example, explore, export, hazard, info, limit, report, run, simulate
+from slipsweep.cli import calibrate, chart, example, explore, export, hazard, info, limit, run, simulate
 from slipsweep.cli.common import printable
 from slipsweep.errors import InputError, RunError
 
@@ -71,7 +71,7 @@ _COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
         (limit.limit, limit.EXAMPLE),
         (hazard.hazard, hazard.EXAMPLE),
     ],
-    "Draw": [(chart.chart, chart.EXAMPLE), (report.report, report.EXAMPLE), (explore.explore, explore.EXAMPLE)],
+    "Draw": [(chart.chart, chart.EXAMPLE), (chart.report, chart.REPORT_EXAMPLE), (explore.explore, explore.EXAMPLE)],
     "Read results": [
         (info.info, info.EXAMPLE),
         (export.export, export.EXAMPLE),

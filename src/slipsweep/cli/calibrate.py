@@ -172,9 +172,11 @@ def calibrate(
 
         return calibration_figures.calibration(table)
 
-    as_netcdf = netcdf_writer(table, table.attrs["title"])
-    as_toml = lambda path: path.write_text(text, encoding="utf-8")  # noqa: E731
-    write_outputs(paths, overwrite, figure, {".nc": as_netcdf, ".toml": as_toml})
+    writers = {
+        ".nc": netcdf_writer(table, table.attrs["title"]),
+        ".toml": lambda path: path.write_text(text, encoding="utf-8"),
+    }
+    write_outputs(paths, overwrite, figure, writers)
     if quiet:
         return
     _summarize(table)

@@ -1,5 +1,6 @@
-"""`slipsweep chart`: design charts of a result."""
+"""`slipsweep chart` and `slipsweep report`: design charts of a result."""
 
+import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,6 +14,10 @@ from slipsweep.errors import InputError
 CHART, AXES, LOOK = Panel("Chart"), Panel("Axes"), Panel("Look")
 
 EXAMPLE = examples("slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf")
+
+REPORT_EXAMPLE = examples(
+    "slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite"
+)
 
 
 def chart(
@@ -92,9 +97,22 @@ def chart(
                 with outputs.complete_or_absent(path, overwrite) as temporary:
                     book.write(temporary, result, figures.values())
                 typer.echo(path)
-    for name, figure in {} if together else figures.items():
-        write_outputs(wanted[name], overwrite, lambda: figure)  # noqa: B023
+    for name in () if together else figures:
+        write_outputs(wanted[name], overwrite, functools.partial(figures.__getitem__, name))
         for path in wanted[name]:
             typer.echo(path)
     for name, reason in left_out.items():
         typer.echo(f"no {name}: {reason}")
+
+
+def report(
+    file: Annotated[Path, typer.Argument(metavar="OUT.nc", help='A result of "slipsweep run".')],
+    output: Annotated[
+        Path | None, OUTPUT("PDF to write (default: OUT.pdf).", "--output", "-o", metavar="OUT.pdf")
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write all charts that fit a result to one PDF, with a title page."""
+    path = output or Path(f"{file.stem}.pdf")
+    check_ending(path, (".pdf",))
+    chart(file, output=[path], overwrite=overwrite)

@@ -20,7 +20,7 @@ from slipsweep.cli.common import (
     taken_as,
     write_outputs,
 )
-from slipsweep.cli.options import chooses, option_name, reads_record
+from slipsweep.cli.options import chooses, option_name
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
@@ -34,6 +34,7 @@ from slipsweep.model.variables import (
     Validity,
     flags_of,
 )
+from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
@@ -48,8 +49,7 @@ EXAMPLE = examples(
 )
 
 
-@reads_record
-@chooses(excitation=WAVEFORMS, model=MODELS)
+@chooses(excitation=WAVEFORMS, model=MODELS, reading=Reading)
 def simulate(
     *,
     theta: Annotated[str | None, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")] = None,

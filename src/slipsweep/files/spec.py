@@ -7,7 +7,7 @@ values may be is known to those that take them: options (`slipsweep.model.choice
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -145,14 +145,9 @@ class SweepSpec:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
-    @contextmanager
-    def named(self) -> Iterator[None]:
+    def named(self) -> AbstractContextManager[None]:
         """Name the file in front of what is not allowed."""
-        try:
-            yield
-        except InputError as error:
-            error.args = (f"{self.source}: {error}",)
-            raise
+        return _named(self.source)
 
     def plan(self) -> "AnyPlan":
         """Return what the sweep file describes: a sweep, or the statistics of samples.
@@ -236,7 +231,7 @@ def load(path: str | Path) -> SweepSpec:
 
 def is_stream(path: Path) -> bool:
     """Whether a sweep is read from a pipe or a shell's redirection: it has no folder and no name then."""
-    return path == Path("-") or not path.is_file()
+    return path == Path("-") or (path.exists() and not path.is_file() and not path.is_dir())
 
 
 def _load_result(path: Path) -> SweepSpec:
@@ -268,64 +263,45 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Record |
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also of integers too long to convert, and of deep nesting
         raise InputError(f"{source}: not valid TOML: {error}") from None
+    with _named(source):
+        tables = {
+            name: dict(_known(name, content.get(name, {}))) for name in KEYS if name not in ("axes.NAME", "cases")
+        }
+        _refuse_unknown("", content, (*tables, "cases"))
+        numbers = {name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]}
+        model = _chosen(MODELS, tables["model"])
+        rows = _cases(content["cases"]) if "cases" in content else []
+        given = _inputs(tables["axes"], rows, numbers, model.g)
+        if key := next((one for one in ("record", "records") if one in tables["excitation"]), None):
+            given["polarity"] = tables["excitation"].pop("polarity", 1)
+            motion: Any = _recorded_motion(key, tables, folder or Path(), recorded)
+        else:
+            for other in (one for one in tables["excitation"] if one in _RECORD_KEYS):
+                raise InputError(f"excitation.{other}: only beside excitation.record, the file of a recorded motion")
+            motion = _chosen(WAVEFORMS, tables["excitation"])
+        sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
+        components = motion.components if isinstance(motion, Suite) else (motion,) if isinstance(motion, Record) else ()
+        return SweepSpec(
+            source,
+            text,
+            Inputs(**given),
+            tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1)),
+            model,
+            motion,
+            _chosen(SOLVERS, tables["solver"]),
+            _output(tables["output"], sampling is not None),
+            sampling,
+            () if recorded else tuple(Path(one.name) for one in components),
+        )
+
+
+@contextmanager
+def _named(source: str) -> Iterator[None]:
     try:
-        return _checked(content, text, source, folder or Path(), recorded)
+        yield
     except InputError as error:
         error.args = (f"{source}: {error}",)
         raise
-
-
-def _checked(
-    content: dict[str, Any], text: str, source: str, folder: Path, recorded: Record | Suite | None
-) -> SweepSpec:
-    tables = {name: dict(_known(name, content.get(name, {}))) for name in KEYS if name not in ("axes.NAME", "cases")}
-    _refuse_unknown("", content, (*tables, "cases"))
-    numbers = {name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]}
-    if numbers.get("yield_acceleration") == "coulomb":
-        numbers.pop("yield_acceleration")
-    model = _chosen(MODELS, tables["model"])
-    sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
-    rows = _cases(content["cases"]) if "cases" in content else []
-    columns = [name for name in rows[0] if name != "label"] if rows else []
-    given: dict[str, Any] = {}
-    for table, values in (
-        ("axes", {name: _axis(name, axis, model.g) for name, axis in tables["axes"].items()}),
-        ("cases", {name: xr.DataArray([row[name] for row in rows], dims="case") for name in columns}),
-        ("model", {name: check_single(name, value, f"model.{name}") for name, value in numbers.items()}),
-    ):
-        for name in values:
-            if name in given:
-                raise InputError(f"{table}.{name}: given twice: give it in one table")
-        given |= values
-    excitation, solver = tables["excitation"], tables["solver"]
-    key = next((one for one in ("record", "records") if one in excitation), None)
-    if key is None:
-        for other in excitation:
-            if other in _RECORD_KEYS:
-                raise InputError(f"excitation.{other}: only beside excitation.record, the file of a recorded motion")
-        motion: Any = _chosen(WAVEFORMS, excitation)
-    else:
-        for table, others in (
-            ("excitation", [one for one in excitation if one not in _RECORD_KEYS]),
-            ("solver", solver),
-        ):
-            for other in others:
-                raise InputError(f"{table}.{other}: not allowed with excitation.{key}, to which the response is exact")
-        given["polarity"] = excitation.pop("polarity", 1)
-        motion = recorded or _recorded_motion(excitation, folder)
-    components = motion.components if isinstance(motion, Suite) else (motion,) if isinstance(motion, Record) else ()
-    return SweepSpec(
-        source,
-        text,
-        Inputs(**given),
-        tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1)),
-        model,
-        motion,
-        _chosen(SOLVERS, solver),
-        _output(tables["output"], sampling is not None),
-        sampling,
-        () if recorded else tuple(Path(one.name) for one in components),
-    )
 
 
 def _known(key: str, table: Any, keys: str | None = None) -> _Table:
@@ -356,19 +332,48 @@ def _sampling(table: _Table, g: float) -> "Sampling":
     return check_sampling(drawn, **options, g=g, keys="uncertainty.")
 
 
-def _recorded_motion(table: _Table, folder: Path) -> Record | Suite:
-    """The records in files that [excitation] names."""
-    key = "record" if "record" in table else "records"
+def _inputs(axes: _Table, rows: list[dict[str, Any]], numbers: _Table, g: float) -> dict[str, Any]:
+    """The parameters, each from one table: [axes], [[cases]] or [model]."""
+    columns = [name for name in rows[0] if name != "label"] if rows else []
+    given: dict[str, Any] = {}
+    for table, values in (
+        ("axes", {name: _axis(name, axis, g) for name, axis in axes.items()}),
+        ("cases", {name: xr.DataArray([row[name] for row in rows], dims="case") for name in columns}),
+        (
+            "model",
+            {
+                name: check_single(name, value, f"model.{name}")
+                for name, value in numbers.items()
+                if (name, value) != ("yield_acceleration", "coulomb")
+            },
+        ),
+    ):
+        for name in values:
+            if name in given:
+                raise InputError(f"{table}.{name}: given twice: give it in one table")
+        given |= values
+    return given
+
+
+def _recorded_motion(
+    key: str, tables: Mapping[str, _Table], folder: Path, recorded: Record | Suite | None
+) -> Record | Suite:
+    """The records in files that [excitation] names, or those that a result has kept."""
+    table = tables["excitation"]
+    others = [f"excitation.{one}" for one in table if one not in _RECORD_KEYS]
+    for other in (*others, *(f"solver.{one}" for one in tables["solver"])):
+        raise InputError(f"{other}: not allowed with excitation.{key}, to which the response is exact")
     if {"record", "records"} <= {*table}:
         raise InputError("excitation.records: not allowed beside record: give one of them")
     if key == "record" and "pairs" in table:
         raise InputError("excitation.pairs: only beside excitation.records, the files of a suite")
     if key == "record" and not isinstance(table["record"], str):
         raise InputError(f"excitation.record = {show(table['record'])}: must be the name of a file")
+    if recorded is not None:
+        return recorded
+    options = {name: value for name, value in table.items() if name not in ("record", "records", "pairs")}
     try:
-        reading = Reading(
-            **{name: value for name, value in table.items() if name not in ("record", "records", "pairs")}
-        )
+        reading = Reading(**options)
         if key == "record":
             return read_record(folder / table["record"], **reading.options)
         return suite_in(folder, table["records"], table.get("pairs"), reading)
