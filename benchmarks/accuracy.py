@@ -1,7 +1,7 @@
 """The page docs/accuracy.md, from what has been measured: ``python -m benchmarks.accuracy``.
 
-Takes speed_vs_error.csv as it lies in benchmarks/results, and measures where double precision ends (a few 30-digit
-solutions, seconds).
+Takes speed_vs_error.csv as it lies in benchmarks/results, and measures errors against closed forms and where double
+precision ends (a few 30-digit solutions, seconds).
 """
 
 import csv
@@ -12,6 +12,7 @@ import numpy as np
 import slipsweep
 from benchmarks.grids import RULES, G
 from benchmarks.machine import DOCS, RESULTS, measured_on, number, table
+from tests.support import closed_forms
 from tests.support.reference import solve
 
 WANTED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
@@ -60,6 +61,25 @@ def cycle_errors(found: list[dict[str, Any]]) -> str:
     return table(["regime", "median", "95 %", "worst", "ns a cell and core"], rows)
 
 
+def newmark() -> str:
+    """Newmark's block in closed form, and the error of the cycle solver under each wave and a rectangular pulse."""
+    waves = {"square": slipsweep.Square(1), "sine": slipsweep.Sine(1), "triangle": slipsweep.Triangle(1)}
+    pulse = slipsweep.Record(np.array([0.0, 1.0]), np.array([G, G]))
+    rows = []
+    for r in (0.02, 0.1, 0.2, 0.5, 0.8, 0.95):
+        block: dict[str, Any] = {"yield_coefficient": r, "model": slipsweep.Newmark(g=G)}
+        found = {name: slipsweep.sweep(**block, amplitude=G, frequency=1.0, excitation=w) for name, w in waves.items()}
+        found["rectangle"] = slipsweep.sweep(**block, excitation=pulse)
+        row = [f"{r:g}"]
+        for name in ("rectangle", *waves):
+            exact = float(getattr(closed_forms, name)(closed_forms.mpf(r)))
+            error = abs(float(found[name].permanent_displacement) / G - exact) / exact
+            row += [f"{exact:.6g}", number(error, 1)]
+        rows.append(row)
+    names = ("pulse", "square", "sine", "triangle")
+    return table(["Üy/A", *(f"{name}{what}" for name in names for what in (": u/(A T²)", ", error"))], rows)
+
+
 def near_yield() -> str:
     """Error of the cycle solver at A = Üy (1 + 10⁻ᵏ), beside what one ulp of each input does to the answer."""
 
@@ -102,6 +122,16 @@ plane.
 It takes no steps, so that there is no number of steps to choose. The largest errors are in cells nearest to
 yield. There the rounding of the inputs alone has the same effect (below).
 
+## Newmark's block in closed form
+
+With r = Üy/A, a rectangular pulse of duration T gives (V²/2Üy)(1 − r) with V = A T (Newmark 1965). One cycle of a
+square wave gives u/(A T²) = (1 − r)/(4 (1 + r)), and one of a triangle wave (3 + 2√2)/48 · (1 − r)³ where r ≥ 3 − 2√2.
+Under a sine the block stops at the root φ₂ of cos φ₁ − cos φ = r (φ − φ₁) behind φ₁ = asin r, and
+4π² u/(A T²) = (cos φ₁ + r φ₁)(φ₂ − φ₁) − sin φ₂ + sin φ₁ − r (φ₂² − φ₁²)/2. It always stops within the cycle, so that n
+cycles give n times as much. tests/kernels/test_closed_forms.py compares these forms with an integration by SciPy, and
+both solvers with these forms. Errors here are those of the cycle solver.
+
+{newmark()}
 ## The step solver
 
 Steps a cycle, and time a cell on one core, for 95 of 100 cells to be within an error ("–": not within
