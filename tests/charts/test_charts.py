@@ -11,12 +11,12 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
 
 import slipsweep
 from slipsweep.charts import kinds, maps, style
-from slipsweep.charts.answers import newmark
 from slipsweep.charts.slices import Result
+from slipsweep.charts.solved import newmark
+from slipsweep.charts.style import Options
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.files.selection import find, places_at
@@ -25,6 +25,8 @@ from slipsweep.model.variables import NOTES
 SINE = slipsweep.Sine(cycles=5)
 AMPLITUDES = np.linspace(0.5, 13.5, 53)
 FREQUENCIES = np.geomspace(0.2, 20, 25)
+
+SWEEP_KINDS = list(kinds.SORTS["sweep"][1])
 
 #: A lined slope: the interface is weak, the block does not come to rest, and ends upslope.
 LINED_SINE = slipsweep.Sine(cycles=15)
@@ -78,13 +80,10 @@ def caption(figure: Figure) -> str:
     return " ".join(figure.get_supxlabel().split())
 
 
-def inside(patch: PathPatch, points: Any) -> Any:
-    """Which points a patch of rectangles covers."""
-    found = np.zeros(len(points), bool)
-    for vertices in patch.get_path().to_polygons():
-        polygon = np.asarray(vertices)
-        found |= ((points > polygon.min(axis=0) + 1e-9) & (points < polygon.max(axis=0) - 1e-9)).all(axis=1)
-    return found
+def inside(area: Any, points: Any) -> Any:
+    """Which points a filled area covers, those on its edge among them."""
+    (path,) = area.get_paths()
+    return path.contains_points(points, radius=1e-9) | path.contains_points(points, radius=-1e-9)
 
 
 # -------------------------------------------------------------------------- lines and contours
@@ -180,7 +179,7 @@ def test_hatching_is_where_validity_says_so(grid: xr.Dataset, x: str) -> None:
         covered = inside(patches[0], mesh).reshape(cells.shape) if patches else np.zeros(cells.shape, bool)
         assert not (covered & ~expected).any()
         assert covered.sum() + left == expected.sum()  # regions too small for a hatch are counted in the caption
-        assert all(patch.get_hatch() for patch in patches)
+        assert all(patch.hatches[0] for patch in patches)
         seen += covered.sum()
     assert seen > 0
 
@@ -409,7 +408,7 @@ def test_only_what_is_shown_is_read(path: Path, monkeypatch: pytest.MonkeyPatch)
         for kind, count in expected.items():
             read.clear()
             monkeypatch.setattr(xr.Dataset, "load", counted)
-            kinds.draw(kinds.drawable(data, "grid"), kind, kinds.Request())
+            kinds.draw(Result(data, "grid"), kind, Options())
             monkeypatch.undo()
             assert read == {"sliding_mode" if kind == "modes" else "permanent_displacement": count, "validity": count}
 
@@ -504,7 +503,7 @@ def test_ratios_have_one_order_of_lightness() -> None:
     assert colours(10)[0] < colours(10)[2]  # cold above
 
 
-@pytest.mark.parametrize("kind", kinds.SORTS["sweep"])
+@pytest.mark.parametrize("kind", SWEEP_KINDS)
 def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
     """Nothing is cut off, no legend lies on the data, no entry is without its mark, and nothing has a colour."""
     figure = lined.slipsweep.chart(kind, at={"mu_s": 0.25}, width="90mm", grey=True)
@@ -538,11 +537,11 @@ def test_curves_and_modes_differ_without_colour(lined: xr.Dataset) -> None:
     looks = [(str(line._dash_pattern), line.get_marker()) for line in labelled(figure, "μs")]
     assert len({dash for dash, _ in looks}) == len({marker for _, marker in looks}) == 3
     figure = lined.slipsweep.chart("modes")
-    hatches = [named(figure, text)[0].get_hatch() or "" for text in style.MODE_TEXT.values()]
+    hatches = [named(figure, text)[0].hatches[0] for text in style.MODE_TEXT.values()]
     assert len(set(hatches)) == 3
 
 
-@pytest.mark.parametrize("kind", [kind for kind in kinds.SORTS["sweep"] if kind != "curve"])
+@pytest.mark.parametrize("kind", [kind for kind in SWEEP_KINDS if kind != "curve"])
 def test_panels(lined: xr.Dataset, kind: str) -> None:
     x = {"x": "theta"} if kind in ("contours", "modes", "newmark") else {}
     figure = lined.slipsweep.chart(kind, panels=["mu_s"], at={"mu_s": "0.25,0.4"}, **x)
@@ -568,7 +567,7 @@ def test_cases_tell_curves_and_panels_apart() -> None:
     picked = result.slipsweep.chart("contours", at={"case": "steep"})
     assert picked.get_supxlabel().startswith("case steep: θ = 12°")
     for options, message in (
-        ({"x": "case"}, "case: the cases have no order"),
+        ({"x": "case"}, "--x case: no such axis; known here: amplitude, frequency"),
         ({"at": {"case": "stepe"}}, "must be a number or one of gentle, steep"),
         ({"at": {"case": 1.5}}, r"case = 1.5: must be a number or one of"),
     ):
@@ -581,9 +580,8 @@ def test_little_to_draw(grid: xr.Dataset) -> None:
     small = slipsweep.sweep([0.0, 5.0, 30.0], [0.3, 0.5], [1.0, 2.0, 4.0, 7.0], [1.0, 2.0, 4.0])
     for fill, undrawn in ((0.0, {"families", "dimensionless"}), (np.nan, {"families", "dimensionless"})):
         data = small.assign(permanent_displacement=small.permanent_displacement * 0 + fill)
-        result = kinds.drawable(data, "small")
-        request = kinds.Request()
-        figures, left_out = kinds.draw_all(result, kinds.fitting(result, request), request, strict=False)
+        result, options = Result(data, "small"), Options()
+        figures, left_out = kinds.draw_all(result, kinds.fitting(result, options), options, strict=False)
         assert set(left_out) == undrawn
         assert "No contours: no values" in caption(figures["contours"])
     single = small.permanent_displacement.where(small.amplitude == 7.0, 0.0)
@@ -598,7 +596,7 @@ def test_little_to_draw(grid: xr.Dataset) -> None:
 @pytest.mark.usefixtures("without_layout")
 def test_default_set_of_charts(path: Path, here: Path) -> None:
     assert main(["chart", str(path)]) == 0
-    drawn = [kind for kind in kinds.SORTS["sweep"] if kind != "curve"]
+    drawn = [kind for kind in SWEEP_KINDS if kind != "curve"]
     assert sorted(one.name for one in here.iterdir()) == sorted(f"grid-{kind}.png" for kind in drawn)
     for one in here.iterdir():
         image = matplotlib.image.imread(one)
@@ -631,18 +629,18 @@ def test_formats(path: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> 
         (("--kind", "contour"), 'did you mean "contours"?'),
         (("--kind", "contours", "--variable", "displacement"), 'did you mean "permanent_displacement"?'),
         (("--kind", "contours", "--variable", "validity"), "is a code"),
-        (("--kind", "contours", "--x", "theta", "--y", "theta"), "two different axes"),
+        (("--kind", "contours", "--x", "theta", "--y", "theta"), "--y theta: no such axis"),
         (("--kind", "contours", "--x", "theta", "--at", "theta=3"), "is an axis of this chart"),
         (
             ("-k", "modes", "--at", "theta=6", "--at", "mu_s=0.3", "--at", "frequency=1"),
-            "needs two axes with two values",
+            "needs another axis with two values or more",
         ),
         (("-o", "a.png"), "give one --kind"),
         (("--kind", "modes", "--levels", "1cm,2cm"), "--levels 1cm,2cm: only with --kind contours"),
         (("--levels", "1cm,2kg"), 'levels = "2kg": must be a number, with a unit that converts to m'),
-        (("--levels", "1cm"), "levels: 1cm: must be two different values or more"),
+        (("-k", "contours", "--levels", "1cm"), "levels: 0.01: must be two different values or more"),
         (("--kind", "contours", "--panels", "theta,mu_s,frequency"), "must be one axis or two"),
-        (("--kind", "spread", "--y", "theta"), "--y theta: not with spread"),
+        (("--kind", "spread", "--y", "theta"), "--y theta: not with a chart over one axis"),
         (("--kind", "modes", "-o", "a.gif"), "must end in one of .png, .svg, .pdf"),
         (("--kind", "modes", "--width", "9mm"), "width = 9mm: must be 50 to 1000 mm"),
     ],
@@ -662,7 +660,7 @@ def test_results_without_an_axis_or_an_attribute(here: Path, capsys: pytest.Capt
     rows = slipsweep.sweep(xr.DataArray([2.0, 12.0], dims="case"), 0.5, 4.0, 1.0)
     rows.to_netcdf("rows.nc")
     assert main(["chart", "rows.nc", "-o", "a.png"]) == 2
-    assert "no axis of two values or more (its dimensions: case, 2)" in capsys.readouterr().err
+    assert "this chart needs another axis with two values or more" in capsys.readouterr().err
     kept = {name: value for name, value in rows.attrs.items() if name != "recoupling"}
     for changed, message in (
         (rows.drop_attrs(deep=False).assign_attrs(kept), "attribute 'recoupling': missing; it says what was solved"),
@@ -680,7 +678,7 @@ def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path
 
     assert main(["report", str(path)]) == 0
     pages = Path("grid.pdf").read_bytes().count(b"/Type /Page ")
-    assert pages == len(kinds.SORTS["sweep"])  # without the curve, with the title
+    assert pages == len(SWEEP_KINDS)  # without the curve, with the title
     with slipsweep.open_result(path) as data:
         title = book.title_page(Result(data, "grid.nc"))
     text = "\n".join(one.get_text() for one in title.texts)

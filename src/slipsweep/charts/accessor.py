@@ -1,7 +1,7 @@
 """`Dataset.slipsweep`: what the command line draws, from a dataset; importing this module registers it with xarray."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Literal
 
 import xarray as xr
 
@@ -12,18 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from slipsweep.files.selection import At
-
-    class _Options(TypedDict, total=False):
-        at: Mapping[str, At] | None
-        x: str | None
-        y: str | None
-        panels: Sequence[str]
-        variable: str
-        levels: Sequence[float | str]
-        units: Literal["m/s2", "g"]
-        show_cautions: bool
-        width: float | str | None
-        grey: bool
 
 
 @xr.register_dataset_accessor("slipsweep")
@@ -48,11 +36,6 @@ class SlipsweepAccessor:
     def flags(self) -> xr.Dataset:
         """`slipsweep.flags` of the dataset."""
         return flags(self._dataset)
-
-    @overload
-    def chart(self, kind: str | None = None, *, ax: "Axes", **options: Unpack["_Options"]) -> "Axes": ...
-    @overload
-    def chart(self, kind: str | None = None, *, ax: None = None, **options: Unpack["_Options"]) -> "Figure": ...
 
     def chart(
         self,
@@ -122,9 +105,10 @@ class SlipsweepAccessor:
         >>> figure.axes[0].get_ylabel()
         'permanent displacement, downslope (mm)'
         """
-        from slipsweep.charts import kinds
+        from slipsweep.charts.kinds import figure_of
 
-        result = kinds.drawable(self._dataset, "dataset")
-        look = kinds.look_of(result, variable, levels, units, show_cautions, width, grey)
-        figure = kinds.draw(result, kind, kinds.Request(x, y, at or {}, variable, panels, axes=ax, look=look))
+        figure = figure_of(
+            self._dataset, kind=kind, at=at or {}, x=x, y=y, panels=panels, variable=variable, levels=levels,
+            units=units, show_cautions=show_cautions, width=width, grey=grey, ax=ax,
+        )  # fmt: skip
         return figure if ax is None else ax

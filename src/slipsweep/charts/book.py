@@ -1,7 +1,7 @@
 """All charts of a result as one PDF: a title page that says what they show, then a chart a page."""
 
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 import matplotlib as mpl
@@ -10,22 +10,15 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
+from slipsweep.charts import style
 from slipsweep.charts.maps import HATCHES
 from slipsweep.charts.slices import NAMED, Result
-from slipsweep.charts.style import LEFT_OUT, SYMBOLS, drawn_text, flag_name, model_text, plain, unit
+from slipsweep.charts.solved import is_recorded
 from slipsweep.files.selection import axis_labels
-from slipsweep.model.variables import (
-    PARAMETERS,
-    RECORD_RESULTS,
-    REFERENCE,
-    RESULTS,
-    STATISTICS,
-)
+from slipsweep.model.variables import PARAMETERS, REFERENCE
 
-_LONG_NAMES = RECORD_RESULTS | RESULTS | STATISTICS
-
-#: Characters in a line, after a heading.
-_WIDTH, _INDENT = 96, 2
+#: Characters in a line.
+_WIDTH = 96
 
 
 def write(path: Path, result: Result, figures: Iterable[Figure]) -> None:
@@ -38,36 +31,42 @@ def write(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
     attributes = result.attrs
-    recorded = result.sort in ("record", "suite")
+    recorded = is_recorded(result.data)
     hatched = [
-        f"{flag_name(flag)} ({flag.kind}): {flag.text}"
-        + ("; left out of contours and curves unless their caption says that it is drawn" if flag in LEFT_OUT else "")
+        f"{style.flag_name(flag)} ({flag.kind}): {flag.text}"
+        + (
+            "; left out of contours and curves unless their caption says that it is drawn"
+            if flag in style.LEFT_OUT
+            else ""
+        )
         for flag in HATCHES
     ]
-    sections: Mapping[str, list[str]] = {
-        "Results": [f"{name}: {_LONG_NAMES[name]['long_name']}" for name in result.variables],
-        "Inputs": [*_inputs(result), *filter(None, [drawn_text(attributes)])],
-        "Model and estimates": model_text(attributes).splitlines(),
+    sections: dict[str, list[str]] = {
+        "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
+        "Inputs": [*_inputs(result), *filter(None, [style.drawn_text(attributes)])],
+        "Model and estimates": style.model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": [
             "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz",
             *(["none under recorded motions: the rules for them extend the paper"] if recorded else []),
         ],
         **({} if recorded else {"Flags that the charts hatch": hatched}),
         "Origin": [
-            plain(result.name),
+            style.plain(result.name),
             f"solved by {attributes.get('source', 'slipsweep')}",
             f"drawn by slipsweep {__version__}, matplotlib {mpl.__version__}",
-            *plain(str(attributes.get("history", ""))).splitlines(),
+            *style.plain(str(attributes.get("history", ""))).splitlines(),
             REFERENCE,
         ],
     }
     figure = Figure(figsize=(8.27, 11.69))
-    figure.text(0.08, 0.94, plain(textwrap.fill(str(attributes.get("title", "")), 54)), fontsize="xx-large", va="top")
+    figure.text(
+        0.08, 0.94, style.plain(textwrap.fill(str(attributes.get("title", "")), 54)), fontsize="xx-large", va="top"
+    )
     lines = []
     for heading, texts in sections.items():
         lines += ["", heading.upper()]
         for text in texts:
-            lines += textwrap.wrap(text, _WIDTH, initial_indent=" " * _INDENT, subsequent_indent=" " * 2 * _INDENT)
+            lines += textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="    ")
     figure.text(0.08, 0.86, "\n".join(lines), fontsize="small", va="top", linespacing=1.4)
     return figure
 
@@ -79,11 +78,10 @@ def _inputs(result: Result) -> list[str]:
         if name not in result.data.coords:
             continue
         values = np.unique(result.data[name].values)
-        units = unit(name)
-        space = "" if units in ("", "°") else " "
-        ends = f"{values[0]:.4g}{space}{units}"
-        if len(values) > 1:
-            ends = f"{values[0]:.4g} to {values[-1]:.4g}{space}{units}, {len(values)} values"
-        texts.append(f"{PARAMETERS[name]['long_name']} {SYMBOLS[name]}: {ends}")
+        ends = f"{values[0]:.4g} to {values[-1]:.4g}" if len(values) > 1 else f"{values[0]:.4g}"
+        number = f", {len(values)} values" if len(values) > 1 else ""
+        texts.append(
+            f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}: {style.with_unit(ends, style.unit(name))}{number}"
+        )
     labels = {dim: axis_labels(result.data, dim) for dim in NAMED if dim in result.dims}
-    return texts + [f"{dim}s: {plain(', '.join(names))}" for dim, names in labels.items() if names]
+    return texts + [f"{dim}s: {style.plain(', '.join(names))}" for dim, names in labels.items() if names]

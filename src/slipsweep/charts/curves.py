@@ -1,6 +1,7 @@
 """Curves: a result over one axis of a slice, a curve for each value of another, or for each option of the model."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,47 +11,20 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from slipsweep.charts.answers import (
-    DISPLACEMENT,
-    DRIVES,
-    SIDE,
-    alternatives,
-    newmark,
-    sides_of,
-    solve,
-    thresholds,
-)
-from slipsweep.charts.sheet import (
-    Panel,
-    Sheet,
-    check_positive,
-    curve_looks,
-    has_flags,
-    log_axis,
-    log_ticks,
-    over,
-    plot_curve,
-    reliable,
-)
-from slipsweep.charts.style import (
-    BLUE,
-    LINES,
-    NEWMARK,
-    NO_SLIDING,
-    UNSOUND,
-    VERMILION,
-    flag_name,
-    ratio_text,
-    value_text,
-)
+from slipsweep.charts import solved, style
+from slipsweep.charts.sheet import Panel, Sheet, curve_looks, has_flags, log_axis, log_ticks, over, plot_curve, reliable
+from slipsweep.charts.slices import Result
+from slipsweep.charts.solved import DISPLACEMENT, DRIVES, SIDE
+from slipsweep.charts.style import Options
+from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
-from slipsweep.model.variables import CAUTIONS, RESULTS, Validity
+from slipsweep.model.variables import CAUTIONS, RESULTS, STRENGTHS, Validity
 
 Floats = NDArray[np.float64]
 Curve = tuple[Floats, Floats]
 
-#: Least displacement of a logarithmic axis, mm, where the largest is far above; and of u ω² / A.
-_LEAST, _LEAST_SCALED = 1.0, 1e-4
+#: Least value of u ω² / A on its axis, where the largest is far above, and frequencies that are shown to fall together.
+_LEAST_SCALED, _FREQUENCIES = 1e-4, 3
 
 _NEWMARK: dict[str, Any] = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
 _JUMP: dict[str, Any] = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
@@ -60,88 +34,86 @@ _UNSOUND: dict[str, Any] = {"color": "0.55", "linewidth": 7, "linestyle": (0, (0
 #: How the options are drawn that an engineer has to choose from.
 _ANSWERS: dict[str, dict[str, Any]] = {
     f"{decay}, stop by {end}": {"color": colour, "markerfacecolor": face, "linestyle": dash, "marker": marker}
-    for end, colour, face in (("Eq. 12", BLUE, BLUE), ("integration", VERMILION, "white"))
+    for end, colour, face in (("Eq. 12", style.BLUE, style.BLUE), ("integration", style.VERMILION, "white"))
     for decay, dash, marker in (
         ("λ by Eq. 6", (0, (7, 2)), "o"), ("λ = 2", (0, (3, 1.5)), "s"), ("λ = 3", (0, (7, 2, 1.5, 2)), "^"),
     )
-} | {NEWMARK: {"color": "0.35", "linestyle": "-", "marker": "x"}}  # fmt: skip
+} | {style.NEWMARK: {"color": "0.35", "linestyle": "-", "marker": "x"}}  # fmt: skip
 
 
-# ------------------------------------------------------------------------- the three charts
+# ------------------------------------------------------------------------------- the kinds
 
 
-def families(sheet: Sheet, name: str) -> Figure:
-    """Draw curves of a result over one axis, one for each value of another, and Newmark's beside displacements.
+def families(result: Result, options: Options) -> Figure:
+    """Curves of a result over one axis, one for each value of another, and Newmark's beside displacements."""
+    first = ("frequency", "yield_coefficient", "mu_s", "theta")
+    name = result.quantity(options.variable)
+    return _drawn(result.sheet(options, result.compared(name), DRIVES, curves=[*first, *result.wide]), name)
 
-    Parameters
-    ----------
-    sheet : Sheet
-        Of a slice that holds the result and `validity`; without `y` there is one curve.
-    name : str
-        The result.
-    """
-    factor = 1000.0 if RESULTS[name].get("units") == "m" else 1.0
-    label, shown = RESULTS[name]["long_name"], "mm" if factor > 1 else sheet.look.unit(name)
-    drawn = reliable(sheet.data, name, sheet.look)
-    check_positive(label, drawn.values)
-    compared = name == DISPLACEMENT and sheet.data.attrs["model"] != "newmark"
-    sheet.data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn)
-    if name == DISPLACEMENT:
-        theirs = newmark(sheet.data)
-        sheet.data["newmark"] = theirs.reset_coords(drop=True)
-        sheet.find_unsound(drawn, theirs, "Barred curves")
+
+def curve(result: Result, options: Options) -> Figure:
+    """One curve of a result over one axis, and Newmark's beside a displacement."""
+    name = result.quantity(options.variable)
+    return _drawn(result.sheet(options, result.compared(name), (*DRIVES, "yield_coefficient", "frequency")), name)
+
+
+def under_a_record(result: Result, options: Options) -> Figure:
+    """Displacements under one record over one axis, a curve for each value of another."""
+    first = (*STRENGTHS, "yield_acceleration", "yield_coefficient")
+    others = [dim for dim in result.wide if dim != "polarity"]
+    return _drawn(result.sheet(options, result.compared(DISPLACEMENT), first, curves=others), DISPLACEMENT)
+
+
+def _drawn(sheet: Sheet, name: str) -> Figure:
+    """Curves of a result, of the displacement with Newmark's."""
+    units = sheet.options.unit(name)
+    factor, units = (1000.0, "mm") if units == "m" else (1.0, units)
+    label = f"{RESULTS[name]['long_name']} ({units})" if units else RESULTS[name]["long_name"]
+    sheet.show(name, "Barred curves")
     sheet.set_axis("x", sheet.x)
     for panel in sheet.panels:
-        log_axis(panel.axes, drawn.values * factor, _LEAST if factor > 1 else None)
-        panel.axes.set_ylabel(f"{label} ({shown})" if shown else label)
+        log_axis(panel.axes, sheet.data["drawn"].values * factor, label, 1.0 if factor > 1 else None)
         found = _curves(panel, panel.grid("drawn"), _on_limit(panel, name))
-        looks = curve_looks(len(found)) if panel.y else [{"color": BLUE, "linestyle": "-", "marker": ""}]
+        looks = curve_looks(len(found)) if panel.y else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
         for member, ((xs, ys), look) in enumerate(zip(found, looks, strict=True)):
             _draw(sheet, panel, (xs, ys * factor), member, len(found), look)
         _underlay(sheet, panel, name, factor)
-        for ys, look in zip(panel.grid("newmark") if compared else (), looks, strict=False):
+        for ys, look in zip(panel.grid("newmark") if "newmark" in sheet.data else (), looks, strict=False):
             _draw_newmark(sheet, panel, (panel.values(panel.x), ys * factor), look)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(name)
-    if compared:
-        sheet.notes += ratio_text((drawn / theirs).values)
     return sheet.done()
 
 
-def dimensionless(sheet: Sheet) -> Figure:
-    """Draw uω²/A against A/Üy, in which all frequencies give one curve.
-
-    Parameters
-    ----------
-    sheet : Sheet
-        Of a slice over the amplitude and some frequencies that holds `permanent_displacement` and `validity`.
-    """
-    drawn = reliable(sheet.data, DISPLACEMENT, sheet.look)
-    theirs = newmark(sheet.data)
-    sheet.data = sheet.data.merge(thresholds(sheet.data)).assign(drawn=drawn, newmark=theirs.reset_coords(drop=True))
-    sheet.find_unsound(drawn, theirs, "Barred curves")
-    scaled = [dimensionless_curves(panel, panel.data["drawn"]) for panel in sheet.panels]
+def dimensionless(result: Result, options: Options) -> Figure:
+    """uω²/A against A/Üy, in which all frequencies give one curve."""
+    if options.x not in (None, *DRIVES):
+        raise InputError(f"{result.name}: --x {options.x}: the dimensionless chart is drawn over A / Üy")
+    drive = next((dim for dim in reversed(DRIVES) if dim in result.wide), None)
+    if drive is None:
+        raise InputError(f"{result.name}: the dimensionless chart needs an amplitude of two values or more")
+    first = ("mu_s", "theta", "yield_acceleration", "yield_coefficient")
+    keep = {"frequency": result.spread("frequency", _FREQUENCIES)} if "frequency" in result.wide else {}
+    names = result.compared(DISPLACEMENT)
+    sheet = result.sheet(replace(options, x=None), names, drive, curves=first, keep=keep)
+    sheet.show(DISPLACEMENT, "Barred curves")
+    scaled = [_scaled(panel, panel.data["drawn"]) for panel in sheet.panels]
     # the paper's axis begins at the yield acceleration
     beyond = np.concatenate([ys[xs > 1] for one in scaled for xs, ys in one.values()])
-    check_positive("displacement beyond the yield acceleration", beyond)
     frequencies = np.atleast_1d(sheet.data["frequency"].values)
     shapes: list[dict[str, Any]] = [
         {"marker": shape, "markersize": 5, "markerfacecolor": "none"} for shape in "ox+"[: frequencies.size - 1]
     ]
     for panel, curves in zip(sheet.panels, scaled, strict=True):
         panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
-        panel.axes.set_ylabel("permanent displacement, u ω² / A")
-        log_axis(panel.axes, beyond, _LEAST_SCALED)
-        found = _on_limit(panel, DISPLACEMENT)
-        sides = sides_of(panel.data["limit_line"])["amplitude"] if found is not None else None
-        edges = {} if found is None else dimensionless_curves(panel, found, sides, SIDE)
-        classical = {} if sheet.data.attrs["model"] == "newmark" else dimensionless_curves(panel, panel.data["newmark"])
+        log_axis(panel.axes, beyond, "permanent displacement, u ω² / A", _LEAST_SCALED)
+        beyond_limit = _beyond(panel)
+        classical = _scaled(panel, panel.data["newmark"]) if "newmark" in panel.data else {}
         members = len(curves) // frequencies.size
         for member, look in enumerate(curve_looks(members)):
             xs, ys = curves[member, 0]
-            if edges:
-                ends, on_limit = edges[member, 0]
-                xs, ys = _broken(xs, ys, xs > ends[0], ends[0], on_limit)
+            if beyond_limit is not None:
+                xs, ys = _broken(xs, ys, beyond_limit[member])
             _draw(sheet, panel, (xs, ys), member, members, {**look, "marker": ""})
             if classical:
                 _draw_newmark(sheet, panel, classical[member, 0], look)
@@ -155,35 +127,29 @@ def dimensionless(sheet: Sheet) -> Figure:
         log_ticks(panel.axes.xaxis, 10)
         panel.axes.set_xlim(left=1.0)
     for frequency, shape in zip(frequencies, [{"linestyle": "-"}, *shapes], strict=True) if shapes else ():
-        sheet.legend[value_text("frequency", frequency)] = Line2D([], [], **{"color": "0.3", "linestyle": "", **shape})
+        handle: dict[str, Any] = {"color": "0.3", "linestyle": "", **shape}
+        sheet.legend[style.value_text(sheet.data, "frequency", frequency, options)] = Line2D([], [], **handle)
     sheet.note_left_out(DISPLACEMENT)
-    sheet.notes += [] if sheet.data.attrs["model"] == "newmark" else ratio_text((drawn / theirs).values)
     return sheet.done()
 
 
-def spread(sheet: Sheet) -> Figure:
-    """Draw the results of options that an engineer has to choose from, the band between them, and this result.
+def spread(result: Result, options: Options) -> Figure:
+    """The results of options that an engineer has to choose from, the band between them, and this result.
 
     Newmark's block; friction decay λ by Eq. 6 or as measured; sliding that ends by Eq. 12 or by integration.
-
-    Parameters
-    ----------
-    sheet : Sheet
-        Of a slice over one axis that holds `permanent_displacement` and `validity`.
     """
-    drawn = reliable(sheet.data, DISPLACEMENT, sheet.look)
+    if "yield_coefficient" in result.data.coords:
+        raise InputError(f"{result.name}: the result has ky alone: other options of the model need theta and mu_s")
+    sheet = result.sheet(options, result.compared(DISPLACEMENT), DRIVES)
     # the others have a mode limit, whatever this one is
-    sheet.data = sheet.data.merge(thresholds(sheet.data, always=True)).assign(drawn=drawn)
-    sheet.find_unsound(drawn, newmark(sheet.data), "Barred, of this result")
+    sheet.show(DISPLACEMENT, "Barred, of this result", always=True)
     sheet.set_axis("x", sheet.x)
     flags: list[xr.DataArray] = []
     own_text = _own_text(sheet.data)  # one for all panels: the caption has what differs
     answers = [_answers(panel, own_text, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for _, ys in one.values()])
-    check_positive(RESULTS[DISPLACEMENT]["long_name"], values)
     for panel, curves in zip(sheet.panels, answers, strict=True):
-        log_axis(panel.axes, values, _LEAST)
-        panel.axes.set_ylabel("permanent displacement (mm)")
+        log_axis(panel.axes, values, "permanent displacement (mm)")
         xs = next(xs for xs, _ in curves.values())
         each = np.array([ys for _, ys in curves.values()])
         # what is zero lies below any logarithmic axis, not nowhere
@@ -206,14 +172,10 @@ def spread(sheet: Sheet) -> Figure:
 # ------------------------------------------------------------------------ what they show
 
 
-def dimensionless_curves(
-    panel: Panel, displacement: xr.DataArray, amplitude: xr.DataArray | None = None, along: str | None = None
-) -> dict[tuple[int, int], Curve]:
+def _scaled(panel: Panel, displacement: xr.DataArray) -> dict[tuple[int, int], Curve]:
     """A/Üy and uω²/A of every curve of a panel and every frequency of its slice, by their numbers."""
-    data = panel.data
-    dims = (panel.y, "frequency", along or panel.x)
-    variables = (displacement, data["amplitude"] if amplitude is None else amplitude, data["frequency"],
-                 data["yield_line"])  # fmt: skip
+    data, dims = panel.data, (panel.y, "frequency", panel.x)
+    variables = (displacement, data["amplitude"], data["frequency"], data["yield_line"])
     u, a, frequency, threshold = (over(one, data, dims) for one in variables)
     with np.errstate(divide="ignore", invalid="ignore"):
         scaled, ratio = np.broadcast_arrays(u * (2 * math.pi * frequency) ** 2 / a, a / threshold)
@@ -223,13 +185,12 @@ def dimensionless_curves(
 def _answers(panel: Panel, own_text: str, flags: list[xr.DataArray]) -> dict[str, Curve]:
     """The curves of a spread, mm, all over the same abscissae, the result's own last; their validity to `flags`."""
     found = {}
-    for text, (model, changed) in alternatives(panel.data).items():
-        solved = solve(panel.data, [DISPLACEMENT, "validity"], model, **changed)
-        flags.append(solved["validity"])
-        drawn = reliable(solved, DISPLACEMENT, panel.look)
+    for text, (model, changed) in solved.alternatives(panel.data).items():
+        answer = solved.solve(panel.data, [DISPLACEMENT, "validity"], model, **changed)
+        flags.append(answer["validity"])
+        drawn = reliable(answer, DISPLACEMENT, panel.options)
         found[text] = _curves(panel, panel.grid(drawn), _on_limit(panel, DISPLACEMENT, model, **changed))[0]
-    own = _curves(panel, panel.grid("drawn"), _on_limit(panel, DISPLACEMENT))[0]
-    found[f"this result:\n{own_text}"] = own
+    found[f"this result:\n{own_text}"] = _curves(panel, panel.grid("drawn"), _on_limit(panel, DISPLACEMENT))[0]
     return {text: (xs, ys * 1000.0) for text, (xs, ys) in found.items()}
 
 
@@ -237,7 +198,7 @@ def _own_text(data: xr.Dataset) -> str:
     """What a result is called among those of other options."""
     model = MODELS.from_attributes(data.attrs)
     if model.name == "newmark":
-        return NEWMARK
+        return style.NEWMARK
     given = data.coords.get("decay_rate")
     decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
     return f"{decay}, stop by {'Eq. 12' if model.options['recoupling'] == 'eq12' else 'integration'}"
@@ -251,7 +212,8 @@ def _on_limit(panel: Panel, name: str, model: Model | None = None, **changed: An
     data = panel.data
     if "limit_line" not in data or panel.x not in DRIVES:
         return None
-    return reliable(solve(data, [name, "validity"], model, **changed, **sides_of(data["limit_line"])), name, panel.look)
+    sides = solved.solve(data, [name, "validity"], model, **changed, **solved.sides_of(data["limit_line"]))
+    return reliable(sides, name, panel.options)
 
 
 def _curves(panel: Panel, rows: Floats, on_limit: xr.DataArray | None = None) -> list[Curve]:
@@ -259,18 +221,24 @@ def _curves(panel: Panel, rows: Floats, on_limit: xr.DataArray | None = None) ->
 
     With the results on the limit they go there from either side.
     """
-    xs, data = panel.values(panel.x), panel.data
-    if "limit_line" not in data:
+    xs, beyond = panel.values(panel.x), _beyond(panel)
+    if beyond is None:
         return [(xs, ys) for ys in rows]
-    limit = panel.grid("limit_line")
-    beyond = panel.grid("amplitude") > limit
     if panel.x not in DRIVES:
         return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, strict=True)]
-    scale = panel.look.scale(panel.x, panel.g)
+    limit = panel.grid("limit_line")
+    scale = panel.options.scale(panel.x, panel.g)
     if panel.x == "displacement_amplitude":
         scale = scale / (2 * math.pi * panel.grid("frequency")) ** 2
     edges = [None] * len(rows) if on_limit is None else panel.grid(on_limit, SIDE)
     return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, (limit * scale)[:, 0], edges, strict=True)]
+
+
+def _beyond(panel: Panel) -> NDArray[np.bool_] | None:
+    """Where the amplitude is above the mode limit, if there is one."""
+    if "limit_line" not in panel.data:
+        return None
+    return np.asarray(panel.grid("amplitude") > panel.grid("limit_line"))
 
 
 def _broken(
@@ -294,8 +262,8 @@ def _above_zero(curve: Curve) -> Curve:
 def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: dict[str, Any]) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
     xs, ys = _above_zero(curve)
-    several = panel.x != "frequency" and "frequency" in panel.data.dims
-    single = NEWMARK if panel.data.attrs["model"] == "newmark" else "this result"
+    several = panel.x != "frequency" and panel.data.sizes.get("frequency", 1) > 1
+    single = style.NEWMARK if solved.is_newmark(panel.data) else "this result"
     text = panel.member(member) or ("all frequencies" if several else single)
     sheet.legend[text] = plot_curve(panel.axes, xs, ys, member / members, label=text, **look)
     for at in np.flatnonzero(np.isnan(ys[1:-1]) & (xs[1:-1] == xs[2:])) + 1:
@@ -307,12 +275,11 @@ def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, l
 
 def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]) -> None:
     """Draw Newmark's curve beside one of a family, with the same dash; beside one curve, dashed."""
-    xs, ys = _above_zero(curve)
-    more = {"linestyle": look["linestyle"]} if panel.y else {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
-    panel.axes.plot(xs, ys, gid="newmark", **{**_NEWMARK, **more})
-    sheet.remarks[f"{NEWMARK} (same dash)" if panel.y else NEWMARK] = Line2D(
-        [], [], **(_NEWMARK if panel.y else {**_NEWMARK, **more})
-    )
+    alone = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
+    look = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else alone)
+    panel.axes.plot(*_above_zero(curve), gid="newmark", **look)
+    text = f"{style.NEWMARK} (same dash)" if panel.y else style.NEWMARK
+    sheet.remarks[text] = Line2D([], [], **(_NEWMARK if panel.y else look))
 
 
 def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> None:
@@ -322,46 +289,39 @@ def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> Non
     """
     data = panel.data
     drawn = data["drawn"]
-    flagged = (drawn > 0) & has_flags(data["validity"], CAUTIONS)
-    marks = [(flagged, "caution", _CAUTION)]
-    if "unsound" in data:
-        marks.append((data["unsound"], "unsound", _UNSOUND))
-    for cells, gid, look in marks:
+    marks = [("caution", _CAUTION, (drawn > 0) & has_flags(data["validity"], CAUTIONS))]
+    marks += [("unsound", _UNSOUND, data["unsound"])] if "unsound" in data else []
+    for gid, look, cells in marks:
         marked = drawn.where(cells).transpose(*drawn.dims)
         if factor:
             # the limit itself is cautious, and a jump there is no line
             edge = _on_limit(panel, name) if gid == "caution" else None
             curves = [(xs, ys * factor) for xs, ys in _curves(panel, panel.grid(marked), edge)]
         else:
-            found = dimensionless_curves(panel, marked)
-            curves = [curve for (_, frequency), curve in found.items() if frequency == 0]
+            curves = [curve for (_, frequency), curve in _scaled(panel, marked).items() if frequency == 0]
         for xs, ys in curves:
             panel.axes.plot(xs, ys, gid=gid, **look)
-        if not cells.any():
-            continue
-        if gid == "unsound":
-            sheet.remarks[UNSOUND] = Line2D([], [], **_UNSOUND)
-        else:
-            codes = sheet.data["validity"].values[(sheet.data["drawn"] > 0).transpose(*sheet.data["validity"].dims)]
-            names = [flag_name(flag) for flag in CAUTIONS & Validity(int(np.bitwise_or.reduce(codes.astype(int))))]
-            sheet.remarks["caution:\n" + "\n".join(names)] = Line2D([], [], **_CAUTION)
+        if cells.any() and gid == "unsound":
+            sheet.remarks[style.UNSOUND] = Line2D([], [], **look)
+        elif cells.any():
+            codes = sheet.data["validity"].where(sheet.data["drawn"] > 0, 0).values.astype(int)
+            names = [style.flag_name(flag) for flag in CAUTIONS & Validity(int(np.bitwise_or.reduce(codes, axis=None)))]
+            sheet.remarks["caution:\n" + "\n".join(names)] = Line2D([], [], **look)
 
 
 def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
     """Vertical lines where the amplitude passes a threshold that all curves of a panel share."""
     low, high = panel.axes.get_xlim()
     data = panel.data
-    if panel.x in ("yield_coefficient", "yield_acceleration") and data["amplitude"].size == 1:
-        place = data["amplitude"].item() / (panel.g if panel.x == "yield_coefficient" else 1.0)
-        place *= panel.look.scale(panel.x, panel.g)
-        if low < place < high:
-            panel.axes.axvspan(place, high, facecolor="none", edgecolor="0.7", hatch="..", linewidth=0, zorder=0.5)
-            sheet.remarks[f"{NO_SLIDING}: Üy above A"] = Patch(facecolor="none", edgecolor="0.7", hatch="..")
-    if panel.x != "amplitude":
-        return
-    for name, (text, look) in LINES.items():
-        if name not in data or data[name].size > 1:
-            continue
-        place = data[name].item() * panel.look.scale("amplitude", panel.g)
-        if low <= place <= high:
-            sheet.remarks[text] = panel.axes.axvline(place, gid=name, **{**look, "linewidth": 1.0, "zorder": 1.7})
+    if panel.x in ("yield_coefficient", "yield_acceleration") and "amplitude" in data and not solved.is_recorded(data):
+        place = data["amplitude"].values.max() / (panel.g if panel.x == "yield_coefficient" else 1.0)
+        place *= panel.options.scale(panel.x, panel.g)
+        if low < place < high and data["amplitude"].size == 1:
+            look: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.7", "hatch": ".."}
+            panel.axes.axvspan(place, high, linewidth=0, zorder=0.5, **look)
+            sheet.remarks[f"{style.NO_SLIDING}: Üy above A"] = Patch(**look)
+    for name, (text, look) in style.LINES.items() if panel.x == "amplitude" else ():
+        if name in data and data[name].size == 1:
+            place = data[name].item() * panel.options.scale("amplitude", panel.g)
+            if low <= place <= high:
+                sheet.remarks[text] = panel.axes.axvline(place, gid=name, **{**look, "linewidth": 1.0, "zorder": 1.7})

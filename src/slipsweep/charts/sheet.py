@@ -7,7 +7,7 @@ Figures are made without pyplot, hence without a window system or state between 
 import itertools
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -22,23 +22,9 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from slipsweep.charts.answers import unsound
-from slipsweep.charts.style import (
-    LEFT_OUT,
-    LEFT_OUT_TEXT,
-    SYMBOLS,
-    Look,
-    axis_label,
-    caption,
-    grey_map,
-    is_acceleration,
-    left_out_text,
-    length_text,
-    plain,
-    to_grey,
-    unsound_text,
-    value_text,
-)
+from slipsweep.charts import solved, style
+from slipsweep.charts.solved import DISPLACEMENT
+from slipsweep.charts.style import Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 
@@ -47,10 +33,10 @@ Floats = NDArray[np.float64]
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 
-#: Width of a figure of one panel, inches, and characters of a caption in an inch.
+#: Width of a figure of one panel, inches, and characters of a style.caption in an inch.
 _WIDTH, _CHARACTERS = 7.0, 16
 
-#: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
+#: Height of a line of a style.caption or legend, inches, and lines that the usual height has a place for.
 _LINE, _LINES = 0.165, 4
 
 #: Markers on a curve.
@@ -61,16 +47,14 @@ _MARKED = 7
 
 
 class Drawing:
-    """A figure of panels with a legend and a caption.
+    """A figure of panels with a legend and a style.caption.
 
     Parameters
     ----------
-    look : Look
+    options : Options
     rows, columns : int
     size : tuple of float
-        Width and height, inches; `look.width` scales both.
-    axes : Axes, optional
-        What to draw the one panel in, instead of a new figure.
+        Width and height, inches; `options.width` scales both.
     shared
         Further options of `Figure.subplots`.
 
@@ -81,15 +65,13 @@ class Drawing:
     legend, remarks : dict of str to Artist
         Entries of the legend by text: what is drawn in several panels has one.  Remarks come last.
     notes : list of str
-        Sentences for the caption.
+        Sentences for the style.caption.
     """
 
-    def __init__(
-        self, look: Look, rows: int, columns: int, size: tuple[float, float], axes: Axes | None = None, **shared: Any
-    ) -> None:
-        factor = 1.0 if look.width is None else look.width / size[0]
-        self.look, self.axes = look, axes
+    def __init__(self, options: Options, rows: int, columns: int, size: tuple[float, float], **shared: Any) -> None:
+        self.options, axes = options, options.ax
         if axes is None:
+            factor = 1.0 if options.inches is None else options.inches / size[0]
             self.figure = Figure(figsize=(size[0] * factor, size[1] * factor), layout="constrained")
             self.grid = self.figure.subplots(rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False)
         else:
@@ -103,49 +85,53 @@ class Drawing:
         self.remarks: dict[str, Artist] = {}
         self.notes: list[str] = []
 
-    def mark_zero(self, panels: Iterable[Axes]) -> None:
-        """A line at zero and a grid in panels over time."""
-        for panel in panels:
-            panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-            panel.margins(x=0)
-            panel.grid(color="0.9")
-        self.figure.align_ylabels()
-
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
-        """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
-        entries = self.legend | self.remarks
-        lines = 0
+        """Draw the legend, beside or above the panels, and a style.caption of `texts` and the notes under them."""
+        entries, font = self.legend | self.remarks, self.options.font
+        handles, labels = list(entries.values()), list(entries)
+        axes, lines = self.options.ax, 0
         width, height = self.figure.get_size_inches()
-        if self.axes is not None:
-            right = any(other.yaxis.get_ticks_position() == "right" for other in self.axes.child_axes)
+        if axes is not None:
+            right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
             if entries:
-                self.axes.legend(
-                    list(entries.values()), list(entries), fontsize="small", frameon=False,
+                axes.legend(
+                    handles, labels, fontsize="small", frameon=False,
                     loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0),
                 )  # fmt: skip
-            add_caption(self.figure, self.axes, [*texts, *self.notes])
+            wrapped = self._wrapped(texts, axes.get_window_extent().width / self.figure.dpi)
+            axes.annotate(
+                "\n".join(wrapped), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
+                ha="center", va="top", fontsize="x-small", annotation_clip=False,
+            )  # fmt: skip
         else:
             self._set_small()
             if entries:
                 beside = beside and width > 5.0
-                columns = 1 if beside else max(1, int(width * 10.0 / self.look.font / 2.2))
+                columns = 1 if beside else max(1, int(width * 10.0 / font / 2.2))
                 self.figure.legend(
-                    list(entries.values()), list(entries), ncols=columns, handlelength=3.2, fontsize="small",
-                    frameon=False, loc="outside right upper" if beside else "outside upper center",
+                    handles, labels, ncols=columns, handlelength=3.2, fontsize="small", frameon=False,
+                    loc="outside right upper" if beside else "outside upper center",
                 )  # fmt: skip
                 longest = max(text.count("\n") + 1 for text in entries)
                 lines = 0 if beside else math.ceil(len(entries) / columns) * longest - 1
-            lines += add_caption(self.figure, None, [*texts, *self.notes], self.look.font)
-            more = max(0, lines - _LINES) * _LINE * self.look.font / 10.0
+            wrapped = self._wrapped(texts, width * 10.0 / font)
+            self.figure.supxlabel("\n".join(wrapped), fontsize="small")
+            more = max(0, lines + len(wrapped) - _LINES) * _LINE * font / 10.0
             self.figure.set_size_inches(width, height + more)
-        if self.look.grey:
-            without_colour(self.figure)
+        if self.options.grey:
+            _without_colour(self.figure)
         return self.figure
+
+    def _wrapped(self, texts: Sequence[str], width: float) -> list[str]:
+        """Lines of a style.caption that is as wide as some inches of text of 10 points."""
+        characters = max(20, int(_CHARACTERS * width))
+        every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
+        return [line for text in every for line in textwrap.wrap(text, characters)]
 
     def _set_small(self) -> None:
         """Sizes of text, in points: ticks are made only when the figure is drawn."""
         several = self.grid.size > 1
-        size = self.look.font * (0.833 if several else 1.0)
+        size = self.options.font * (0.833 if several else 1.0)
         for panel in self.grid.ravel():
             for axes in (panel, *panel.child_axes):
                 axes.tick_params(labelsize=size)
@@ -154,38 +140,23 @@ class Drawing:
                 panel.yaxis.label.set_fontsize(size)
 
 
-def add_caption(figure: Figure, axes: Axes | None, texts: Sequence[str], font: float = 10.0) -> int:
-    """A caption under a figure, or under the one panel that is given, as wide as that; returns its lines."""
-    width = figure.get_figwidth() if axes is None else axes.get_window_extent().width / figure.dpi
-    characters = max(20, int(_CHARACTERS * 10.0 / font * width))
-    lines = [line for text in texts for one in text.splitlines() for line in textwrap.wrap(one, characters)]
-    if axes is None:
-        figure.supxlabel("\n".join(lines), fontsize="small")
-    else:
-        axes.annotate(
-            "\n".join(lines), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
-            ha="center", va="top", fontsize="x-small", annotation_clip=False,
-        )  # fmt: skip
-    return len(lines)
-
-
-def without_colour(figure: Figure) -> None:
+def _without_colour(figure: Figure) -> None:
     """Replace all colours by their lightness."""
     for artist in figure.findobj():
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            artist.set_cmap(grey_map(artist.get_cmap()))
+            artist.set_cmap(style.grey_map(artist.get_cmap()))
         elif isinstance(artist, Line2D | Patch):
             kinds = ("color", "markerfacecolor", "markeredgecolor")
             for kind in kinds if isinstance(artist, Line2D) else ("facecolor", "edgecolor"):
-                artist.set(**{kind: tuple(to_grey(getattr(artist, f"get_{kind}")())[0])})
+                artist.set(**{kind: tuple(style.to_grey(getattr(artist, f"get_{kind}")())[0])})
         elif isinstance(artist, mpl.collections.Collection):
             for kind in ("facecolor", "edgecolor"):
                 colours = getattr(artist, f"get_{kind}")()
                 if len(colours):
-                    artist.set(**{kind: to_grey(colours)})
+                    artist.set(**{kind: style.to_grey(colours)})
 
 
-# ------------------------------------------------------------------- of slices of a sweep
+# ------------------------------------------------------------------- of slices of a result
 
 
 class Panel:
@@ -196,14 +167,14 @@ class Panel:
     axes : Axes
     x, y : str
         The axes of a map; of curves `y` is the curve parameter, or None.
-    look : Look
+    options : Options
     g : float
         Gravity, m/s².
     """
 
     def __init__(self, sheet: "Sheet", axes: Axes, where: dict[str, int]) -> None:
         self._sheet, self._where = sheet, where
-        self.axes, self.x, self.y, self.look = axes, sheet.x, sheet.y, sheet.look
+        self.axes, self.x, self.y, self.options = axes, sheet.x, sheet.y, sheet.options
         self.g = float(sheet.data.attrs["g"])
 
     @property
@@ -213,20 +184,21 @@ class Panel:
 
     def values(self, name: str) -> Floats:
         """The values along an axis, in the units that they are drawn in."""
-        return axis_numbers(self.data, name) * self.look.scale(name, self.g)
+        return axis_numbers(self.data, name) * self.options.scale(name, self.g)
 
     def grid(self, name: str | xr.DataArray, along: str | None = None) -> Any:
         """A variable over (y, x), or over (y, `along`); without y of one row."""
         array = self.data[name] if isinstance(name, str) else name
         return over(array, self.data, (self.y, along or self.x))
 
-    def reliable(self, name: str) -> xr.DataArray:
-        """A result of the slice as it may be drawn."""
-        return reliable(self.data, name, self.look)
-
     def member(self, index: int) -> str:
         """What a curve is called."""
-        return "" if self.y is None else member_text(self.data, self.y, index, self.look)
+        return "" if self.y is None else member_text(self.data, self.y, index, self.options)
+
+    def add_title(self, text: str) -> None:
+        """A line more over the panel."""
+        title = self.axes.get_title()
+        self.axes.set_title(f"{title}\n{text}" if title else text, fontsize="small")
 
 
 class Sheet(Drawing):
@@ -238,23 +210,28 @@ class Sheet(Drawing):
         The slice of all panels.
     x, y : str
         The axes of a map; of curves `y` is the curve parameter, or None.
+    options : Options
     across, down : str, optional
         Dimensions that panels lie along.
+
+    Attributes
+    ----------
+    panels : list of Panel
     """
 
     def __init__(
-        self, data: xr.Dataset, x: str, y: str | None, look: Look,
-        across: str | None = None, down: str | None = None, axes: Axes | None = None,
+        self, data: xr.Dataset, x: str, y: str | None, options: Options,
+        across: str | None = None, down: str | None = None,
     ) -> None:  # fmt: skip
         columns, rows = (data.sizes[dim] if dim else 1 for dim in (across, down))
         size = (_WIDTH, 5.3) if rows == columns == 1 else (max(_WIDTH, 2.0 + 2.7 * columns), 2.0 + 2.5 * rows)
-        super().__init__(look, rows, columns, size, axes)
+        super().__init__(options, rows, columns, size)
         self.data, self.x, self.y, self.across, self.down = data, x, y, across, down
         self.panels: list[Panel] = []
         for (row, column), one in np.ndenumerate(self.grid):
             where = {dim: at for dim, at in ((across, column), (down, row)) if dim}
             self.panels.append(Panel(self, one, where))
-            title = ", ".join(member_text(data, dim, at, look) for dim, at in where.items())
+            title = ", ".join(member_text(data, dim, at, options) for dim, at in where.items())
             if title:
                 one.set_title(title, fontsize="medium")
 
@@ -262,56 +239,64 @@ class Sheet(Drawing):
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
         values = self.panels[0].values(name)
         for panel in self.panels:
-            set_scale(panel.axes, side, values)
-            getattr(panel.axes, f"set_{side}label")(axis_label(name, self.look))
-            place = panel.axes.get_subplotspec()
+            axes = panel.axes
+            getattr(axes, f"set_{side}lim")(values[0], values[-1])
+            if is_log(values):
+                getattr(axes, f"set_{side}scale")("log")
+                log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
+            getattr(axes, f"set_{side}label")(style.axis_label(name, self.options))
+            place = axes.get_subplotspec()
             outer = place is None or (place.is_last_col() if side == "y" else place.is_first_row())
-            if is_acceleration(name) and (outer or self.axes is not None):
-                second_scale(panel.axes, side, panel.g, self.look, SYMBOLS[name])
+            if style.is_acceleration(name) and (outer or self.options.ax is not None):
+                _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
         """Say which values of a result are left out: by the slice's flags and others."""
         flags = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
-        raised = [flag for flag in LEFT_OUT_TEXT if any(has_flags(one, flag).any() for one in flags)]
-        self.notes += left_out_text(raised, self.look, name == "permanent_displacement")
+        raised = [flag for flag in style.LEFT_OUT_TEXT if any(has_flags(one, flag).any() for one in flags)]
+        self.notes += style.left_out_text(raised, self.options.show_cautions, name == DISPLACEMENT)
 
-    def find_unsound(self, drawn: xr.DataArray, theirs: xr.DataArray, what: str) -> None:
-        """Add to the slice where its displacement has a trend that no block has, and note how much of it that is.
+    def show(self, name: str, marked: str, always: bool = False) -> None:
+        """Add to the slice what charts of a result draw.
 
-        `drawn` is the displacement as it is drawn, `theirs` that of Newmark's block, `what` how such places are marked.
+        ``drawn``, the values that may be drawn; `thresholds`; of displacements ``newmark``, that of Newmark's block,
+        and ``unsound``, where there is a trend that no block has.  Notes say how the two compare, and how much of the
+        slice is `marked`.
         """
-        found = unsound(self.data, theirs)
-        shown = drawn > 0
-        either = shown & (found["falls"] | found["below"])
-        self.data["unsound"] = either.transpose(*drawn.dims)
-        falls, below = (int((shown & found[name]).sum()) for name in ("falls", "below"))
-        self.notes += unsound_text(falls, below, int(either.sum()), int(shown.sum()), what)
+        drawn = reliable(self.data, name, self.options)
+        self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
+        if name != DISPLACEMENT or solved.is_newmark(self.data):
+            return
+        theirs = solved.newmark(self.data)
+        if theirs is not None:
+            self.data["newmark"] = theirs.reset_coords(drop=True)
+            self.notes += style.ratio_text((drawn / theirs).values)
+        falls, below = ((drawn > 0) & one for one in solved.unsound(self.data, theirs))
+        self.data["unsound"] = (falls | below).transpose(*drawn.dims)
+        counts = (int(one.sum()) for one in (falls, below, self.data["unsound"], drawn > 0))
+        self.notes += style.unsound_text(marked, *counts)
 
     def done(self, beside: bool = True) -> Figure:
-        """Draw legend and caption."""
-        if self.axes is None:
+        """Draw legend and style.caption."""
+        if self.options.ax is None:
             for panel in self.panels:
                 panel.axes.label_outer()
-        picked = "".join(f"{dim} {plain(label)}: " for dim, label in self.data.attrs.get("picked", {}).items())
-        text = f"{picked}{caption(self.data, self.look)}; {self.data.attrs.get('source', 'slipsweep')}"
-        return self.finish([text, *self._cases()], beside)
-
-    def _cases(self) -> list[str]:
-        """What the cases are that tell curves or panels apart."""
-        own = [name for name in SYMBOLS if name in self.data.coords and self.data[name].dims == ("case",)]
-        texts = []
+        picked = "".join(f"{dim} {style.plain(label)}: " for dim, label in self.data.attrs.get("picked", {}).items())
+        text = f"{picked}{style.caption(self.data, self.options)}; {self.data.attrs.get('source', 'slipsweep')}"
+        cases = []
+        own = [name for name in style.SYMBOLS if name in self.data.coords and self.data[name].dims == ("case",)]
         for at in range(self.data.sizes.get("case", 0)):
-            values = ", ".join(member_text(self.data, name, at, self.look) for name in own)
-            texts.append(f"{member_text(self.data, 'case', at, self.look)}: {values}.")
-        return texts
+            values = ", ".join(member_text(self.data, name, at, self.options) for name in own)
+            cases.append(f"{member_text(self.data, 'case', at, self.options)}: {values}.")
+        return self.finish([text, *cases], beside)
 
 
-def reliable(results: xr.Dataset, name: str, look: Look) -> xr.DataArray:
+def reliable(results: xr.Dataset, name: str, options: Options) -> xr.DataArray:
     """A result as it may be drawn: NaN where it is upslope, or left out for its flags."""
     values = results[name]
     shown = values >= 0
-    if "validity" in results and not look.show_cautions:
-        shown = shown & ~has_flags(results["validity"], LEFT_OUT)
+    if "validity" in results and not options.show_cautions:
+        shown = shown & ~has_flags(results["validity"], style.LEFT_OUT)
     return values.where(shown).transpose(*values.dims)
 
 
@@ -320,17 +305,13 @@ def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
     return (validity.fillna(0).astype(np.int64) & int(flags)) != 0
 
 
-def member_text(data: xr.Dataset, dim: str, index: int, look: Look) -> str:
+def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str:
     """A value of an axis that tells curves or panels apart: ``θ = 5°``, or a case by its label."""
     labels = axis_labels(data, dim)
     if labels:
-        return plain(labels[index])
-    value = float(axis_numbers(data, dim)[index]) if dim in data.sizes else float(data[dim].values[index])
-    if dim == "threshold":
-        return f"d = {length_text(value)}"
-    if dim not in SYMBOLS:
-        return f"{value:g}"
-    return value_text(dim, value * look.scale(dim, float(data.attrs["g"])), look.unit(dim))
+        return style.plain(labels[index])
+    values = axis_numbers(data, dim) if dim in data.sizes else data[dim].values
+    return style.value_text(data, dim, float(values[index]), options)
 
 
 def over(array: xr.DataArray, data: xr.Dataset, dims: Sequence[str | None]) -> Any:
@@ -352,14 +333,6 @@ def is_log(values: Floats) -> bool:
     return bool(np.ptp(factors) / factors.mean() < np.ptp(steps) / steps.mean())
 
 
-def set_scale(axes: Axes, side: str, values: Floats) -> None:
-    """From the first to the last of some values, on the scale that they are spaced on."""
-    getattr(axes, f"set_{side}lim")(values[0], values[-1])
-    if is_log(values):
-        getattr(axes, f"set_{side}scale")("log")
-        log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
-
-
 def log_ticks(axis: Any, span: float) -> None:
     """Ticks of a logarithmic axis over some ratio of its ends, with numbers as people write them."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if span < 2000 else (1,)))
@@ -369,21 +342,47 @@ def log_ticks(axis: Any, span: float) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def second_scale(axes: Axes, side: str, g: float, look: Look, symbol: str = "A") -> None:
+def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> None:
     """An acceleration in the other unit, on the other side, with round values of its own."""
-    factor, text = (g, f"{symbol} (m/s²)") if look.units == "g" else (1 / g, f"{symbol} (g)")
+    factor, text = (g, f"{symbol} (m/s²)") if units == "g" else (1 / g, f"{symbol} (g)")
     functions = (lambda a: a * factor, lambda a: a / factor)
-    other = (
-        axes.secondary_yaxis("right", functions=functions)
-        if side == "y"
-        else axes.secondary_xaxis("top", functions=functions)
-    )
+    add: Any = axes.secondary_yaxis if side == "y" else axes.secondary_xaxis
+    other = add("right" if side == "y" else "top", functions=functions)
     getattr(other, f"set_{side}label")(text)
     low, high = getattr(axes, f"get_{side}lim")()
     # it would take them when it is drawn, too late for the layout to leave space for its numbers
     getattr(other, f"set_{side}lim")(low * factor, high * factor)
     if getattr(axes, f"get_{side}scale")() == "log":
         log_ticks(getattr(other, f"{side}axis"), high / low)
+
+
+def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, zeros: bool = False) -> float:
+    """A logarithmic ordinate that shows what is above `least`, and no more than seven decades.
+
+    With `zeros` curves come from below the axis: it begins at `least`.  Returns what may be drawn for values of zero:
+    a number below the end of the axis.
+
+    Raises
+    ------
+    InputError
+        No value is above zero.
+    """
+    finite = values[np.isfinite(values)]
+    there = finite[finite > 0]
+    if not there.size:
+        what = "no value above zero" if finite.size else "no value"
+        raise InputError(f"{label}: {what} in this slice, and the axis is logarithmic; choose another slice (--at)")
+    high = float(there.max())
+    low = max(float(there.min()), high * 1e-7)
+    if least is not None and high > 10 * least:
+        low = least if zeros and (values <= 0).any() else max(low, least)
+    axes.set_yscale("log")
+    axes.set_ylim(low / 1.2, high * 1.5)
+    axes.set_ylabel(label)
+    log_ticks(axes.yaxis, high / low * 100)
+    axes.grid(color="0.9", which="major")
+    axes.set_axisbelow(True)
+    return axes.get_ylim()[0] / 10
 
 
 # ----------------------------------------------------------------------------------- curves
@@ -412,30 +411,3 @@ def plot_curve(axes: Axes, xs: Floats, ys: Floats, offset: float = 0.0, **look: 
         look, regular = {**look, "marker": "." if single.size else ""}, regular[:0]
     (line,) = axes.plot(xs, ys, markevery=sorted({*regular.tolist(), *single.tolist()}), **look)
     return line
-
-
-def check_positive(name: str, values: Floats) -> None:
-    """Refuse what a logarithmic axis cannot show (InputError)."""
-    there = values[np.isfinite(values)]
-    if not (there > 0).any():
-        reason = "no value" if not there.size else "no value above zero"
-        raise InputError(f"{name}: {reason} in this slice, and the axis is logarithmic; choose another slice (--at)")
-
-
-def log_axis(axes: Axes, values: Floats, least: float | None, zeros: bool = False) -> float:
-    """A logarithmic ordinate that shows what is above `least`, and no more than seven decades.
-
-    With `zeros` curves come from below the axis: it begins at `least`.  Returns what may be drawn for values of zero:
-    a number below the end of the axis.
-    """
-    axes.set_yscale("log")
-    there = values[np.isfinite(values) & (values > 0)]
-    high = float(there.max())
-    low = max(float(there.min()), high * 1e-7)
-    if least is not None and high > 10 * least:
-        low = least if zeros and (values <= 0).any() else max(low, least)
-    axes.set_ylim(low / 1.2, high * 1.5)
-    log_ticks(axes.yaxis, high / low * 100)
-    axes.grid(color="0.9", which="major")
-    axes.set_axisbelow(True)
-    return axes.get_ylim()[0] / 10

@@ -1,109 +1,100 @@
-"""Slices of a result: the cells that a chart shows, and no others, as a dataset.
+"""Slices of a result: the cells that a chart shows, and no others, laid out in panels.
 
 A slice at a value that is not among those of the result is solved, with the same options.
 """
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from slipsweep.charts.answers import solve, with_amplitude
-from slipsweep.charts.style import drawn_text
+from slipsweep.charts.sheet import Sheet
+from slipsweep.charts.solved import DISPLACEMENT, is_recorded, solve, with_amplitude
+from slipsweep.charts.style import SHOWN, Options, drawn_text
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.selection import At, Place, axis_labels, between, find
 from slipsweep.model.options import MODELS
-from slipsweep.model.variables import (
-    INTENSITY_MEASURES,
-    PARAMETERS,
-    RECORD_RESULTS,
-    RESULTS,
-    STATISTIC_COORDINATES,
-    STATISTICS,
-)
+from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 from slipsweep.motion.waveforms import WAVEFORMS
-
-#: Results that charts show, and the coordinates that slices keep.
-_RESULTS = RECORD_RESULTS | RESULTS | STATISTICS
-_KEPT = {*PARAMETERS, *STATISTIC_COORDINATES, *(f"motion_{name}" for name in INTENSITY_MEASURES), "label", "motion"}
 
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
 
-#: Points of an axis that a figure shows: more than one for every two dots on paper is lost.
-MOST_POINTS = 600
+#: Variables by which results of functions other than `sweep` are known, and what those are called.
+OTHER_SORTS = {
+    "limit": "limit_amplitude",
+    "calibration": "computed_ground_acceleration",
+    "friction": "friction_ratio",
+    "hazard": "annual_rate",
+    "history": "relative_displacement",
+}
 
-#: What is kept of an axis: a slice of it, indices, or places some of which lie between its values.
-Kept = slice | Sequence[int] | Sequence[Place]
+#: Most curves of a family, panels across and down, and points of an axis that a figure can show.
+_CURVES, _PANELS, _POINTS = 6, 3, 600
+
+#: What is kept of an axis: a slice of it, or places, some of which may lie between its values.
+Kept = slice | Sequence[Place]
 
 
 class Result:
-    """A result of a sweep, of which slices are drawn.
+    """A result that is drawn.
 
     Parameters
     ----------
     data : Dataset
-        As `sweep` returns it, or `slipsweep.open_result`: only what is drawn of it is read.
-    name : str
+        As a function of slipsweep returns it, or `slipsweep.open_result`: only what is drawn of it is read.
+    name : str or Path
         What it is called in errors.
 
     Attributes
     ----------
+    sort : str
+        What it is a result of: "sweep", "statistics", "record", "suite", or one of `OTHER_SORTS`.
     variables : list of str
         Names of its results.
-    dims : tuple of str
+    dims : list of str
         Dimensions of its results.
-    sort : str
-        What it is a result of: "sweep", "statistics", "record" or "suite".
 
     Raises
     ------
     InputError
-        It is no result of a sweep, does not say what was solved, or has other units than slipsweep writes.
+        It is no result, does not say what was solved, or has other units than slipsweep writes.
     """
 
-    def __init__(self, data: xr.Dataset, name: str) -> None:
-        self.name = name
-        self.variables = [str(one) for one in data.data_vars if one in _RESULTS]
+    def __init__(self, data: xr.Dataset, name: str | Path) -> None:
+        self.name, self.attrs = str(name), data.attrs
+        self.sort = _sort(data)
+        if self.sort in OTHER_SORTS and self.sort != "limit":
+            self.data, self.variables, self.dims = data, [], []
+            return
+        self.variables = [str(one) for one in data.data_vars if one in SHOWN]
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
-        dims = dict.fromkeys(dim for one in self.variables for dim in data[one].dims)
-        self.dims = tuple(map(str, dims))
-        if not all(data.sizes[dim] for dim in self.dims):
+        data = data[self.variables]
+        if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
-        falling = [
-            dim for dim in self.dims
-            if dim in PARAMETERS and dim != "polarity" and not data.get_index(dim).is_monotonic_increasing
-        ]  # fmt: skip
+        check_attributes(data.attrs, self.name)
+        for key, one in data.variables.items():
+            units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
+            if units and one.attrs.get("units", units) != units:
+                raise InputError(f'{name}: {key}: units = "{one.attrs["units"]}"; must be "{units}"')
+        self.dims = [str(dim) for dim in data.sizes]
+        parameters = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
+        falling = [dim for dim in parameters if not data.get_index(dim).is_monotonic_increasing]
         self.data = data.sortby(falling) if falling else data
-        self.attrs: dict[str, Any] = {str(key): value for key, value in data.attrs.items()}
-        check_attributes(self.attrs, name)
-        for key, about in (PARAMETERS | _RESULTS).items():
-            found = data[key].attrs.get("units") if key in data.variables else None
-            if found and found != about.get("units", found):
-                raise InputError(f'{name}: {key}: units = "{found}"; must be "{about["units"]}"')
-        self.sort = self._sort()
-
-    def _sort(self) -> str:
-        if any(name in STATISTICS for name in self.variables):
-            return "statistics"
-        if {"record", "suite"}.isdisjoint(self.attrs):
-            return "sweep"
-        return "suite" if "motion" in self.dims else "record"
-
-    # ------------------------------------------------------------------------ what is meant
-
-    @property
-    def is_newmark(self) -> bool:
-        """Whether it is of Newmark's block."""
-        return bool(self.attrs["model"] == "newmark")
+        there = {*map(str, with_amplitude(data).coords)}
+        block = () if "yield_coefficient" in there else ("theta", "mu_s")
+        for key in (*block, "amplitude", "frequency") if self.sort == "sweep" else ():
+            if key not in there:
+                raise InputError(f"{name}: {key}: not in the result, but charts need it")
 
     @property
     def wide(self) -> list[str]:
         """Axes that a chart can be drawn over: those of a parameter that has more than one value."""
-        known = {*PARAMETERS, *STATISTIC_COORDINATES}
+        known = {*PARAMETERS, *STATISTIC_COORDINATES, "displacement"}
         return [dim for dim in self.dims if self.data.sizes[dim] > 1 and dim in known and dim in self.data.coords]
 
     @property
@@ -111,31 +102,22 @@ class Result:
         """Axes whose values can tell curves or panels apart: also cases and motions, which have no order."""
         return [*self.wide, *(dim for dim in NAMED if dim in self.dims and self.data.sizes[dim] > 1)]
 
-    def require(self, *names: str) -> None:
-        """Refuse a result that lacks a parameter (InputError); Newmark's block needs its yield coefficient alone."""
-        there = {*map(str, with_amplitude(self.data).coords)}
-        if "yield_coefficient" in there:
-            there |= {"theta", "mu_s"}
-        for name in names:
-            if name not in there:
-                raise InputError(f"{self.name}: {name}: not in the result, but this chart needs it")
-
-    def axis(self, name: str) -> str:
-        """`name` if it is an axis with more than one value, or of groups (InputError naming the axes there are)."""
-        if name in self.groups:
-            return name
-        if name in self.dims or name in self.data.coords:
-            raise InputError(f"{self.name}: {name}: has one value; axes with several: {self._axes_text()}")
-        raise InputError(f"{self.name}: {name}: no such axis; {did_you_mean(name, self.wide)}")
-
-    def _axes_text(self) -> str:
-        return ", ".join(self.groups) or "none"
-
     def result(self, name: str) -> str:
         """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
         if name not in self.variables:
             raise InputError(f"{self.name}: {name}: no such variable; {did_you_mean(name, self.variables)}")
         return name
+
+    def quantity(self, name: str) -> str:
+        """`name` if it is a result that contours and curves can show."""
+        if self.result(name) in ("sliding_mode", "validity"):
+            raise InputError(f"{self.name}: --variable {name}: is a code, not a quantity; --kind modes shows the modes")
+        return name
+
+    def compared(self, name: str) -> list[str]:
+        """A result with its flags, and with Newmark's displacement if the file has it."""
+        theirs = "newmark_displacement"
+        return [name, "validity", *([theirs] if name == DISPLACEMENT and theirs in self.variables else [])]
 
     def places(self, at: Mapping[str, At]) -> dict[str, list[Place]]:
         """Where on the axes the values requested are.
@@ -145,8 +127,7 @@ class Result:
         InputError
             As `slipsweep.files.selection.find`, or a value between those of the result where no slice can be solved.
         """
-        there = self.data[[*self.variables, *(name for name in self.data.coords if name in _KEPT)]]
-        found = find(there, at, self.name)
+        found = find(self.data, at, self.name)
         for name, places in found.items():
             for place in places:
                 if place.index is None and (reason := self._unsolvable(name)):
@@ -155,20 +136,12 @@ class Result:
 
     def _unsolvable(self, dim: str) -> str:
         """Why no slice at another value of an axis can be solved; empty where it can."""
-        if self.sort == "statistics":
-            return "statistics are not computed again for a chart"
-        if self.sort in ("record", "suite"):
-            return "the response to recorded motions is not solved anew for a chart"
-        if dim not in PARAMETERS:
-            return "nothing lies between them"
+        if self.sort != "sweep":
+            return "nothing is computed again for a chart of statistics, limits or recorded motions"
         derived = {"amplitude"} if dim in ("displacement_amplitude", "frequency") else set()
-        others = [
-            name for name, one in self.data.coords.items()
-            if name in PARAMETERS and name not in (dim, *derived) and dim in one.dims
-        ]  # fmt: skip
-        return f"{others[0]} is known at those values only" if others else ""
-
-    # --------------------------------------------------------------------------- selection
+        others = [name for name in PARAMETERS if name in self.data.coords and name not in (dim, *derived)]
+        tied = next((name for name in others if dim in self.data[name].dims), None)
+        return f"{tied} is known at those values only" if tied else ""
 
     def select(self, names: Iterable[str], keep: Mapping[str, Kept], at: Mapping[str, At]) -> xr.Dataset:
         """The cells of a slice, read, or solved where they are not in the result.
@@ -176,8 +149,8 @@ class Result:
         Parameters
         ----------
         names : iterable of str
-            Results; the flags are solved for the slice if they are not in the file.
-        keep : mapping of axis to slice, indices or places
+            Results; of a sweep those that are not in the file are solved for the slice.
+        keep : mapping of axis to slice or places
             The axes that stay, and what of them; a result may lack some.
         at : mapping of axis to value
             Where to cut the other axes.  Those not named are cut in the middle, `polarity` at 1.
@@ -188,38 +161,35 @@ class Result:
             With every parameter as a coordinate.  The attribute ``picked`` has the names of the case and motion that
             were selected.
         """
-        where: dict[str, Any] = {}
-        exact: dict[str, Any] = {}
-        cuts = self.places(at)
+        cuts, index, exact, picked = self.places(at), {}, {}, {}
         for dim in self.dims:
-            found: Any = keep[dim] if dim in keep else cuts.get(dim, [self._middle(dim)])
-            if dim not in keep and len(found) > 1:
+            chosen: Any = keep[dim] if dim in keep else cuts.get(dim) or [Place(math.nan, self._middle(dim))]
+            if isinstance(chosen, slice):
+                index[dim] = chosen
+                continue
+            if dim not in keep and len(chosen) > 1:
                 raise InputError(f"{self.name}: {dim} = {at[dim]}: several values are for curves or panels only")
-            if not isinstance(found, slice) and isinstance(found[0], Place):
-                if any(place.index is None for place in found):
-                    values = np.array([place.value for place in found])
-                    exact[dim] = xr.Variable((dim,), values) if dim in keep else xr.Variable((), values[0])
-                found = [place.index or 0 for place in found]
-            where[dim] = found if dim in keep else found[0]
-        wanted = [name for name in names if name in self.variables]
-        picked = {
-            dim: axis_labels(self.data, dim)[where[dim]]
-            for dim in NAMED
-            if dim in where and dim not in keep and axis_labels(self.data, dim)
-        }
-        coords = [name for name in self.data.coords if name in _KEPT or name in self.dims]
-        data = self.data[[*wanted, *coords]].isel(where).load()
-        # coordinates of a statistic that other statistics have
-        data = data.drop_vars([name for name in coords if not {*data[name].dims} <= {*keep}])
-        for dim, values in exact.items():
-            data = data.assign_coords({dim: values.to_base_variable()})
-            data[dim].attrs = dict(PARAMETERS[dim])
+            shape = (len(chosen),) if dim in keep else ()
+            where: Any = np.reshape([place.index or 0 for place in chosen], shape)
+            if any(place.index is None for place in chosen):
+                exact[dim] = (
+                    (dim,) if shape else (),
+                    np.reshape([one.value for one in chosen], shape),
+                    PARAMETERS[dim],
+                )
+            elif not shape and dim in NAMED and axis_labels(self.data, dim):
+                picked[dim] = axis_labels(self.data, dim)[int(where)]
+            index[dim] = where
+        there = [name for name in names if name in self.variables]
+        data = self.data[there].isel(index, missing_dims="ignore").load().assign_coords(exact)
         if exact and "displacement_amplitude" in data.coords:
             data = data.drop_vars("amplitude", errors="ignore")
         data = with_amplitude(data)
-        solved = [name for name in names if exact or name not in self.variables]
+        solved = [name for name in names if exact or name not in there]
+        if solved and self.sort != "sweep":
+            self.result(solved[0])
         if solved:
-            data = data.drop_vars(wanted if exact else []).assign(solve(data, solved).data_vars)
+            data = data.drop_vars(there if exact else []).assign(solve(data, solved).data_vars)
         return data.assign_attrs(picked=picked)
 
     def _middle(self, dim: str) -> int:
@@ -227,25 +197,121 @@ class Result:
             return int(np.argmax(self.data[dim].values))
         return 0 if dim in NAMED else (self.data.sizes[dim] - 1) // 2
 
-    def members(self, dim: str, number: int, at: Mapping[str, At]) -> Kept:
-        """The values that tell curves or panels apart: those requested, or `number` at most from end to end."""
-        return self.places({dim: at[dim]})[dim] if dim in at else spread(self.data.sizes[dim], number)
-
-    def thinned(self, dim: str) -> slice:
-        """A slice of an axis of `MOST_POINTS` values at most."""
+    def spread(self, dim: str, number: int) -> list[Place]:
+        """At most `number` places on an axis, from end to end, in even steps if a few less have them."""
         size = self.data.sizes[dim]
-        return slice(0, size, math.ceil(size / MOST_POINTS))
+        even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
+        number = even[0] if even and size > number else number
+        return [Place(math.nan, int(i)) for i in np.unique(np.linspace(0, size - 1, min(number, size)).round())]
+
+    # ---------------------------------------------------------------------------- layout
+
+    def sheet(
+        self, options: Options, names: Sequence[str], x: str | Sequence[str], *, y: Sequence[str] = (),
+        curves: Sequence[str] | None = None, keep: Mapping[str, Kept] | None = None, same: Sequence[str] = (),
+    ) -> Sheet:  # fmt: skip
+        """The slice of a chart, in panels.
+
+        Parameters
+        ----------
+        options : Options
+        names : sequence of str
+            Results that it needs; the chart can be drawn over the axes of the first.
+        x : str, or sequence of str
+            What it is drawn over; or axes in order of preference, of which the user may choose another.
+        y : sequence of str
+            Of a map, vertical axes in order of preference.
+        curves : sequence of str, optional
+            Axes that tell curves apart, in order of preference, if one is there; without, there is one curve.
+        keep : mapping of axis to slice or places
+            What else stays.
+        same : sequence of str
+            Axes that the results do not vary along in fact: no panels are made of them.
+
+        Raises
+        ------
+        InputError
+            An axis that was chosen is not there, or none is left.
+        """
+        kept: dict[str, Any] = {}
+        at, places = dict(options.at), self.places(options.at)
+        for dim, part in (keep or {}).items():
+            kept[dim] = places.get(dim, part)
+            at.pop(dim, None)
+        along = [str(dim) for dim in self.data[self.result(names[0])].dims]
+        groups = [dim for dim in self.groups if dim in along and dim not in kept]
+        wide = [dim for dim in groups if dim in (*PARAMETERS, "displacement")]
+        several = [dim for dim in groups if len(places.get(dim, ())) > 1 and dim not in options.panels]
+        across: str = x if isinstance(x, str) else self._axis(options, "x", wide, x)
+        if isinstance(x, str) and options.x is not None:
+            raise InputError(f"{self.name}: --x {options.x}: not with this chart, which is drawn over another quantity")
+        rest = [dim for dim in groups if dim != across]
+        up: str | None = None
+        if y:
+            up = self._axis(options, "y", [dim for dim in wide if dim != across], y, f"; --x is {across}")
+            kept[up] = self._thinned(up)
+        elif curves is not None:
+            free = [dim for dim in rest if dim not in (*at, *options.panels)]
+            up = next((dim for dim in (*several, *curves) if dim in (*several, *free) and dim != across), None)
+            if options.y is not None:
+                up = self._axis(options, "y", rest, ())
+            if up:
+                kept[up] = places.get(up) or self.spread(up, _CURVES)
+                at.pop(up, None)
+        elif options.y is not None:
+            raise InputError(f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use --panels")
+        if not (isinstance(x, str) and across in kept):
+            kept[across] = self._thinned(across) if across in self.dims else slice(None)
+        for dim in (across, up or across):
+            if dim in at:
+                raise InputError(f"{self.name}: {dim} = {at[dim]}: is an axis of this chart; it cannot have one value")
+        panels = list(options.panels) or [dim for dim in several if dim not in kept]
+        if options.more_panels and not panels:
+            panels = [dim for dim in groups if dim not in (*kept, *same, *at)]
+        for name in panels[:2]:
+            if name not in groups or name in kept:
+                left = [dim for dim in groups if dim not in kept]
+                raise InputError(f"{self.name}: --panels {name}: must be another axis; {did_you_mean(name, left)}")
+            kept[name] = places.get(name) or self.spread(name, _PANELS)
+            at.pop(name, None)
+        return Sheet(self.select(names, kept, at), across, up, options, *panels[:2])
+
+    def _axis(self, options: Options, option: str, there: list[str], preferred: Sequence[str], more: str = "") -> str:
+        """The axis that an option names, or the first of those preferred, or any that is left for it."""
+        given = options.x if option == "x" else options.y
+        if given is not None:
+            if given not in there:
+                raise InputError(f"{self.name}: --{option} {given}: no such axis; {did_you_mean(given, there)}{more}")
+            return given
+        free = [dim for dim in there if dim not in (*options.panels, *options.at, options.x, options.y)]
+        found = next((dim for dim in (*preferred, *free) if dim in free), None)
+        if found is None:
+            fixed = f"; --at fixes {', '.join(options.at)}" if options.at else ""
+            raise InputError(
+                f"{self.name}: this chart needs another axis with two values or more{more}; "
+                f"there are: {', '.join(there) or 'none'}{fixed}"
+            )
+        return found
+
+    def _thinned(self, dim: str) -> slice:
+        """A slice of an axis of `_POINTS` values at most: more than one for every two dots on paper are lost."""
+        size = self.data.sizes[dim]
+        return slice(0, size, math.ceil(size / _POINTS))
 
 
-def spread(size: int, number: int) -> list[int]:
-    """At most `number` of `size` indices, from end to end, in even steps if a few less have them."""
-    even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
-    number = even[0] if even and size > number else number
-    return sorted({round(i) for i in np.linspace(0, size - 1, min(number, size))})
+def _sort(data: xr.Dataset) -> str:
+    for sort, variable in OTHER_SORTS.items():
+        if variable in data:
+            return sort
+    if any(name in STATISTICS for name in data.data_vars):
+        return "statistics"
+    if not is_recorded(data):
+        return "sweep"
+    return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
 
 
-def check_attributes(attrs: Mapping[str, Any], name: str) -> None:
-    """Refuse a result of a sweep that does not say what was solved (InputError)."""
+def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
+    """Refuse a result that does not say what was solved (InputError)."""
     recorded = not {"record", "suite"}.isdisjoint(attrs)
     options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
     for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
@@ -256,5 +322,5 @@ def check_attributes(attrs: Mapping[str, Any], name: str) -> None:
         if not recorded:
             WAVEFORMS.from_attributes(attrs)
         drawn_text(attrs)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+    except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{name}: attributes do not say what was solved: {error}") from None

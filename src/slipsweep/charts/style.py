@@ -1,9 +1,9 @@
-"""How charts look and what they say: colours, symbols, units, labels, captions, cautions, the same in all of them."""
+"""How charts look and what they say: options, colours, symbols, units, labels, captions, cautions."""
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -14,6 +14,7 @@ from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import (
+    LIMIT_RESULTS,
     PARAMETERS,
     RECORD_RESULTS,
     RESULTS,
@@ -23,6 +24,14 @@ from slipsweep.model.variables import (
     Validity,
 )
 from slipsweep.motion.waveforms import WAVEFORMS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from slipsweep.files.selection import At
+
+#: Attributes of all results that charts show, by name.
+SHOWN = LIMIT_RESULTS | RECORD_RESULTS | RESULTS | STATISTICS
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -60,14 +69,12 @@ MODE_TEXT = {
     SlidingMode.CONTINUOUS: "continuous",
 }
 
-#: Flags of values that are unreliable: left out unless requested.
-LEFT_OUT = Validity.NOT_RECOUPLED | Validity.UPSLOPE
-
-#: What captions say of them.
+#: Flags of values that are unreliable, left out unless requested, and what captions say of them.
 LEFT_OUT_TEXT = {
     Validity.NOT_RECOUPLED: "not_recoupled (does not come to rest within the cycle)",
     Validity.UPSLOPE: "upslope (ends above where it began)",
 }
+LEFT_OUT = Validity(sum(LEFT_OUT_TEXT))
 
 #: Other words of legends.
 NEWMARK, NO_SLIDING = "Newmark's block", MODE_TEXT[SlidingMode.STUCK]
@@ -85,34 +92,61 @@ _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
 _WIDE = 5.0
 
 
-@dataclass(frozen=True)
-class Look:
-    """What a reader may choose about all charts.
+@dataclass
+class Options:
+    """What a user chooses about a chart: the parameters of `SlipsweepAccessor.chart`, checked.
 
     Attributes
     ----------
-    units : {"m/s2", "g"}
-        Unit of accelerations on the main axis and in the caption.
-    show_cautions : bool
-        Draw values whose flags say that they are unreliable; otherwise they are left out.
-    levels : tuple of float
-        Contours, in the result's own unit; by default round values among the results.
-    width : float, optional
-        Width of the figure, inches.
-    grey : bool
-        Without colour.
+    heights : list of float
+        The levels as numbers in the variable's own unit, in order.
+    more_panels : bool
+        Panels lie along axes that would have one value otherwise.
+
+    Raises
+    ------
+    InputError
+        A level is no number with a unit of the variable, or not above zero; no figure can be so wide; there are more
+        than two axes of panels.
     """
 
+    x: str | None = None
+    y: str | None = None
+    at: "Mapping[str, At]" = field(default_factory=dict)
+    panels: Sequence[str] = ()
+    variable: str = "permanent_displacement"
+    levels: Sequence[float | str] = ()
     units: Literal["m/s2", "g"] = "m/s2"
     show_cautions: bool = False
-    levels: tuple[float, ...] = ()
-    width: float | None = None
+    width: float | str | None = None
     grey: bool = False
+    ax: "Axes | None" = None
+    heights: list[float] = field(init=False)
+    more_panels: bool = False
+
+    def __post_init__(self) -> None:
+        own = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
+        found = {quantity("levels", one, own, 1.0) if isinstance(one, str) else float(one) for one in self.levels}
+        for level in found:
+            if not 0 < level < float("inf"):
+                raise InputError(f"levels: {level:g}: must be > 0")
+        self.heights = sorted(found)
+        if len(self.panels) > 2:
+            raise InputError(f"--panels {','.join(self.panels)}: must be one axis or two")
+        if self.inches is not None and not 50.0 <= self.inches * 25.4 <= 1000.0:
+            raise InputError(f"width = {self.width}: must be 50 to 1000 mm, as in 90mm")
+
+    @property
+    def inches(self) -> float | None:
+        """Width of the figure; None for the usual one."""
+        if isinstance(self.width, str):
+            return quantity("width", self.width, "m", 1.0) / 0.0254
+        return None if self.width is None else self.width / 25.4
 
     @property
     def font(self) -> float:
         """Size of text, points."""
-        return 10.0 if self.width is None or self.width >= _WIDE else 7.0
+        return 10.0 if self.inches is None or self.inches >= _WIDE else 7.0
 
     def scale(self, name: str, g: float) -> float:
         """What to multiply a parameter by to draw it."""
@@ -121,16 +155,6 @@ class Look:
     def unit(self, name: str) -> str:
         """The unit that a parameter or result is drawn in, as people write it."""
         return "g" if self.units == "g" and is_acceleration(name) else unit(name)
-
-
-def figure_width(width: float | str | None) -> float | None:
-    """Width of a figure in inches, from mm or a text with a unit (InputError if no figure can be so wide)."""
-    if width is None:
-        return None
-    millimetres = 1000.0 * quantity("width", width, "m", 1.0) if isinstance(width, str) else width
-    if not 50.0 <= millimetres <= 1000.0:
-        raise InputError(f"width = {width}: must be 50 to 1000 mm, as in 90mm")
-    return millimetres / 25.4
 
 
 def ratio_colours(number: int) -> ListedColormap:
@@ -168,7 +192,7 @@ def is_acceleration(name: str) -> bool:
 
 def about(name: str) -> dict[str, Any]:
     """Long name and unit of a parameter, result or tolerable displacement."""
-    return (PARAMETERS | RECORD_RESULTS | RESULTS | STATISTICS | {"displacement": TOLERABLE_DISPLACEMENT})[name]
+    return (SHOWN | PARAMETERS | {"displacement": TOLERABLE_DISPLACEMENT})[name]
 
 
 def unit(name: str) -> str:
@@ -181,20 +205,18 @@ def unit_text(units: str) -> str:
     return _UNITS.get(units, units)
 
 
-def axis_label(name: str, look: Look | None = None) -> str:
+def axis_label(name: str, options: Options) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
     text = about(name)["long_name"]
     if SYMBOLS[name] != name.replace("_", " "):
         text = f"{text.split(',')[0].split(' that ')[0]} {SYMBOLS[name]}"
-    units = (look or Look()).unit(name)
+    units = options.unit(name)
     return f"{text} ({units})" if units else text
 
 
-def value_text(name: str, value: float, units: str | None = None) -> str:
-    """A parameter's value with symbol and unit: ``θ = 5°``."""
-    units = unit(name) if units is None else units
-    space = "" if units in ("", "°") else " "
-    return f"{SYMBOLS[name]} = {value:.4g}{space}{units}"
+def with_unit(text: str, units: str) -> str:
+    """A number and its unit: ``5°``, ``3 Hz``."""
+    return f"{text}{units}" if units in ("", "°") else f"{text} {units}"
 
 
 def length_text(metres: float) -> str:
@@ -202,9 +224,19 @@ def length_text(metres: float) -> str:
     return f"{metres * 1000:.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
 
 
-def plain(text: str) -> str:
+def value_text(data: xr.Dataset, name: str, value: float, options: Options) -> str:
+    """A parameter's value with symbol and unit: ``θ = 5°``."""
+    if name == "threshold":
+        return f"d = {length_text(value)}"
+    if name not in SYMBOLS:
+        return f"{value:g}"
+    number = f"{value * options.scale(name, float(data.attrs['g'])):.4g}"
+    return f"{SYMBOLS[name]} = {with_unit(number, options.unit(name))}"
+
+
+def plain(text: Any) -> str:
     """A name that users give, as matplotlib draws it as it stands: a ``$`` begins no formula."""
-    return text.replace("$", r"\$")
+    return str(text).replace("$", r"\$")
 
 
 def flag_name(flag: int) -> str:
@@ -215,15 +247,12 @@ def flag_name(flag: int) -> str:
 # --------------------------------------------------------------------------------- captions
 
 
-def caption(data: xr.Dataset, look: Look | None = None) -> str:
-    """The parameters that have one value, the model and the shaking, on two lines."""
-    look = look or Look()
+def caption(data: xr.Dataset, options: Options | None = None) -> str:
+    """The parameters that have one value, the distributions of uncertain ones, the model and the shaking, in lines."""
     single = [name for name in SYMBOLS if name in data.coords and data[name].size == 1]
-    g = float(data.attrs["g"])
-    parts = [value_text(name, data[name].item() * look.scale(name, g), look.unit(name)) for name in single]
+    values = ", ".join(value_text(data, name, data[name].item(), options or Options()) for name in single)
     drawn = drawn_text(data.attrs)
-    uncertain = [f"uncertain: {drawn}"] if drawn else []
-    return "\n".join([", ".join(parts), *uncertain, model_text(data.attrs)]).strip()
+    return "\n".join([values, *([f"uncertain: {drawn}"] if drawn else []), model_text(data.attrs)]).strip()
 
 
 #: Models and their options in captions.
@@ -246,50 +275,38 @@ def model_text(attributes: Mapping[Any, Any]) -> str:
     model = MODELS.from_attributes(attributes)
     words = [_WORDS[model.name], *(_WORDS[value] for value in model.options.values() if value in _WORDS)]
     recorded = next((name for name in ("record", "suite") if name in attributes), None)
-    shaking = f"{recorded} {plain(str(attributes[recorded]))}" if recorded else WAVEFORMS.from_attributes(attributes)
-    inputs = [plain(str(attributes["friction_inputs"]))] if "friction_inputs" in attributes else []
+    shaking = f"{recorded} {plain(attributes[recorded])}" if recorded else WAVEFORMS.from_attributes(attributes)
+    inputs = [plain(attributes["friction_inputs"])] if "friction_inputs" in attributes else []
     return "\n".join([*inputs, f"{', '.join(words)}; {shaking}"])
 
 
 def drawn_text(attributes: Mapping[Any, Any]) -> str:
-    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``; empty if none.
-
-    Raises
-    ------
-    InputError
-        The attributes are not those that slipsweep writes.
-    """
+    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``; empty if none."""
     if "uncertain" not in attributes:
         return ""
     signs = {"absolute": "~", "factor": "×", "offset": "+"}
     texts = []
-    try:
-        for name, given in json.loads(attributes["uncertain"]).items():
-            numbers = ", ".join(f"{key}={value}" for key, value in given.items() if key not in ("distribution", "kind"))
-            texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
-    except (ValueError, TypeError, LookupError, AttributeError):
-        raise InputError(
-            f"attribute uncertain = {attributes['uncertain']!r}: names no distributions of inputs"
-        ) from None
-    pooled = f"{plain(str(attributes['pooled']))} x " if "pooled" in attributes else ""
+    for name, given in json.loads(attributes["uncertain"]).items():
+        numbers = ", ".join(f"{key}={value}" for key, value in given.items() if key not in ("distribution", "kind"))
+        texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
+    pooled = f"{plain(attributes['pooled'])} x " if "pooled" in attributes else ""
     return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"
 
 
-def left_out_text(raised: Iterable[Validity], look: Look, of_displacement: bool) -> list[str]:
+def left_out_text(raised: Iterable[Validity], show_cautions: bool, of_displacement: bool) -> list[str]:
     """Which unreliable values are left out, and which are drawn on request.
 
     No logarithmic scale shows what is below zero: displacements upslope are left out in any case.
     """
-    flags = list(raised)
-    below_zero = Validity.UPSLOPE if of_displacement else Validity(0)
-    left_out = [flag for flag in flags if not look.show_cautions or flag in below_zero]
-    heading = "Left out, below zero on a logarithmic scale" if look.show_cautions else "Left out"
-    found = ((heading, left_out), ("Drawn on request", [flag for flag in flags if flag not in left_out]))
-    return [
-        f"{text}: values flagged {' or '.join(LEFT_OUT_TEXT[flag] for flag in group)}."
-        for text, group in found
-        if group
-    ]
+    always = Validity.UPSLOPE if of_displacement else Validity(0)
+    groups: dict[str, list[str]] = {}
+    for flag in raised:
+        if show_cautions and flag not in always:
+            heading = "Drawn on request"
+        else:
+            heading = "Left out, below zero on a logarithmic scale" if show_cautions else "Left out"
+        groups.setdefault(heading, []).append(LEFT_OUT_TEXT[flag])
+    return [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
 
 
 def ratio_text(ratio: np.ndarray) -> list[str]:
@@ -304,13 +321,13 @@ def ratio_text(ratio: np.ndarray) -> list[str]:
     ]
 
 
-def unsound_text(falls: int, below: int, either: int, total: int, what: str) -> list[str]:
+def unsound_text(marked: str, falls: int, below: int, either: int, total: int) -> list[str]:
     """What share of a picture no block would show: a sentence, or none."""
     if not either or not total:
         return []
     parts = [("falls with A", falls), ("lies below half of Newmark's", below)]
     shares = [f"{text} in {100 * count / total:.2g} %" for text, count in parts if count]
     return [
-        f"{what}: {100 * either / total:.2g} % of the sliding cells shown. The displacement {' and '.join(shares)}, "
+        f"{marked}: {100 * either / total:.2g} % of the sliding cells shown. The displacement {' and '.join(shares)}, "
         "a trend of the model that no block has."
     ]

@@ -101,9 +101,9 @@ def friction(
     )
 
     def figure() -> "Figure":
-        from slipsweep.charts import calibration_figures
+        from slipsweep.charts.kinds import figure_of
 
-        return calibration_figures.friction(table)
+        return figure_of(table)
 
     write_outputs(paths, overwrite, figure, {".nc": netcdf_writer(table, table.attrs["title"])})
     if quiet:
@@ -168,9 +168,9 @@ def calibrate(
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
 
     def figure() -> "Figure":
-        from slipsweep.charts import calibration_figures
+        from slipsweep.charts.kinds import figure_of
 
-        return calibration_figures.calibration(table)
+        return figure_of(table)
 
     writers = {
         ".nc": netcdf_writer(table, table.attrs["title"]),

@@ -1,7 +1,6 @@
 """`slipsweep chart` and `slipsweep report`: design charts of a result."""
 
 import functools
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -72,31 +71,30 @@ def chart(
 
     from slipsweep.charts import book, kinds
     from slipsweep.charts.slices import Result
+    from slipsweep.charts.style import Options
     from slipsweep.files import outputs
     from slipsweep.files.opening import read_result
 
     requested = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
     if levels is not None and requested and {"contours", "fragility"}.isdisjoint(requested):
         raise InputError(f"--levels {levels}: only with --kind contours or fragility")
+    across, heights = (text.split(",") if text else () for text in (panels, levels))
+    options = Options(x, y, cuts(at), across, variable, heights, units, show_cautions, width, grey)
     with read_result(file) as data:
-        result = kinds.drawable(data, file)
-        chosen_levels = levels.split(",") if levels else ()
-        look = kinds.look_of(result, variable, chosen_levels, units, show_cautions, width, grey)
-        request = kinds.Request(x, y, cuts(at), variable, panels.split(",") if panels else (), look=look)
-        chosen = requested or list(kinds.fitting(result, request))
+        result = Result(data, file)
+        chosen = requested or kinds.fitting(result, options)
         together = bool(given) and len(chosen) > 1
         for path in given:
             if together and path.suffix != ".pdf":
                 raise InputError(f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several")
         wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in chosen}
         outputs.check_outputs(given or [wanted[name][0] for name in chosen], overwrite, reads=[file])
-        request = replace(request, more_panels=together)
-        figures, left_out = kinds.draw_all(result, chosen, request, strict=bool(requested))
-        if together and isinstance(result, Result):  # what is drawn whole has one chart, hence no book
-            for path in given:
-                with outputs.complete_or_absent(path, overwrite) as temporary:
-                    book.write(temporary, result, figures.values())
-                typer.echo(path)
+        options.more_panels = together
+        figures, left_out = kinds.draw_all(result, chosen, options, strict=bool(requested))
+        for path in given if together else ():
+            with outputs.complete_or_absent(path, overwrite) as temporary:
+                book.write(temporary, result, figures.values())
+            typer.echo(path)
     for name in () if together else figures:
         write_outputs(wanted[name], overwrite, functools.partial(figures.__getitem__, name))
         for path in wanted[name]:

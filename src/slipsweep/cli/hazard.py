@@ -73,12 +73,12 @@ def hazard(
     rates = displacement_hazard(result, given, lengths)
 
     def figure() -> "Figure":
-        from slipsweep.charts import hazard_figures
+        from slipsweep.charts.kinds import figure_of
+        from slipsweep.charts.limits import drawn_thresholds
 
-        # of uncertain inputs through the displacements that the result has
-        stored = "exceedance_probability" in result
-        drawn = None if stored else hazard_figures.drawn_thresholds(result, rates["threshold"].values)
-        return hazard_figures.hazard_chart(displacement_hazard(result, given, drawn), marked=rates["threshold"].values)
+        marked = rates["threshold"].values
+        drawn = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
+        return figure_of(displacement_hazard(result, given, drawn).assign_attrs(marked=marked))
 
     write_outputs(paths, overwrite, figure, {".xml": lambda path: write_fragility(result, path, lengths)})
     if not quiet:

@@ -101,9 +101,9 @@ def limit(
             table = job.plan.solve(progress)
 
     def figure() -> "Figure":
-        from slipsweep.charts.limit_figures import limit_chart
+        from slipsweep.charts.kinds import figure_of
 
-        return limit_chart(table.assign_coords(label=("case", list(job.labels))) if job.labels else table)
+        return figure_of(table.assign_coords(label=("case", list(job.labels))) if job.labels else table)
 
     write_outputs(figures, overwrite, figure)
     if not quiet:

@@ -132,9 +132,9 @@ def simulate(
         raise RunError(f"the model gives no value: {why} ({taken_as(given, model.g)})")
 
     def figure() -> "Figure":
-        from slipsweep.charts.history_figures import history
+        from slipsweep.charts.kinds import figure_of
 
-        return history(table)
+        return figure_of(table)
 
     recorded = None if isinstance(motion, Waveform) else motion
     as_netcdf = netcdf_writer(table, "Time history of a sliding block", recorded)

@@ -1,7 +1,7 @@
-"""What is solved for a chart, on the cells of its slice, by the public functions.
+"""What charts compute on the cells of their slice, by the public functions.
 
-The accelerations of yield and of the mode limit, results on the limit itself, Newmark's block, the results of
-other options of the model, and where the displacement has a trend that no block has.
+The accelerations of yield and of the mode limit, Newmark's block, the results of other options of the model, and where
+the displacement has a trend that no block has.
 """
 
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
-from slipsweep.model.variables import PARAMETERS, WAVEFORM_INPUTS
+from slipsweep.model.variables import PARAMETERS, STRENGTHS, WAVEFORM_INPUTS
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
 
@@ -29,9 +29,18 @@ DISPLACEMENT = "permanent_displacement"
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 _FRICTION = ("decay_rate", "delta_mu", "minimum_friction")
 
-#: How much smaller the amplitude is at which it is asked whether the displacement falls with it, and what of a
-#: displacement is rounding.
+#: The amplitude, over that of a cell, from which the displacement should not fall; what of a displacement is rounding.
 _SMALLER, _ROUNDING = 0.99, 1e-9
+
+
+def is_recorded(data: xr.Dataset) -> bool:
+    """Whether a result is of recorded motions, for which nothing is solved again."""
+    return not {"record", "suite"}.isdisjoint(data.attrs)
+
+
+def is_newmark(data: xr.Dataset) -> bool:
+    """Whether a result is of Newmark's block."""
+    return bool(data.attrs["model"] == "newmark")
 
 
 def solve(data: xr.Dataset, names: Iterable[str], model: Model | None = None, **changed: Any) -> xr.Dataset:
@@ -81,20 +90,13 @@ def with_amplitude(data: xr.Dataset) -> xr.Dataset:
 
 
 def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
-    """Yield acceleration and, but for Newmark's block, limiting acceleration (Eq. 7) of a slice, m/s².
+    """Accelerations of yield and of the mode limit (Eq. 7) of a slice, m/s², along the dimensions they depend on.
 
-    Parameters
-    ----------
-    data : Dataset
-    always : bool
-        Return both for Newmark's block, too.
-
-    Returns
-    -------
-    Dataset
-        ``yield_line`` and ``limit_line`` along those dimensions of the slice that they depend on;
-        NaN where the block slides under its own weight.
+    ``yield_line`` and, but for Newmark's block where not `always`, ``limit_line``; NaN where the block slides under
+    its own weight.  None for a record: each of its pulses has its own peak.
     """
+    if is_recorded(data) and "half_wave_peak" not in data:
+        return xr.Dataset()
     g = float(data.attrs["g"])
     if "yield_coefficient" in data.coords:
         return xr.Dataset({"yield_line": data["yield_coefficient"].reset_coords(drop=True) * g})
@@ -103,58 +105,48 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     found = friction_parameters(amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given)
     onset = found["yield_acceleration"].reset_coords(drop=True)
     lines = {"yield_line": onset.where(onset > 0)}
-    if always or data.attrs["model"] != "newmark":
+    if always or not is_newmark(data):
         lines["limit_line"] = found["limiting_acceleration"].where(found["validity"] == 0).reset_coords(drop=True)
     return xr.Dataset(lines)
 
 
-def newmark(data: xr.Dataset, **changed: Any) -> xr.DataArray:
-    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved."""
-    if data.attrs["model"] == "newmark" and not changed:
-        return data[DISPLACEMENT]
-    if "newmark_displacement" in data and not changed:
-        return data["newmark_displacement"]
-    return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])), **changed)[DISPLACEMENT]
+def newmark(data: xr.Dataset) -> xr.DataArray | None:
+    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved; None of records."""
+    if "newmark_displacement" in data or is_recorded(data):
+        return data.get("newmark_displacement")
+    return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])))[DISPLACEMENT]
 
 
 def sides_of(limit: xr.DataArray) -> dict[str, Any]:
     """The amplitude on the mode limit, where the block still sticks and slips, and the next number above it.
 
-    What to give to `solve` or `newmark` for the results on either side, along a dimension ``side``.
+    What to give to `solve` for the results on either side, along a dimension ``side``.
     """
     there = np.where(np.isfinite(limit.values), limit.values, 1.0)
     both = np.stack([there, np.nextafter(there, np.inf)], axis=-1)
     return {"amplitude": xr.DataArray(both, dims=(*limit.dims, SIDE)), "displacement_amplitude": None}
 
 
-def unsound(data: xr.Dataset, theirs: xr.DataArray) -> xr.Dataset:
-    """Where the displacement has a trend that no block has.
-
-    Parameters
-    ----------
-    data : Dataset
-        A slice of a sweep with the permanent displacement.
-    theirs : DataArray
-        Displacement of Newmark's block on its cells.
+def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray]:
+    """Where the displacement of a slice has a trend that no block has.
 
     Returns
     -------
-    Dataset
-        ``falls``: it is smaller than at an amplitude that is 1 % smaller; ``below``: it is less than half of Newmark's.
+    DataArray of bool
+        Where it is smaller than at an amplitude that is 1 % smaller; of recorded motions than at the next smaller
+        amplitude of the slice.
+    DataArray of bool
+        Where it is less than half of that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
-    if data.attrs["model"] == "newmark":
-        nowhere = xr.zeros_like(ours, bool)
-        return xr.Dataset({"falls": nowhere, "below": nowhere})
-    drive = next(name for name in reversed(DRIVES) if name in data.coords)
-    before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * _SMALLER)})[DISPLACEMENT]
-    if drive in before.dims:
-        before = before.assign_coords({drive: ours[drive]})
-    before = before.reset_coords(drop=True)
-    return xr.Dataset({
-        "falls": (ours < before * (1 - _ROUNDING)) & (ours > 0),
-        "below": (ours < 0.5 * theirs) & (ours > 0),
-    })  # fmt: skip
+    drive = next((name for name in ("displacement_amplitude", *STRENGTHS) if name in data.coords), "")
+    if is_recorded(data):
+        before = ours.shift({drive: 1}) if drive in ours.dims else ours
+    else:
+        before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * _SMALLER)})[DISPLACEMENT]
+        before = before.assign_coords({drive: ours[drive]} if drive in before.dims else {}).reset_coords(drop=True)
+    below = xr.zeros_like(ours, bool) if theirs is None else ours < 0.5 * theirs
+    return (ours < before * (1 - _ROUNDING)) & (ours > 0), below & (ours > 0)
 
 
 def alternatives(data: xr.Dataset) -> dict[str, tuple[Model, dict[str, Any]]]:

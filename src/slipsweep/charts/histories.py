@@ -1,0 +1,208 @@
+"""Figures over time: the history of a block, measured friction, measured against computed motion."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from slipsweep.charts import style
+from slipsweep.charts.sheet import Drawing
+from slipsweep.charts.slices import Result
+from slipsweep.charts.solved import thresholds
+from slipsweep.charts.style import BLUE, VERMILION, Options
+from slipsweep.model.variables import SlidingMode
+
+#: How the half waves of a record are drawn: told apart in grey, too.
+_MODES: dict[SlidingMode, dict[str, Any]] = {
+    SlidingMode.STUCK: {"facecolor": "white", "edgecolor": "0.6", "linewidth": 0.5},
+    SlidingMode.STICK_SLIP: {"facecolor": "#BBD7EA", "edgecolor": BLUE, "linewidth": 0.5},
+    SlidingMode.CONTINUOUS: {"facecolor": VERMILION, "edgecolor": "black", "linewidth": 0.5, "hatch": "/////"},
+}
+
+#: What legends above a panel have in common.
+_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False}
+
+_GREY = "0.45"
+
+#: Of each channel of the block: label, factor to the unit drawn, and this unit.
+_CHANNELS = {
+    "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "m/s²"),
+    "relative_velocity": ("relative\nvelocity (m/s)", 1.0, "m/s"),
+    "relative_displacement": ("relative\ndisplacement (mm)", 1000.0, "mm"),
+}
+
+
+def _finish(drawing: Drawing, panels: Iterable[Axes], texts: list[str]) -> Figure:
+    """A line at zero and a grid in the panels, and a style.caption."""
+    for panel in panels:
+        panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+        panel.margins(x=0)
+        panel.grid(color="0.9")
+    drawing.figure.align_ylabels()
+    return drawing.finish(texts)
+
+
+# ------------------------------------------------------------------------- of `simulate`
+
+
+def history(result: Result, options: Options) -> Figure:
+    """A time history in the manner of the paper's Figs. 5, 8 and 9.
+
+    Panels over time: accelerations of base and block, friction coefficient, relative velocity, relative displacement.
+    Under a record a row of boxes on top has the sliding mode of each positive half wave, and lines show the
+    accelerations of yield and of the mode limit.
+    """
+    data = result.data
+    modes, friction = "half_wave_mode" in data, "friction_coefficient" in data
+    heights = [*([0.22] if modes else []), *([1.0] * (3 + friction))]
+    size, ratios = (7.0, 7.0 + 0.5 * modes), {"height_ratios": heights}
+    drawing = Drawing(options, len(heights), 1, size, sharey=False, gridspec_kw=ratios)
+    panels = list(drawing.grid.ravel()[modes:])
+    accelerations, *_, velocity, displacement = panels
+    time = data["time"].values
+    accelerations.plot(time, data["ground_acceleration"].values, color=BLUE, label="base")
+    accelerations.plot(time, data["block_acceleration"].values, color=VERMILION, linestyle="--", label="block")
+    if modes:
+        _draw_modes(drawing.grid[0, 0], data)
+        _draw_thresholds(accelerations, data)
+    accelerations.legend(ncols=4, fontsize="small", **_ABOVE)
+    accelerations.set_ylabel("acceleration\n(m/s²)")
+    if friction:
+        panels[1].plot(time, data["friction_coefficient"].values, color=VERMILION)
+        panels[1].set_ylabel("friction\ncoefficient")
+    velocity.plot(time, data["relative_velocity"].values, color=VERMILION)
+    velocity.set_ylabel("relative\nvelocity (m/s)")
+    metres = bool((np.abs(data["relative_displacement"]) >= 1.0).any())
+    displacement.plot(time, data["relative_displacement"].values * (1 if metres else 1000), color=VERMILION)
+    displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
+    displacement.set_xlabel("time (s)")
+    return _finish(drawing, panels, [style.caption(data, options)])
+
+
+def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
+    """A box for each positive half wave of the record, by the sliding mode that its peak decides."""
+    start, end, mode = (data[f"half_wave_{name}"].values for name in ("start", "end", "mode"))
+    entries = []
+    for one, look in _MODES.items():
+        which = mode == one
+        if which.any():
+            spans = list(zip(start[which], (end - start)[which], strict=True))
+            panel.broken_barh(spans, (0.0, 1.0), gid=one.name.lower(), **look)
+        entries.append(Patch(label=f"{style.MODE_TEXT[one]} ({np.count_nonzero(which)})", **look))
+    panel.set_ylim(0.0, 1.0)
+    panel.set_yticks([])
+    panel.tick_params(axis="x", bottom=False)
+    panel.set_ylabel("half\nwaves", rotation=0, ha="right", va="center", fontsize="small")
+    panel.legend(handles=entries, ncols=3, fontsize="small", **_ABOVE)
+    panel.margins(x=0)
+
+
+def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
+    """Lines of the accelerations of yield and, but for Newmark's block, of the mode limit."""
+    highest = data["half_wave_peak"].values.max(initial=0.0)
+    for name, value in thresholds(data).items():
+        if np.isfinite(value) and value <= 1.5 * highest:
+            text, look = style.LINES[str(name)]
+            panel.axhline(value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5})
+
+
+# ------------------------------------------------------------- of tests on a shaking table
+
+
+def friction(result: Result, options: Options) -> Figure:
+    """Measured friction in the manner of the paper's Fig. 7, with the friction by statics.
+
+    Panels over time: accelerations of table and block; friction by Eq. 1 and by statics.  Slides are shaded, from
+    onset to stop.
+    """
+    table = result.data
+    drawing = Drawing(options, 2, 1, (7.0, 4.8), sharey=False)
+    accelerations, coefficient = drawing.grid.ravel()
+    time = table["time"].values
+    accelerations.plot(time, table["ground_acceleration"].values, color=BLUE, label="table")
+    accelerations.plot(time, table["block_acceleration"].values, color=VERMILION, linewidth=1.0, label="block")
+    accelerations.set_ylabel("acceleration\n(m/s²)")
+    accelerations.legend(ncols=2, **_ABOVE)
+    _friction_lines(table, coefficient)
+    coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
+    coefficient.legend(ncols=3, **_ABOVE)
+    coefficient.set_xlabel("time (s)")
+    stops = np.where(np.isnan(table["slide_stop"].values), time[-1], table["slide_stop"].values)
+    for panel in (accelerations, coefficient):
+        for onset, stop in zip(table["slide_onset"].values, stops, strict=True):
+            panel.axvspan(onset, stop, color="0.92", zorder=0)
+    shaded = f"shaded: slides, relative acceleration beyond {table.attrs['threshold']:.3g} m/s²"
+    texts = [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"]
+    return _finish(drawing, [accelerations, coefficient], texts)
+
+
+def calibration(result: Result, options: Options) -> Figure:
+    """Measured against computed motion in the manner of the paper's Figs. 8 and 9.
+
+    Panels over time, a column for each test: the table's acceleration, each channel of the block, measured or not,
+    with its misfit, and the friction by Eq. 1 and by statics; parameters with their intervals in a style.caption.
+    """
+    table = result.data
+    tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
+    rows = 5 if "free_body_friction" in table else 4
+    size = (7.0 if len(tests) == 1 else 5.0 * len(tests), 9.0)
+    drawing = Drawing(options, rows, len(tests), size, sharey=False)
+    for test, panels in zip(tests, drawing.grid.T, strict=True):
+        shown = test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values})
+        _draw_test(shown, list(panels))
+    for panel in drawing.grid[:, 1:].ravel():
+        panel.set_ylabel("")
+    return _finish(drawing, drawing.grid.ravel(), [table.attrs["constant_friction"], _parameters(table)])
+
+
+def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
+    """One test of a calibration."""
+    time, ground = table["time"].values, panels[0]
+    measured: dict[str, Any] = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
+    ground.plot(time, table["measured_ground_acceleration"].values, **measured)
+    ground.plot(time, table["computed_ground_acceleration"].values, color=BLUE, label="smooth")
+    ground.set_ylabel("acceleration of\nthe table (m/s²)")
+    ground.legend(ncols=2, **_ABOVE)
+    for panel, (name, (label, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
+        text = "not measured"
+        if f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull()):
+            panel.plot(time, factor * table[f"measured_{name}"].values, **measured)
+            misfit, share = factor * table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
+            text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
+        panel.plot(time, factor * table[f"computed_{name}"].values, color=VERMILION, linewidth=1.2, label="computed")
+        panel.set_ylabel(label)
+        panel.set_title(text, fontsize="small", loc="left")
+    panels[1].legend(ncols=2, **_ABOVE)
+    if len(panels) > 4:
+        _friction_lines(table, panels[4])
+        panels[4].legend(ncols=2, **_ABOVE)
+    panels[-1].set_xlabel("time (s)")
+
+
+def _friction_lines(table: xr.Dataset, panel: Axes) -> None:
+    """Friction by Eq. 1 and by statics; told apart in grey by their widths and dashes."""
+    time = table["time"].values
+    panel.plot(time, table["free_body_friction"].values, color=BLUE, linewidth=1.6, label="by statics")
+    eq1 = table["friction_coefficient"].values
+    panel.plot(time, eq1, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 1.5)), label="μ(t) by Eq. 1")
+    panel.set_ylabel("friction\ncoefficient")
+
+
+def _given(table: xr.Dataset) -> str:
+    return f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}"
+
+
+def _parameters(table: xr.Dataset) -> str:
+    """The parameters with their 95 % intervals."""
+    parts = []
+    for name, unit in (("yield_acceleration", "m/s²"), ("decay_rate", ""), ("delta_mu", "")):
+        low, high = table[f"{name}_interval"].values
+        ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
+        known = bool(table[f"{name}_error"].notnull())
+        value = f"= {style.with_unit(f'{table[name].item():.4g}', unit)} ({ends})"
+        parts.append(f"{style.SYMBOLS[name]} {value if known else f'not determined ({style.with_unit(ends, unit)})'}")
+    return f"{', '.join(parts)}; 95 % intervals\n{_given(table)}"

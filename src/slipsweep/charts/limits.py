@@ -1,0 +1,173 @@
+"""Charts of what a tolerable displacement allows: limit amplitudes, and mean annual rates of exceedance."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, over, plot_curve
+from slipsweep.charts.slices import NAMED, Result
+from slipsweep.charts.style import SYMBOLS, Options, model_text, plain
+from slipsweep.charts.suites import draw_suite, kept_motions, suite_text
+from slipsweep.errors import InputError
+from slipsweep.files.selection import axis_labels
+from slipsweep.model.variables import LimitStatus
+from slipsweep.studies.suite_statistics import QUANTILES, SUITE, limit_quantiles, point_names
+
+#: What is drawn along the abscissa, and as curves, in order of preference.
+_ABSCISSAE = ("frequency", "mu_s", "theta", "displacement")
+_CURVES = ("theta", "displacement", "mu_s", "case")
+
+Floats = NDArray[np.float64]
+
+#: Most grid points of annual rates, a curve each; most displacements that are marked, and those of a smooth curve.
+_MOST_CURVES, _MOST_MARKS, _POINTS = 8, 20, 121
+
+
+# --------------------------------------------------------------------- of `limit_amplitude`
+
+
+def limit(result: Result, options: Options) -> Figure:
+    """Limit amplitudes, in g, over one axis: a curve for each value of another, or a thin line for each motion.
+
+    Curves end where no limit exists; circles mark limits set by a discontinuity of the model.  Of a suite with the
+    median and the 16 to 84 % band; where nothing but the motion varies, the motions lie along the abscissa.
+    """
+    suite = kept_motions(result) if "motion" in result.dims else {}
+    along = "motion" if suite and not {*result.wide} - {*SUITE, *options.at} else _ABSCISSAE
+    curves = None if suite else _CURVES
+    sheet = result.sheet(
+        replace(options, more_panels=True), ["limit_amplitude", "limit_status"], along, curves=curves, keep=suite
+    )
+    for panel in sheet.panels:
+        panel.axes.grid(color="0.9", which="both")
+        panel.axes.set_ylabel("limit amplitude A / g")
+        if suite:
+            _draw_motions(sheet, panel)
+        else:
+            _draw_curves(sheet, panel)
+    if sheet.x in NAMED:
+        for panel in sheet.panels:
+            names = [plain(name) for name in axis_labels(sheet.data, sheet.x)]
+            panel.axes.set_xticks(panel.values(sheet.x), names, rotation=40, ha="right")
+            panel.axes.set_xlabel(sheet.x)
+    else:
+        sheet.set_axis("x", sheet.x)
+    # one scale for all, from zero; only now, for it ends the autoscaling
+    sheet.panels[0].axes.set_ylim(bottom=0.0)
+    if not np.isfinite(sheet.data["limit_amplitude"]).any():
+        sheet.notes.append("No limits to draw: limit_status has the reasons.")
+    if suite:
+        sheet.notes.append(_suite_text(sheet.data))
+    drawn = sheet.data["limit_amplitude"].sizes
+    shown = {str(dim): (n, result.data.sizes[dim]) for dim, n in drawn.items()}
+    thinned = [f"{n} of {size} {SYMBOLS.get(dim, dim)}" for dim, (n, size) in shown.items() if n < size]
+    if thinned:
+        sheet.notes.append(f"Shown: {', '.join(thinned)}.")
+    return sheet.done()
+
+
+def _draw_curves(sheet: Sheet, panel: Panel) -> None:
+    """The curves of a family, in circles where a discontinuity of the model sets the limit."""
+    xs = panel.values(panel.x)
+    limits, states = panel.grid("limit_amplitude") / panel.g, panel.grid("limit_status")
+    circle: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 9, "color": "0.82", "zorder": 1.5}
+    for member, look in enumerate(curve_looks(len(limits))):
+        line = plot_curve(panel.axes, xs, limits[member], member / len(limits), **look)
+        if panel.y:
+            sheet.legend[panel.member(member)] = line
+        abrupt = (states[member] >= LimitStatus.AT_MODE_JUMP) & (states[member] <= LimitStatus.AFTER_GAP)
+        if abrupt.any():
+            (marks,) = panel.axes.plot(xs[abrupt], limits[member][abrupt], **circle)
+            sheet.remarks["set by a discontinuity\nof the model"] = marks
+
+
+def _draw_motions(sheet: Sheet, panel: Panel) -> None:
+    """The limits of the motions of a suite, with their median and band."""
+    xs, limits = panel.values(panel.x), panel.data["limit_amplitude"]
+    found = limit_quantiles(panel.data, QUANTILES)["limit_quantile"]
+    quantiles = found.transpose("quantile", ...).values / panel.g
+    quantiles[np.isinf(quantiles)] = np.nan
+    if panel.x != "motion":
+        dims = [dim for dim in SUITE if dim in limits.dims]
+        lines = over(limits, panel.data, (*dims, panel.x)).reshape(-1, xs.size)
+        draw_suite(sheet.legend, panel.axes, xs, lines / panel.g, quantiles)
+        return
+    # no lines from motion to motion: a row of points for each polarity, and the quantiles across all of them
+    ends = np.array([0.5, xs.size + 0.5])
+    draw_suite(sheet.legend, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles.reshape(-1, 1), 2, axis=1))
+    panel.axes.set_xlim(*ends)
+    points = limits.transpose("motion", ...).values.reshape(xs.size, -1)
+    polarities = panel.data["polarity"].values if "polarity" in limits.dims else ()
+    names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
+    look: dict[str, Any] = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
+    for name, row, marker in zip(names, points.T / panel.g, "os", strict=False):
+        (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
+
+
+def _suite_text(data: xr.Dataset) -> str:
+    """What the median is of, and the motions that have no limit."""
+    status = data["limit_status"].values
+    beyond, invalid = (int(np.count_nonzero(status == one)) for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID))
+    texts = [f"Median and band are of {suite_text(data['limit_amplitude'].sizes)}."]
+    if beyond:
+        highest = float(data.attrs["maximum_amplitude"]) / float(data.attrs["g"])
+        texts.append(
+            f"{beyond} of {status.size} limits are above {highest:.4g} g; they count as larger than all others."
+        )
+    if invalid:
+        texts.append(f"{invalid} of {status.size} have no value and are left out.")
+    return " ".join(texts)
+
+
+# ----------------------------------------------------------------- of `displacement_hazard`
+
+
+def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
+    """Displacements, m, that a curve of rates is drawn through: those requested, and as many as a smooth one needs."""
+    most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
+    least = min([one for one in requested if one > 0.0] + [most]) / 10.0
+    return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], requested)
+
+
+def hazard(result: Result, options: Options) -> Figure:
+    """The mean annual rate of exceedance over the displacement, a curve for each grid point.
+
+    The displacements that the attribute ``marked`` has, by default all if they are few, have a marker.  Curves are
+    dotted where more than half of the rate is held above the largest amplitude.
+    """
+    rates = result.data
+    names = point_names(rates, rates["valueless_share"].sizes)
+    if len(names) > _MOST_CURVES:
+        raise InputError(
+            f"{len(names)} grid points: a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
+        )
+    wanted = rates["threshold"].values
+    marks = np.isin(wanted, rates.attrs.get("marked", wanted if wanted.size <= _MOST_MARKS else []))
+    lines, held = (rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate"))
+    if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
+        raise InputError("no motion exceeds any of the given displacements: there is nothing to draw")
+    drawing = Drawing(options, 1, 1, (6.4, 4.8))
+    panel = drawing.grid[0, 0]
+    panel.set(xscale="log", yscale="log", xlabel="permanent displacement d (mm)",
+              ylabel="mean annual rate of u > d (1/year)")  # fmt: skip
+    panel.grid(color="0.9", which="both")
+    for style, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
+        shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
+        above = part > 0.5 * line
+        joined = above | np.append(False, above[:-1]) | np.append(above[1:], False)  # no gaps between the two
+        dashed = {"color": style["color"], "linestyle": style["linestyle"]}
+        panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
+        panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=style["color"], linestyle=":")
+        handle = {**style, "linestyle": "none"} if marks.any() else dashed
+        (drawing.legend[plain(name)],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+    if names == [""]:
+        drawing.legend.clear()
+    texts = [model_text(rates.attrs), f"hazard curve: {plain(rates.attrs['hazard_curve'])}"]
+    if (held > 0.5 * lines).any():
+        texts.append("Dotted: more than half of the rate comes from above the largest amplitude of the sweep, "
+                     "where P is held constant.")  # fmt: skip
+    return drawing.finish(texts)

@@ -1,0 +1,168 @@
+"""Charts of statistics: fragility curves, bands of quantiles, Sobol indices."""
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from slipsweep.charts import style
+from slipsweep.charts.sheet import Panel, Sheet, curve_looks, log_axis, over, plot_curve
+from slipsweep.charts.slices import Result
+from slipsweep.charts.solved import DRIVES
+from slipsweep.charts.style import BLUE, VERMILION, Options
+from slipsweep.errors import InputError
+from slipsweep.files.selection import axis_labels
+from slipsweep.model.variables import PARAMETERS, STRENGTHS, SensitivityStatus
+
+#: What statistics are drawn over, in order of preference.
+_AXES = (*DRIVES, *STRENGTHS)
+
+#: Sobol indices, and how they are drawn: name, interval, text, colour of bars.
+_INDICES = (
+    ("total_index", "total_interval", "total", VERMILION),
+    ("first_order_index", "first_order_interval", "first order", BLUE),
+)
+_FIRST_ORDER: dict[str, Any] = {"linestyle": (0, (3, 1.5)), "linewidth": 1.0}
+
+
+def fragility(result: Result, options: Options) -> Figure:
+    """The probability of exceeding a displacement over one axis, a curve for each threshold."""
+    if options.levels:
+        raise InputError(f"{result.name}: levels: not with statistics, whose thresholds are those in the file")
+    names = ["exceedance_probability", "valueless_share"]
+    return draw_fragility(result.sheet(options, names, _AXES, curves=["threshold"]))
+
+
+def draw_fragility(sheet: Sheet) -> Figure:
+    """Curves of `exceedance_probability` of a slice, and the share of samples without a value, where there are any."""
+    sheet.set_axis("x", sheet.x)
+    fixed = (
+        None
+        if "threshold" in (sheet.y, sheet.across, sheet.down)
+        else style.length_text(sheet.data["threshold"].item())
+    )
+    for panel in sheet.panels:
+        panel.axes.grid(color="0.9")
+        curves = panel.grid("exceedance_probability")
+        for member, (curve, look) in enumerate(zip(curves, curve_looks(len(curves)), strict=True)):
+            text = panel.member(member) or f"d = {fixed}"
+            line = plot_curve(panel.axes, panel.values(panel.x), curve, member / len(curves), label=text, **look)
+            sheet.legend[text] = line
+        shares = panel.grid("valueless_share")
+        if shares.any():
+            dotted: dict[str, Any] = {"color": "0.4", "linestyle": ":"}
+            panel.axes.plot(panel.values(panel.x), shares.max(axis=0), **dotted)
+            sheet.legend["no value (share)"] = Line2D([], [], **dotted)
+        panel.axes.set_ylim(-0.02, 1.02)
+        given = "u > d" if fixed is None or sheet.y is None else f"u > {fixed}"
+        panel.axes.set_ylabel(f"probability of exceedance P({given})")
+    return sheet.done()
+
+
+def quantiles(result: Result, options: Options) -> Figure:
+    """Bands between quantiles of the permanent displacement over one axis."""
+    keep = {"quantile": slice(None)}
+    sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=keep)
+    everything = sheet.data["displacement_quantile"].values * 1000.0
+    sheet.set_axis("x", sheet.x)
+    shares = np.atleast_1d(sheet.data["quantile"].values)
+    for panel in sheet.panels:
+        floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
+        values = over(panel.data["displacement_quantile"], panel.data, ("quantile", panel.x)) * 1000.0
+        shown, xs = np.where(np.isnan(values), np.nan, np.maximum(values, floor)), panel.values(panel.x)
+        pairs = [(low, shares.size - 1 - low) for low in range(shares.size // 2)]
+        for number, (low, high) in enumerate(pairs):
+            colour = mpl.colormaps["Blues"](0.2 + 0.3 * number / len(pairs))
+            look: dict[str, Any] = {"facecolor": colour, "linewidth": 0}
+            panel.axes.fill_between(xs, shown[low], shown[high], **look)
+            sheet.legend[f"{shares[low] * 100:g} to {shares[high] * 100:g} %"] = Patch(**look)
+        if shares.size % 2:
+            middle = shares.size // 2
+            text = "median" if shares[middle] == 0.5 else f"{shares[middle] * 100:g} %"
+            sheet.legend[text] = panel.axes.plot(xs, shown[middle], color=BLUE, linewidth=1.8, label=text)[0]
+    most = float(sheet.data["valueless_share"].max())
+    if most > 0:
+        sheet.notes.append(f"Without a value: up to {most:.1%} of the samples.")
+    return sheet.done()
+
+
+def sensitivity(result: Result, options: Options) -> Figure:
+    """Sobol indices of every input with their 95 % intervals: curves over an axis, or bars at one grid point."""
+    if "total_index" not in result.variables:
+        raise InputError(f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them")
+    names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
+    left = [dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims]
+    keep = {"bound": slice(None), "input": slice(None)}
+    bars = options.x is None and not {*left} - {*options.at, *options.panels}
+    sheet = result.sheet(options, names, "input" if bars else _AXES, keep=keep)
+    _note_status(sheet)
+    inputs = axis_labels(sheet.data, "input")
+    symbols = [" + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+")) for name in inputs]
+    if bars:
+        _draw_bars(sheet, symbols)
+        return sheet.done()
+    sheet.set_axis("x", sheet.x)
+    for panel in sheet.panels:
+        panel.axes.grid(color="0.9")
+        xs = panel.values(panel.x)
+        total, first = (over(panel.data[name], panel.data, ("input", panel.x)) for name, *_ in _INDICES)
+        low, high = over(panel.data["total_interval"], panel.data, ("bound", "input", panel.x))
+        for at, look in enumerate(curve_looks(len(inputs))):
+            panel.axes.fill_between(xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0)
+            solid = {**look, "linestyle": "-", "label": symbols[at]}
+            sheet.legend[symbols[at]] = plot_curve(panel.axes, xs, total[at], at / len(inputs), **solid)
+            panel.axes.plot(xs, first[at], color=look["color"], **_FIRST_ORDER)
+        panel.axes.set_ylim(*_ends(sheet, intervals=False))
+        panel.axes.set_ylabel("Sobol index of the permanent displacement")
+    sheet.remarks["total"] = Line2D([], [], color="0.3")
+    sheet.remarks["first order"] = Line2D([], [], color="0.3", **_FIRST_ORDER)
+    sheet.remarks["95 % interval (total)"] = Patch(alpha=0.15, linewidth=0, color="0.3")
+    return sheet.done()
+
+
+def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
+    """Both indices of every input, the largest total index first."""
+    totals = over(sheet.data["total_index"], sheet.data, ("input", sheet.across, sheet.down))
+    order = np.argsort(np.nan_to_num(totals).reshape(len(symbols), -1).sum(axis=1))
+    for panel in sheet.panels:
+        _draw_panel_of_bars(panel, order)
+        panel.axes.set_yticks(np.arange(len(order)), [symbols[at] for at in order])
+        panel.axes.set_ylim(-0.6, len(order) - 0.4)
+        panel.axes.set_xlim(*_ends(sheet, intervals=True))
+        panel.axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
+        panel.axes.set_xlabel("Sobol index of the permanent displacement")
+    for _, _, text, colour in _INDICES:
+        sheet.legend[text] = Patch(color=colour)
+    sheet.legend["95 % interval"] = Line2D([], [], color="black", marker="|", markersize=6)
+
+
+def _draw_panel_of_bars(panel: Panel, order: Any) -> None:
+    for (name, interval, _, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
+        values = over(panel.data[name], panel.data, ("input",))[order]
+        low, high = over(panel.data[interval], panel.data, ("bound", "input"))[:, order]
+        at = np.arange(len(order)) + shift
+        panel.axes.barh(at, values, height=0.36, color=colour)
+        there = np.isfinite(values + low + high)
+        # a bootstrap's interval may, by a hair, not hold the estimate
+        beside = np.maximum([(values - low)[there], (high - values)[there]], 0.0)
+        panel.axes.errorbar(values[there], at[there], xerr=beside, fmt="none", color="black", capsize=2.5)
+
+
+def _note_status(sheet: Sheet) -> None:
+    """Say why there are no indices at some grid points (InputError if there are none at all)."""
+    status = {int(one) for one in np.unique(sheet.data["sensitivity_status"].values)}
+    reasons = [one.text for one in SensitivityStatus if int(one) in status - {0}]
+    if not np.isfinite(sheet.data["total_index"].values).any():
+        raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons)}; choose another slice (--at)")
+    sheet.notes += [f"No indices where {text}." for text in reasons]
+
+
+def _ends(sheet: Sheet, intervals: bool) -> tuple[float, float]:
+    """Ends of the axis of indices: 0 to 1 and what lies beyond, of intervals not more than half as much again."""
+    values = [sheet.data[name].values.ravel() for name, *_ in _INDICES]
+    values += [np.clip(sheet.data[name].values.ravel(), -0.5, 1.5) for _, name, *_ in _INDICES] if intervals else []
+    every = np.concatenate(values)
+    return min(-0.05, 1.05 * float(np.nanmin(every))), max(1.05, 1.05 * float(np.nanmax(every)))

@@ -1,0 +1,296 @@
+"""Charts of a suite of recorded motions: a curve for each, with median and band; scatter; histogram; fragility."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+from scipy import stats
+
+from slipsweep.charts import statistics, style
+from slipsweep.charts.sheet import Panel, Sheet, has_flags, log_axis, log_ticks, over, plot_curve, reliable
+from slipsweep.charts.slices import Result
+from slipsweep.charts.solved import DISPLACEMENT
+from slipsweep.charts.style import BLUE, Options
+from slipsweep.errors import InputError, did_you_mean
+from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
+from slipsweep.studies.suite_statistics import QUANTILES, SUITE, suite_statistics
+
+Floats = NDArray[np.float64]
+
+#: Powers of the factor and of the time scale that an intensity measure of a motion as recorded grows with.
+SCALING = {
+    "pga": (1, 0),
+    "pgv": (1, 1),
+    "pgd": (1, 2),
+    "arias_intensity": (2, 1),
+    "cav": (1, 1),
+    "significant_duration": (0, 1),
+    "mean_period": (0, 1),
+}
+
+#: Displacements of a fragility where none are requested, m.
+_THRESHOLDS = (0.01, 0.1, 1.0)
+
+#: Logarithms of an intensity measure within this are one value: motions scaled to it.
+_SAME = 1e-6
+
+_LABEL = "permanent displacement (mm)"
+
+_THIN: dict[str, Any] = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
+_BAND: dict[str, Any] = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
+_EDGE: dict[str, Any] = {"color": BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
+_MEDIAN: dict[str, Any] = {"color": BLUE, "linewidth": 2.4, "zorder": 2.3}
+_NEWMARK: dict[str, Any] = {"color": "black", "linewidth": 1.2, "linestyle": ":", "zorder": 2.4}
+_BARS: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
+
+
+# ------------------------------------------------------------------------------- the kinds
+
+
+def motions(result: Result, options: Options) -> Figure:
+    """Displacements over one axis: a thin line for each motion, the suite's median and its 16 to 84 % band.
+
+    With the median of Newmark's block where the file has it.
+    """
+    sheet = _sheet(result, options, _axes(result))
+    everything = _millimetres(sheet.data)
+    sheet.show(DISPLACEMENT, "Not marked")
+    if options.show_cautions:  # upslope ones lie below the axis, as zeros do
+        sheet.data["drawn"] = sheet.data[DISPLACEMENT]
+    sheet.set_axis("x", sheet.x)
+    for panel in sheet.panels:
+        floor = log_axis(panel.axes, everything, _LABEL, zeros=True)
+        xs = panel.values(panel.x)
+        dims = [dim for dim in SUITE if dim in panel.data[DISPLACEMENT].dims]
+        lines = over(panel.data["drawn"], panel.data, (*dims, panel.x)).reshape(-1, xs.size) * 1000.0
+        draw_suite(sheet.legend, panel.axes, xs, lines, _band(panel.data, panel.x), floor)
+        if "newmark_displacement" in panel.data:
+            theirs = panel.data.assign({DISPLACEMENT: panel.data["newmark_displacement"]})
+            median = _raised(_band(theirs, panel.x)[1], floor)
+            sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(xs, median, gid="newmark", **_NEWMARK)[0]
+    _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
+    sheet.note_left_out(DISPLACEMENT)
+    _note_cautions(sheet)
+    return sheet.done()
+
+
+def intensity(result: Result, options: Options) -> Figure:
+    """The displacement of each motion against an intensity measure, and the regression of ln u on its logarithm.
+
+    The measure is that of the motion as it shakes the block.
+    """
+    measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.data.coords]
+    measure = options.x or ("arias_intensity" if "pgv" in result.dims else "pgv")
+    if measure not in measures:
+        raise InputError(f"{result.name}: --x {measure}: no intensity measure; {did_you_mean(measure, measures)}")
+    factor = [] if "scale" in result.data.coords else ["motion_factor"]
+    sheet = _sheet(result, replace(options, x=None), "motion", factor)
+    drawn = [_scattered(panel, measure) for panel in sheet.panels]
+    displacements, places = (np.concatenate([one[i] for one in drawn]) for i in (1, 0))
+    there = places[np.isfinite(places) & (places > 0)]
+    wide = there.size > 0 and there.max() > 3 * there.min()
+    text = INTENSITY_MEASURES[measure]["long_name"].removesuffix(" as recorded")
+    for panel, (xs, ys, negative) in zip(sheet.panels, drawn, strict=True):
+        log_axis(panel.axes, displacements, _LABEL)
+        if wide:
+            panel.axes.set_xscale("log")
+            log_ticks(panel.axes.xaxis, there.max() / there.min())
+        panel.axes.grid(color="0.9")
+        panel.axes.set_xlabel(f"{text} ({style.unit_text(INTENSITY_MEASURES[measure]['units'])})")
+        low = panel.axes.get_ylim()[0]
+        groups: list[tuple[str, NDArray[np.bool_], dict[str, Any]]] = [
+            ("polarity 1" if negative.any() else "a motion", ~negative, {"marker": "o", "color": BLUE}),
+            ("polarity −1", negative, {"marker": "s", "color": style.VERMILION, "markerfacecolor": "white"}),
+        ]
+        for name, which, look in groups:
+            seen = which & (ys >= low)
+            if seen.any():
+                sheet.legend[name] = panel.axes.plot(xs[seen], ys[seen], linestyle="", ms=5, gid=name, **look)[0]
+        below = ys < low
+        if below.any():
+            edge: dict[str, Any] = {"linestyle": "", "marker": "v", "color": "0.4", "markerfacecolor": "none"}
+            panel.axes.plot(xs[below], np.full(below.sum(), low * 1.1), gid="below", **edge)
+            sheet.legend["zero, or below the axis"] = Line2D([], [], **edge)
+        _draw_regression(sheet, panel, xs, ys)
+    sheet.notes.append("Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
+                       "σ: standard deviation of ln u about it.")  # fmt: skip
+    sheet.notes.append("Abscissa: of the motion as it shakes the block, with its factor and time scale.")
+    missing = int(np.count_nonzero(~np.isfinite(places)))
+    if missing:
+        sheet.notes.append(f"{missing} of {places.size} have no {text}: the samples resolve none.")
+    _note_suite(sheet, "Drawn are", "they are marked at the lower edge")
+    sheet.note_left_out(DISPLACEMENT)
+    return sheet.done()
+
+
+def histogram(result: Result, options: Options) -> Figure:
+    """How many motions of a suite have which displacement, with the share of zeros."""
+    sheet = _sheet(result, options, "motion")
+    everything = _millimetres(sheet.data)
+    slid = everything[everything > 0]
+    if not slid.size:
+        raise InputError(f"{result.name}: no motion slides in this slice; choose another slice (--at)")
+    edges = 10.0 ** np.histogram_bin_edges(np.log10(slid), "sturges")
+    # powers of logarithms are rounded: the least and the largest displacement must not lie outside
+    edges[0], edges[-1] = min(edges[0], slid.min()), max(edges[-1], slid.max())
+    for panel in sheet.panels:
+        values, axes = _millimetres(panel.data), panel.axes
+        counts, _ = np.histogram(values[values > 0], edges)
+        axes.bar(edges[:-1], counts, np.diff(edges), align="edge", gid="histogram", **_BARS)
+        axes.set(xscale="log", xlabel=_LABEL, ylabel="number of motions")
+        log_ticks(axes.xaxis, edges[-1] / edges[0])
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        found = _statistics(panel.data)
+        low, median, high = found["displacement_quantile"].values.ravel() * 1000.0
+        for place, look, text in (
+            (median, _MEDIAN, "median"), (low, _EDGE, "16 and 84 %"), (high, _EDGE, "16 and 84 %"),
+        ):  # fmt: skip
+            if place > 0:
+                sheet.legend[text] = axes.axvline(place, gid=text, **look)
+        panel.add_title(f"zero displacement: {found['zero_probability'].item():.0%}")
+    _note_suite(sheet, "Median and 16 to 84 % are of", "no bar shows them")
+    _note_cautions(sheet)
+    return sheet.done()
+
+
+def fragility(result: Result, options: Options) -> Figure:
+    """The share of the motions of a suite that exceed a displacement, over one axis."""
+    sheet = _sheet(result, options, _axes(result))
+    found = suite_statistics(sheet.data, thresholds=options.heights or _THRESHOLDS, quantiles=QUANTILES)
+    _note_suite(sheet, "P is the share of")
+    _note_cautions(sheet)
+    drawn = Sheet(found, sheet.x, "threshold", options, sheet.across, sheet.down)
+    drawn.notes = sheet.notes
+    return statistics.draw_fragility(drawn)
+
+
+# ------------------------------------------------------------------------------- what they share
+
+
+def kept_motions(result: Result) -> dict[str, slice]:
+    """The dimensions of a suite: all its motions, but where some are requested."""
+    return {dim: slice(None) for dim in SUITE if dim in result.dims}
+
+
+def _axes(result: Result) -> list[str]:
+    """What charts of a suite are drawn over: how strong the motions are, else Üy or ky, or any axis."""
+    return [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
+
+
+def _sheet(result: Result, options: Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
+    return result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
+
+
+def draw_suite(
+    legend: dict[str, Any], axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0
+) -> None:
+    """A thin line for each row of `lines`, and the suite's median and band of `quantiles` (16, 50 and 84 %) over them.
+
+    What is below `floor` is drawn there; that is outside of a logarithmic axis.
+    """
+    lines, quantiles = _raised(lines, floor), _raised(quantiles, floor)
+    axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
+    for row in lines:
+        plot_curve(axes, xs, row, gid="motion", **_THIN)
+    for edge in (quantiles[0], quantiles[2]):
+        axes.plot(xs, edge, gid="edge", **_EDGE)
+    plot_curve(axes, xs, quantiles[1], gid="median", **_MEDIAN)
+    legend["median"] = Line2D([], [], **_MEDIAN)
+    legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=BLUE, linestyle="--")
+    if len(lines):
+        legend["a motion"] = Line2D([], [], **_THIN)
+
+
+def _raised(values: Floats, floor: float) -> Floats:
+    """Values not below `floor`; NaN stays."""
+    return np.where(np.isnan(values), np.nan, np.maximum(values, floor))
+
+
+def suite_text(sizes: Mapping[Hashable, int]) -> str:
+    """How many motions there are: ``8 motions in 2 polarities``."""
+    polarities = f" in {sizes['polarity']} polarities" if sizes.get("polarity", 1) > 1 else ""
+    return f"{sizes['motion']} motions{polarities}"
+
+
+def _statistics(data: xr.Dataset) -> xr.Dataset:
+    return suite_statistics(data, thresholds=0.0, quantiles=QUANTILES)
+
+
+def _band(data: xr.Dataset, x: str) -> Floats:
+    """The suite's quantiles along an axis, mm."""
+    found = _statistics(data)
+    return np.asarray(over(found["displacement_quantile"], found, ("quantile", x))) * 1000.0
+
+
+def _millimetres(data: xr.Dataset) -> Floats:
+    values = data[DISPLACEMENT].values.ravel() * 1000.0
+    return np.asarray(values[np.isfinite(values)], np.float64)
+
+
+def _scattered(panel: Panel, measure: str) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Intensity as it shakes the block, displacement in mm, and whether the motion is reversed, of all drawn."""
+    data = panel.data
+    power, time_power = SCALING[measure]
+    factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
+    time = data["time_scale"] if "time_scale" in data.coords else 1.0
+    xs = data[f"motion_{measure}"] * factor**power * time**time_power
+    ys = reliable(data, DISPLACEMENT, panel.options) * 1000.0
+    every = xr.broadcast(xs, ys, data["polarity"] < 0)
+    xs, ys, reverse = (one.transpose(*every[1].dims).values.ravel() for one in every)  # type: ignore[assignment]
+    there = np.isfinite(ys)
+    return np.asarray(xs)[there], np.asarray(ys)[there], np.asarray(reverse)[there]
+
+
+def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
+    """The line of ln u = a + b ln(measure), its R² and scatter over the panel."""
+    slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
+    if slid.sum() < 3:
+        panel.add_title("no regression: fewer than 3 motions slide")
+    elif np.ptp(np.log(xs[slid])) < _SAME:
+        panel.add_title("no regression: one value for all motions")
+    else:
+        found: Any = stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
+        rest = np.log(ys[slid]) - found.intercept - found.slope * np.log(xs[slid])
+        scatter = float(np.sqrt(np.sum(rest**2) / (rest.size - 2)))
+        ends = np.geomspace(xs[slid].min(), xs[slid].max(), 50)
+        line = np.exp(found.intercept) * ends**found.slope
+        look: dict[str, Any] = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
+        sheet.remarks["regression"] = panel.axes.plot(ends, line, gid="regression", **look)[0]
+        panel.add_title(f"slope {found.slope:.2f}, R² = {found.rvalue**2:.2f}, σ = {scatter:.2f}")
+
+
+def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
+    """How many motions there are, how many of them have no value, and why; how many displacements are zero."""
+    found = _statistics(sheet.data)
+    text = f"{what} {suite_text(sheet.data[DISPLACEMENT].sizes)}"
+    up_to = "" if found["valueless_count"].size == 1 else "up to "
+    total, most = int((found["value_count"] + found["valueless_count"]).max()), int(found["valueless_count"].max())
+    if most:
+        counts = found["valueless_flag_count"]
+        reasons = counts.max([dim for dim in counts.dims if dim != "flag"])
+        pairs = zip(counts["flag"].values, reasons.values, strict=True)
+        why = ", ".join(f"{style.flag_name(int(bit))} {int(n)}" for bit, n in pairs if n)
+        sheet.notes.append(f"{text}; {up_to}{most} of {total} have no value and are left out ({why}).")
+    else:
+        sheet.notes.append(f"{text}; all have a value.")
+    zeros = (found["zero_probability"].fillna(0.0) * found["value_count"]).values
+    if zeros_are and zeros.max() > 0:
+        at = int(np.argmax(zeros))
+        count = found["value_count"].values.flat[at]
+        sheet.notes.append(f"Zero displacement: {up_to}{round(zeros.flat[at])} of {count}; {zeros_are}.")
+
+
+def _note_cautions(sheet: Sheet) -> None:
+    """Which cautions the statistics have in them."""
+    shares = {flag: float(has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
+    texts = [f"{style.flag_name(flag)} {100.0 * share:.2g} %" for flag, share in shares.items() if share]
+    if texts:
+        sheet.notes.append(f"Statistics are of all values, also those with a caution: {', '.join(texts)}.")
