@@ -83,11 +83,9 @@ def _export_fragility(file: str, output: Path, at: list[str] | None, overwrite: 
     """Write P(u > d) along the axis amplitude, of the values that --at takes of others."""
     from slipsweep.files.opening import read_result
     from slipsweep.files.outputs import complete_or_absent
-    from slipsweep.files.selection import places_at
+    from slipsweep.files.selection import selected
 
     check_outputs([output], (".xml",), overwrite, [Path(file)])
-    table = read_result(file)
-    axes = [str(dim) for dim in table.sizes if dim not in ("motion", "quantile")]
-    chosen = table.isel(places_at(table, file, cuts(at), axes), missing_dims="ignore")
+    chosen = selected(read_result(file), file, cuts(at), ("motion", "quantile"))
     with complete_or_absent(output, overwrite) as temporary:
         write_fragility(chosen, temporary)

@@ -90,19 +90,19 @@ def hazard(
 def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
     """What is needed of a result, cut where one value of an axis is given."""
     from slipsweep.files.opening import read_result
-    from slipsweep.files.selection import places_at
+    from slipsweep.files.selection import selected
 
     result = read_result(file)
     names = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
     table = result[[name for name in names if name in result]].load()
-    axes = [str(dim) for dim in table.sizes if dim not in ("amplitude", "motion", "threshold")]
-    places = places_at(table, file, cuts(at), axes)
-    for name, found in places.items():
-        if found.size > 1:
-            raise InputError(f"{file}: --at {name}: {found.size} values; must be one")
     if "g" not in table.attrs:
         raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
-    return table.isel({name: int(found[0]) for name, found in places.items()}, missing_dims="ignore")
+    typed = cuts(at)
+    chosen = selected(table, file, typed, ("amplitude", "motion", "threshold"))
+    for name in typed:
+        if chosen.sizes.get(name, 1) > 1:
+            raise InputError(f"{file}: --at {name}: {chosen.sizes[name]} values; must be one")
+    return chosen.squeeze([name for name in typed if name in chosen.sizes])
 
 
 def _summarize(rates: "xr.Dataset", g: float) -> None:

@@ -26,7 +26,7 @@ def info(
     from slipsweep.files.jobs import RUN
     from slipsweep.files.motions import read_embedded
     from slipsweep.files.opening import place_of, read_result
-    from slipsweep.files.selection import places_at
+    from slipsweep.files.selection import selected
     from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import size_text
     from slipsweep.motion.records import Record
@@ -55,9 +55,7 @@ def info(
         echo(f"modes and flags not counted: {error}")
     if displacement and table.sizes.get("motion", 1) < 2:
         raise InputError(f"{file}: --displacement: is for results of a suite of motions")
-    axes = [str(dim) for dim in table.sizes if dim not in SUITE]
-    chosen = table.isel(places_at(table, file, cuts(at), axes), missing_dims="ignore")
-    echo_suite(chosen, most=100, typed=displacement or ())
+    echo_suite(selected(table, file, cuts(at), SUITE), most=100, typed=displacement or ())
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
         if name != RUN:

@@ -131,6 +131,12 @@ def places_at(
     return {name: np.array([place.index for place in found], np.intp) for name, found in places.items()}
 
 
+def selected(data: xr.Dataset, source: object, at: Mapping[str, At], kept: Collection[str]) -> xr.Dataset:
+    """A result at values of its axes, but for those that are `kept` whole; as `places_at`."""
+    dims = [str(dim) for dim in data.sizes if dim not in kept]
+    return data.isel(places_at(data, source, at, dims), missing_dims="ignore")
+
+
 def between(data: xr.Dataset, name: str, value: float) -> str:
     """That a value is not among those of a result, and between which it lies."""
     values = np.sort(axis_numbers(data, name))
