@@ -57,32 +57,11 @@ def curve(result: Result, options: Options) -> Figure:
     return _drawn(result.sheet(options, result.compared(name), (*DRIVES, "yield_coefficient", "frequency")), name)
 
 
-def under_a_record(result: Result, options: Options) -> Figure:
+def motions(result: Result, options: Options) -> Figure:
     """Displacements under one record over one axis, a curve for each value of another."""
     first = (*STRENGTHS, "yield_acceleration", "yield_coefficient")
     others = [dim for dim in result.wide if dim != "polarity"]
     return _drawn(result.sheet(options, result.compared(DISPLACEMENT), first, curves=others), DISPLACEMENT)
-
-
-def _drawn(sheet: Sheet, name: str) -> Figure:
-    """Curves of a result, of the displacement with Newmark's."""
-    units = sheet.options.unit(name)
-    factor, units = (1000.0, "mm") if units == "m" else (1.0, units)
-    label = f"{RESULTS[name]['long_name']} ({units})" if units else RESULTS[name]["long_name"]
-    sheet.show(name, "Barred curves")
-    sheet.set_axis("x", sheet.x)
-    for panel in sheet.panels:
-        log_axis(panel.axes, sheet.data["drawn"].values * factor, label, 1.0 if factor > 1 else None)
-        found = _curves(panel, panel.grid("drawn"), _on_limit(panel, name))
-        looks = curve_looks(len(found)) if panel.y else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
-        for member, ((xs, ys), look) in enumerate(zip(found, looks, strict=True)):
-            _draw(sheet, panel, (xs, ys * factor), member, len(found), look)
-        _underlay(sheet, panel, name, factor)
-        for ys, look in zip(panel.grid("newmark") if "newmark" in sheet.data else (), looks, strict=False):
-            _draw_newmark(sheet, panel, (panel.values(panel.x), ys * factor), look)
-        _mark_accelerations(sheet, panel)
-    sheet.note_left_out(name)
-    return sheet.done()
 
 
 def dimensionless(result: Result, options: Options) -> Figure:
@@ -96,41 +75,59 @@ def dimensionless(result: Result, options: Options) -> Figure:
     keep = {"frequency": result.spread("frequency", _FREQUENCIES)} if "frequency" in result.wide else {}
     names = result.compared(DISPLACEMENT)
     sheet = result.sheet(replace(options, x=None), names, drive, curves=first, keep=keep)
-    sheet.show(DISPLACEMENT, "Barred curves")
-    scaled = [_scaled(panel, panel.data["drawn"]) for panel in sheet.panels]
-    # the paper's axis begins at the yield acceleration
-    beyond = np.concatenate([ys[xs > 1] for one in scaled for xs, ys in one.values()])
-    frequencies = np.atleast_1d(sheet.data["frequency"].values)
-    shapes: list[dict[str, Any]] = [
-        {"marker": shape, "markersize": 5, "markerfacecolor": "none"} for shape in "ox+"[: frequencies.size - 1]
-    ]
-    for panel, curves in zip(sheet.panels, scaled, strict=True):
-        panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
-        log_axis(panel.axes, beyond, "permanent displacement, u ω² / A", _LEAST_SCALED)
-        beyond_limit = _beyond(panel)
-        classical = _scaled(panel, panel.data["newmark"]) if "newmark" in panel.data else {}
-        members = len(curves) // frequencies.size
-        for member, look in enumerate(curve_looks(members)):
-            xs, ys = curves[member, 0]
-            if beyond_limit is not None:
-                xs, ys = _broken(xs, ys, beyond_limit[member])
-            _draw(sheet, panel, (xs, ys), member, members, {**look, "marker": ""})
-            if classical:
-                _draw_newmark(sheet, panel, classical[member, 0], look)
-            for number, shape in enumerate(shapes, start=1):
-                # a few markers a curve, each frequency's between those of the others
-                xs, ys = curves[member, number]
-                every = max(1, xs.size // 12)
-                place = (number * every // frequencies.size, every)
-                panel.axes.plot(xs, ys, color=look["color"], linestyle="", markevery=place, **shape)
-        _underlay(sheet, panel, DISPLACEMENT)
-        log_ticks(panel.axes.xaxis, 10)
-        panel.axes.set_xlim(left=1.0)
-    for frequency, shape in zip(frequencies, [{"linestyle": "-"}, *shapes], strict=True) if shapes else ():
-        handle: dict[str, Any] = {"color": "0.3", "linestyle": "", **shape}
-        sheet.legend[style.value_text(sheet.data, "frequency", frequency, options)] = Line2D([], [], **handle)
-    sheet.note_left_out(DISPLACEMENT)
+    return _drawn(sheet, DISPLACEMENT, scaled=True)
+
+
+def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
+    """Curves of a result, of the displacement with Newmark's; `scaled` as uω²/A over A/Üy."""
+    units = sheet.options.unit(name)
+    factor, units = (1000.0, "mm") if units == "m" else (1.0, units)
+    label, least = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()"), 1.0 if factor > 1 else None
+    sheet.show(name, "Barred curves")
+    values = sheet.data["drawn"].values * factor
+    if scaled:
+        label, least, factor = "permanent displacement, u ω² / A", _LEAST_SCALED, 0.0
+        every = [curve for panel in sheet.panels for curve in _scaled(panel, panel.data["drawn"]).values()]
+        values = np.concatenate([ys[xs > 1] for xs, ys in every])  # the paper's axis begins at the yield acceleration
+    else:
+        sheet.set_axis("x", sheet.x)
+    for panel in sheet.panels:
+        if scaled:
+            panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
+        log_axis(panel.axes, values, label, least)
+        found = _curves(panel, panel.data["drawn"], factor, None if scaled else _on_limit(panel, name))
+        looks = (
+            curve_looks(len(found)) if panel.y or scaled else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
+        )
+        for member, (curve, look) in enumerate(zip(found, looks, strict=True)):
+            _draw(sheet, panel, curve, member, len(found), {**look, "marker": ""} if scaled else look)
+        _underlay(sheet, panel, name, factor)
+        theirs = _curves(panel, panel.data["newmark"], factor, gaps=False) if "newmark" in sheet.data else []
+        for curve, look in zip(theirs, looks, strict=False):
+            _draw_newmark(sheet, panel, curve, look)
+        if scaled:
+            _draw_frequencies(sheet, panel, looks)
+        else:
+            _mark_accelerations(sheet, panel)
+    sheet.note_left_out(name)
     return sheet.done()
+
+
+def _draw_frequencies(sheet: Sheet, panel: Panel, looks: list[dict[str, Any]]) -> None:
+    """A few markers a curve for each frequency but the first, between those of the others."""
+    frequencies = np.atleast_1d(panel.data["frequency"].values)
+    curves, size = _scaled(panel, panel.data["drawn"]), frequencies.size
+    for number, (frequency, shape) in enumerate(zip(frequencies, ["", *"ox+"], strict=False)):
+        marker: dict[str, Any] = {"marker": shape, "markersize": 5, "markerfacecolor": "none", "linestyle": ""}
+        for member, look in enumerate(looks if shape else ()):
+            xs, ys = curves[member, number]
+            every = max(1, xs.size // 12)
+            panel.axes.plot(xs, ys, color=look["color"], markevery=(number * every // size, every), **marker)
+        if size > 1:
+            text = style.value_text(sheet.data, "frequency", frequency, sheet.options)
+            sheet.legend[text] = Line2D([], [], color="0.3", **(marker if shape else {"linestyle": "-"}))
+    log_ticks(panel.axes.xaxis, 10)
+    panel.axes.set_xlim(left=1.0)
 
 
 def spread(result: Result, options: Options) -> Figure:
@@ -189,9 +186,9 @@ def _answers(panel: Panel, own_text: str, flags: list[xr.DataArray]) -> dict[str
         answer = solved.solve(panel.data, [DISPLACEMENT, "validity"], model, **changed)
         flags.append(answer["validity"])
         drawn = reliable(answer, DISPLACEMENT, panel.options)
-        found[text] = _curves(panel, panel.grid(drawn), _on_limit(panel, DISPLACEMENT, model, **changed))[0]
-    found[f"this result:\n{own_text}"] = _curves(panel, panel.grid("drawn"), _on_limit(panel, DISPLACEMENT))[0]
-    return {text: (xs, ys * 1000.0) for text, (xs, ys) in found.items()}
+        found[text] = _curves(panel, drawn, 1000.0, _on_limit(panel, DISPLACEMENT, model, **changed))[0]
+    own = _curves(panel, panel.data["drawn"], 1000.0, _on_limit(panel, DISPLACEMENT))[0]
+    return {**found, f"this result:\n{own_text}": own}
 
 
 def _own_text(data: xr.Dataset) -> str:
@@ -216,29 +213,28 @@ def _on_limit(panel: Panel, name: str, model: Model | None = None, **changed: An
     return reliable(sides, name, panel.options)
 
 
-def _curves(panel: Panel, rows: Floats, on_limit: xr.DataArray | None = None) -> list[Curve]:
+def _curves(
+    panel: Panel, array: xr.DataArray, factor: float, on_limit: xr.DataArray | None = None, gaps: bool = True
+) -> list[Curve]:
     """The curves of a panel, broken where the amplitude passes the mode limit: the jump is no line.
 
-    With the results on the limit they go there from either side.
+    In units of `factor`; of 0, as uω²/A over A/Üy.  With the results on the limit they go there from either side.
     """
-    xs, beyond = panel.values(panel.x), _beyond(panel)
-    if beyond is None:
-        return [(xs, ys) for ys in rows]
-    if panel.x not in DRIVES:
-        return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, strict=True)]
+    if factor:
+        curves = [(panel.values(panel.x), ys * factor) for ys in panel.grid(array)]
+    else:
+        curves = [curve for (_, frequency), curve in _scaled(panel, array).items() if frequency == 0]
+    if "limit_line" not in panel.data or not gaps:
+        return curves
     limit = panel.grid("limit_line")
+    beyond = panel.grid("amplitude") > limit
+    if on_limit is None or not factor:
+        return [_broken(*curve, *at) for curve, *at in zip(curves, beyond, strict=True)]
     scale = panel.options.scale(panel.x, panel.g)
     if panel.x == "displacement_amplitude":
         scale = scale / (2 * math.pi * panel.grid("frequency")) ** 2
-    edges = [None] * len(rows) if on_limit is None else panel.grid(on_limit, SIDE)
-    return [_broken(xs, ys, *at) for ys, *at in zip(rows, beyond, (limit * scale)[:, 0], edges, strict=True)]
-
-
-def _beyond(panel: Panel) -> NDArray[np.bool_] | None:
-    """Where the amplitude is above the mode limit, if there is one."""
-    if "limit_line" not in panel.data:
-        return None
-    return np.asarray(panel.grid("amplitude") > panel.grid("limit_line"))
+    edges = panel.grid(on_limit, SIDE) * factor
+    return [_broken(*curve, *at) for curve, *at in zip(curves, beyond, (limit * scale)[:, 0], edges, strict=True)]
 
 
 def _broken(
@@ -246,11 +242,9 @@ def _broken(
 ) -> Curve:
     """A curve with a gap where `beyond` changes; there are always three points more, for curves side by side."""
     gaps = np.flatnonzero(beyond[1:] != beyond[:-1]) + 1
-    if limit is None:
+    if limit is None or on_limit is None or not gaps.size:
         return np.insert(xs, gaps, xs[gaps]), np.insert(ys, gaps, np.nan)
-    if not gaps.size:
-        return xs, ys
-    below, above = (np.nan, np.nan) if on_limit is None else on_limit
+    below, above = on_limit
     return np.insert(xs, gaps.repeat(3), limit), np.insert(ys, gaps.repeat(3), [below, np.nan, above])
 
 
@@ -275,8 +269,8 @@ def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, l
 
 def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]) -> None:
     """Draw Newmark's curve beside one of a family, with the same dash; beside one curve, dashed."""
-    alone = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
-    look = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else alone)
+    single = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
+    look = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
     panel.axes.plot(*_above_zero(curve), gid="newmark", **look)
     text = f"{style.NEWMARK} (same dash)" if panel.y else style.NEWMARK
     sheet.remarks[text] = Line2D([], [], **(_NEWMARK if panel.y else look))
@@ -285,20 +279,16 @@ def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]
 def _underlay(sheet: Sheet, panel: Panel, name: str, factor: float = 0.0) -> None:
     """Put a broad grey line under what a caution is about, and a barred one under what no block does.
 
-    In units of `factor`, without one dimensionless.
+    In units of `factor`, as `_curves`.
     """
     data = panel.data
     drawn = data["drawn"]
     marks = [("caution", _CAUTION, (drawn > 0) & has_flags(data["validity"], CAUTIONS))]
     marks += [("unsound", _UNSOUND, data["unsound"])] if "unsound" in data else []
     for gid, look, cells in marks:
-        marked = drawn.where(cells).transpose(*drawn.dims)
-        if factor:
-            # the limit itself is cautious, and a jump there is no line
-            edge = _on_limit(panel, name) if gid == "caution" else None
-            curves = [(xs, ys * factor) for xs, ys in _curves(panel, panel.grid(marked), edge)]
-        else:
-            curves = [curve for (_, frequency), curve in _scaled(panel, marked).items() if frequency == 0]
+        # the limit itself is cautious, and a jump there is no line
+        edge = _on_limit(panel, name) if gid == "caution" and factor else None
+        curves = _curves(panel, drawn.where(cells).transpose(*drawn.dims), factor, edge)
         for xs, ys in curves:
             panel.axes.plot(xs, ys, gid=gid, **look)
         if cells.any() and gid == "unsound":

@@ -36,8 +36,14 @@ _CHANNELS = {
 }
 
 
+def _plot(panel: Axes, table: xr.Dataset, name: str, ylabel: str, factor: float = 1.0, **look: Any) -> None:
+    """A variable over time."""
+    panel.plot(table["time"].values, factor * table[name].values, **{"color": VERMILION, **look})
+    panel.set_ylabel(ylabel)
+
+
 def _finish(drawing: Drawing, panels: Iterable[Axes], texts: list[str]) -> Figure:
-    """A line at zero and a grid in the panels, and a style.caption."""
+    """A line at zero and a grid in the panels, and a caption."""
     for panel in panels:
         panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         panel.margins(x=0)
@@ -52,7 +58,6 @@ def _finish(drawing: Drawing, panels: Iterable[Axes], texts: list[str]) -> Figur
 def history(result: Result, options: Options) -> Figure:
     """A time history in the manner of the paper's Figs. 5, 8 and 9.
 
-    Panels over time: accelerations of base and block, friction coefficient, relative velocity, relative displacement.
     Under a record a row of boxes on top has the sliding mode of each positive half wave, and lines show the
     accelerations of yield and of the mode limit.
     """
@@ -63,22 +68,18 @@ def history(result: Result, options: Options) -> Figure:
     drawing = Drawing(options, len(heights), 1, size, sharey=False, gridspec_kw=ratios)
     panels = list(drawing.grid.ravel()[modes:])
     accelerations, *_, velocity, displacement = panels
-    time = data["time"].values
-    accelerations.plot(time, data["ground_acceleration"].values, color=BLUE, label="base")
-    accelerations.plot(time, data["block_acceleration"].values, color=VERMILION, linestyle="--", label="block")
+    label = "acceleration\n(m/s²)"
+    _plot(accelerations, data, "ground_acceleration", label, color=BLUE, label="base")
+    _plot(accelerations, data, "block_acceleration", label, linestyle="--", label="block")
     if modes:
         _draw_modes(drawing.grid[0, 0], data)
         _draw_thresholds(accelerations, data)
     accelerations.legend(ncols=4, fontsize="small", **_ABOVE)
-    accelerations.set_ylabel("acceleration\n(m/s²)")
     if friction:
-        panels[1].plot(time, data["friction_coefficient"].values, color=VERMILION)
-        panels[1].set_ylabel("friction\ncoefficient")
-    velocity.plot(time, data["relative_velocity"].values, color=VERMILION)
-    velocity.set_ylabel("relative\nvelocity (m/s)")
-    metres = bool((np.abs(data["relative_displacement"]) >= 1.0).any())
-    displacement.plot(time, data["relative_displacement"].values * (1 if metres else 1000), color=VERMILION)
-    displacement.set_ylabel(f"relative\ndisplacement ({'m' if metres else 'mm'})")
+        _plot(panels[1], data, "friction_coefficient", "friction\ncoefficient")
+    _plot(velocity, data, "relative_velocity", "relative\nvelocity (m/s)")
+    factor, unit = (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
+    _plot(displacement, data, "relative_displacement", f"relative\ndisplacement ({unit})", factor)
     displacement.set_xlabel("time (s)")
     return _finish(drawing, panels, [style.caption(data, options)])
 
@@ -114,24 +115,19 @@ def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
 
 
 def friction(result: Result, options: Options) -> Figure:
-    """Measured friction in the manner of the paper's Fig. 7, with the friction by statics.
-
-    Panels over time: accelerations of table and block; friction by Eq. 1 and by statics.  Slides are shaded, from
-    onset to stop.
-    """
+    """Measured friction in the manner of the paper's Fig. 7, with the friction by statics; slides are shaded."""
     table = result.data
     drawing = Drawing(options, 2, 1, (7.0, 4.8), sharey=False)
     accelerations, coefficient = drawing.grid.ravel()
-    time = table["time"].values
-    accelerations.plot(time, table["ground_acceleration"].values, color=BLUE, label="table")
-    accelerations.plot(time, table["block_acceleration"].values, color=VERMILION, linewidth=1.0, label="block")
-    accelerations.set_ylabel("acceleration\n(m/s²)")
+    label = "acceleration\n(m/s²)"
+    _plot(accelerations, table, "ground_acceleration", label, color=BLUE, label="table")
+    _plot(accelerations, table, "block_acceleration", label, linewidth=1.0, label="block")
     accelerations.legend(ncols=2, **_ABOVE)
     _friction_lines(table, coefficient)
     coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
     coefficient.legend(ncols=3, **_ABOVE)
     coefficient.set_xlabel("time (s)")
-    stops = np.where(np.isnan(table["slide_stop"].values), time[-1], table["slide_stop"].values)
+    stops = table["slide_stop"].fillna(table["time"].values[-1]).values
     for panel in (accelerations, coefficient):
         for onset, stop in zip(table["slide_onset"].values, stops, strict=True):
             panel.axvspan(onset, stop, color="0.92", zorder=0)
@@ -141,10 +137,9 @@ def friction(result: Result, options: Options) -> Figure:
 
 
 def calibration(result: Result, options: Options) -> Figure:
-    """Measured against computed motion in the manner of the paper's Figs. 8 and 9.
+    """Measured against computed motion in the manner of the paper's Figs. 8 and 9, a column for each test.
 
-    Panels over time, a column for each test: the table's acceleration, each channel of the block, measured or not,
-    with its misfit, and the friction by Eq. 1 and by statics; parameters with their intervals in a style.caption.
+    With the misfit of each channel, the friction by Eq. 1 and by statics, and in the caption the parameters.
     """
     table = result.data
     tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
@@ -161,20 +156,18 @@ def calibration(result: Result, options: Options) -> Figure:
 
 def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
     """One test of a calibration."""
-    time, ground = table["time"].values, panels[0]
+    ground, label = panels[0], "acceleration of\nthe table (m/s²)"
     measured: dict[str, Any] = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
-    ground.plot(time, table["measured_ground_acceleration"].values, **measured)
-    ground.plot(time, table["computed_ground_acceleration"].values, color=BLUE, label="smooth")
-    ground.set_ylabel("acceleration of\nthe table (m/s²)")
+    _plot(ground, table, "measured_ground_acceleration", label, **measured)
+    _plot(ground, table, "computed_ground_acceleration", label, color=BLUE, label="smooth")
     ground.legend(ncols=2, **_ABOVE)
     for panel, (name, (label, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
         text = "not measured"
         if f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull()):
-            panel.plot(time, factor * table[f"measured_{name}"].values, **measured)
+            _plot(panel, table, f"measured_{name}", label, factor, **measured)
             misfit, share = factor * table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
             text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
-        panel.plot(time, factor * table[f"computed_{name}"].values, color=VERMILION, linewidth=1.2, label="computed")
-        panel.set_ylabel(label)
+        _plot(panel, table, f"computed_{name}", label, factor, linewidth=1.2, label="computed")
         panel.set_title(text, fontsize="small", loc="left")
     panels[1].legend(ncols=2, **_ABOVE)
     if len(panels) > 4:
@@ -185,11 +178,10 @@ def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
 
 def _friction_lines(table: xr.Dataset, panel: Axes) -> None:
     """Friction by Eq. 1 and by statics; told apart in grey by their widths and dashes."""
-    time = table["time"].values
-    panel.plot(time, table["free_body_friction"].values, color=BLUE, linewidth=1.6, label="by statics")
-    eq1 = table["friction_coefficient"].values
-    panel.plot(time, eq1, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 1.5)), label="μ(t) by Eq. 1")
-    panel.set_ylabel("friction\ncoefficient")
+    label = "friction\ncoefficient"
+    dashed: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 1.5))}
+    _plot(panel, table, "free_body_friction", label, color=BLUE, linewidth=1.6, label="by statics")
+    _plot(panel, table, "friction_coefficient", label, label="μ(t) by Eq. 1", **dashed)
 
 
 def _given(table: xr.Dataset) -> str:

@@ -18,52 +18,36 @@ from slipsweep.errors import InputError, did_you_mean
 
 Draw = Callable[[Result, Options], Figure]
 
-#: Of each sort of result: what it is called in messages, and its kinds of charts.
-SORTS: dict[str, tuple[str, dict[str, Draw]]] = {
+#: Of each sort of result: what it is called in messages, and its charts, of the kinds that their functions' names say.
+SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "sweep": (
         "a sweep under harmonic motion",
-        {
-            "contours": maps.contours,
-            "modes": maps.modes,
-            "families": curves.families,
-            "curve": curves.curve,
-            "dimensionless": curves.dimensionless,
-            "newmark": maps.newmark_ratio,
-            "spread": curves.spread,
-        },
+        (maps.contours, maps.modes, curves.families, curves.curve, curves.dimensionless, maps.newmark, curves.spread),
     ),
-    "statistics": (
-        "statistics of displacements",
-        {
-            "fragility": statistics.fragility,
-            "quantiles": statistics.quantiles,
-            "sensitivity": statistics.sensitivity,
-        },
-    ),
+    "statistics": ("statistics of displacements", (statistics.fragility, statistics.quantiles, statistics.sensitivity)),
     "suite": (
-        "a sweep under a suite of motions",
-        {
-            "motions": suites.motions,
-            "fragility": suites.fragility,
-            "intensity": suites.intensity,
-            "histogram": suites.histogram,
-        },
+        "a sweep under a suite of motions", (suites.motions, suites.fragility, suites.intensity, suites.histogram)
     ),
-    "record": ("a sweep under a recorded motion", {"motions": curves.under_a_record}),
-    "history": ("a time history", {"history": histories.history}),
-    "limit": ("limit amplitudes", {"limit": limits.limit}),
-    "friction": ("measured friction", {"friction": histories.friction}),
-    "calibration": ("a calibration", {"calibration": histories.calibration}),
-    "hazard": ("annual rates", {"hazard": limits.hazard}),
-}
+    "record": ("a sweep under a recorded motion", (curves.motions,)),
+    "history": ("a time history", (histories.history,)),
+    "limit": ("limit amplitudes", (limits.limit,)),
+    "friction": ("measured friction", (histories.friction,)),
+    "calibration": ("a calibration", (histories.calibration,)),
+    "hazard": ("annual rates", (limits.hazard,)),
+}  # fmt: skip
 
 #: What results that are drawn whole have no choice of.
 _CHOICES = ("at", "x", "y", "panels", "levels")
 
 
+def kinds_of(sort: str) -> dict[str, Draw]:
+    """The kinds of charts of a sort of result, in order."""
+    return {function.__name__: function for function in SORTS[sort][1]}
+
+
 def check_kind(kind: str) -> str:
     """`kind` if there is such a chart (InputError otherwise)."""
-    known = [name for _, kinds in SORTS.values() for name in kinds]
+    known = [name for sort in SORTS for name in kinds_of(sort)]
     if kind not in known:
         raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, known)}")
     return kind
@@ -71,7 +55,7 @@ def check_kind(kind: str) -> str:
 
 def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
-    kinds = [*SORTS[result.sort][1]]
+    kinds = [*kinds_of(result.sort)]
     if result.sort == "statistics" and "total_index" not in result.variables:
         kinds.remove("sensitivity")
     if result.sort != "sweep":
@@ -89,18 +73,14 @@ def fitting(result: Result, options: Options) -> list[str]:
 
 
 def draw(result: Result, kind: str | None, options: Options) -> Figure:
-    """Draw one chart of a result, the first of those that fit if none is named.
-
-    Raises
-    ------
-    InputError
-        The chart cannot be drawn of it, or what is requested is not there.
-    """
-    what, kinds = SORTS[result.sort]
+    """Draw one chart of a result, the first of those that fit if none is named (InputError if it cannot be drawn)."""
+    kinds = kinds_of(result.sort)
     kind = fitting(result, options)[0] if kind is None else check_kind(kind)
     if kind not in kinds:
         one_of = "one of " if len(kinds) > 1 else ""
-        raise InputError(f"{result.name}: --kind {kind}: is {what}: must be {one_of}{', '.join(kinds)}")
+        raise InputError(
+            f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {one_of}{', '.join(kinds)}"
+        )
     for name in _CHOICES if not result.dims else ():
         if getattr(options, name):
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
@@ -108,6 +88,8 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         try:
             return kinds[kind](result, options)
         except KeyError as error:
+            if result.dims:
+                raise
             raise InputError(f"{result.name}: {error.args[0]}: not there, but {kind} needs it") from None
 
 
@@ -121,10 +103,7 @@ def draw_all(
 ) -> tuple[dict[str, Figure], dict[str, str]]:
     """Draw several charts; where not `strict`, those that cannot be drawn are named with the reason.
 
-    Raises
-    ------
-    InputError
-        As `draw`; or none can be drawn.
+    InputError as `draw`, or if none can be drawn.
     """
     result.places(options.at)
     figures: dict[str, Figure] = {}

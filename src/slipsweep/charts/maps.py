@@ -91,7 +91,7 @@ def contours(result: Result, options: Options) -> Figure:
     return _finish(sheet, name)
 
 
-def newmark_ratio(result: Result, options: Options) -> Figure:
+def newmark(result: Result, options: Options) -> Figure:
     """The ratio of the permanent displacement to that of Newmark's block."""
     if is_newmark(result.data):
         raise InputError(f"{result.name}: the result is of Newmark's block itself: the ratio is 1 everywhere")

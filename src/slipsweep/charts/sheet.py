@@ -33,10 +33,10 @@ Floats = NDArray[np.float64]
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 
-#: Width of a figure of one panel, inches, and characters of a style.caption in an inch.
+#: Width of a figure of one panel, inches, and characters of a caption in an inch.
 _WIDTH, _CHARACTERS = 7.0, 16
 
-#: Height of a line of a style.caption or legend, inches, and lines that the usual height has a place for.
+#: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
 _LINE, _LINES = 0.165, 4
 
 #: Markers on a curve.
@@ -47,25 +47,10 @@ _MARKED = 7
 
 
 class Drawing:
-    """A figure of panels with a legend and a style.caption.
+    """A figure of panels with a legend, in which what several panels have is once, and a caption.
 
-    Parameters
-    ----------
-    options : Options
-    rows, columns : int
-    size : tuple of float
-        Width and height, inches; `options.width` scales both.
-    shared
-        Further options of `Figure.subplots`.
-
-    Attributes
-    ----------
-    figure : Figure
-    grid : ndarray of Axes
-    legend, remarks : dict of str to Artist
-        Entries of the legend by text: what is drawn in several panels has one.  Remarks come last.
-    notes : list of str
-        Sentences for the style.caption.
+    `options.width` scales the size in inches, `options.ax` is drawn in instead of a new figure; `shared` goes to
+    `Figure.subplots`.  Remarks come last in the legend; notes are sentences for the caption.
     """
 
     def __init__(self, options: Options, rows: int, columns: int, size: tuple[float, float], **shared: Any) -> None:
@@ -86,7 +71,7 @@ class Drawing:
         self.notes: list[str] = []
 
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
-        """Draw the legend, beside or above the panels, and a style.caption of `texts` and the notes under them."""
+        """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
         entries, font = self.legend | self.remarks, self.options.font
         handles, labels = list(entries.values()), list(entries)
         axes, lines = self.options.ax, 0
@@ -123,7 +108,7 @@ class Drawing:
         return self.figure
 
     def _wrapped(self, texts: Sequence[str], width: float) -> list[str]:
-        """Lines of a style.caption that is as wide as some inches of text of 10 points."""
+        """Lines of a caption that is as wide as some inches of text of 10 points."""
         characters = max(20, int(_CHARACTERS * width))
         every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
         return [line for text in every for line in textwrap.wrap(text, characters)]
@@ -160,17 +145,7 @@ def _without_colour(figure: Figure) -> None:
 
 
 class Panel:
-    """A part of a sheet's slice and the axes it is drawn in.
-
-    Attributes
-    ----------
-    axes : Axes
-    x, y : str
-        The axes of a map; of curves `y` is the curve parameter, or None.
-    options : Options
-    g : float
-        Gravity, m/s².
-    """
+    """A part of a sheet's slice and the axes it is drawn in."""
 
     def __init__(self, sheet: "Sheet", axes: Axes, where: dict[str, int]) -> None:
         self._sheet, self._where = sheet, where
@@ -202,21 +177,9 @@ class Panel:
 
 
 class Sheet(Drawing):
-    """A figure of panels that share their scales, of one slice.
+    """A figure of panels that share their scales, of one slice, along its dimensions `across` and `down`.
 
-    Parameters
-    ----------
-    data : Dataset
-        The slice of all panels.
-    x, y : str
-        The axes of a map; of curves `y` is the curve parameter, or None.
-    options : Options
-    across, down : str, optional
-        Dimensions that panels lie along.
-
-    Attributes
-    ----------
-    panels : list of Panel
+    `x` and `y` are the axes of a map; of curves `y` is the curve parameter, or None.
     """
 
     def __init__(
@@ -237,14 +200,13 @@ class Sheet(Drawing):
 
     def set_axis(self, side: str, name: str) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
-        values = self.panels[0].values(name)
+        values, label = self.panels[0].values(name), style.axis_label(name, self.options)
         for panel in self.panels:
             axes = panel.axes
-            getattr(axes, f"set_{side}lim")(values[0], values[-1])
+            axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": label})
             if is_log(values):
-                getattr(axes, f"set_{side}scale")("log")
+                axes.set(**{f"{side}scale": "log"})
                 log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
-            getattr(axes, f"set_{side}label")(style.axis_label(name, self.options))
             place = axes.get_subplotspec()
             outer = place is None or (place.is_last_col() if side == "y" else place.is_first_row())
             if style.is_acceleration(name) and (outer or self.options.ax is not None):
@@ -260,8 +222,7 @@ class Sheet(Drawing):
         """Add to the slice what charts of a result draw.
 
         ``drawn``, the values that may be drawn; `thresholds`; of displacements ``newmark``, that of Newmark's block,
-        and ``unsound``, where there is a trend that no block has.  Notes say how the two compare, and how much of the
-        slice is `marked`.
+        and ``unsound``, where there is a trend that no block has.  Notes compare the two, and say how much is `marked`.
         """
         drawn = reliable(self.data, name, self.options)
         self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
@@ -277,7 +238,7 @@ class Sheet(Drawing):
         self.notes += style.unsound_text(marked, *counts)
 
     def done(self, beside: bool = True) -> Figure:
-        """Draw legend and style.caption."""
+        """Draw legend and caption."""
         if self.options.ax is None:
             for panel in self.panels:
                 panel.axes.label_outer()
@@ -345,13 +306,11 @@ def log_ticks(axis: Any, span: float) -> None:
 def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> None:
     """An acceleration in the other unit, on the other side, with round values of its own."""
     factor, text = (g, f"{symbol} (m/s²)") if units == "g" else (1 / g, f"{symbol} (g)")
-    functions = (lambda a: a * factor, lambda a: a / factor)
     add: Any = axes.secondary_yaxis if side == "y" else axes.secondary_xaxis
-    other = add("right" if side == "y" else "top", functions=functions)
-    getattr(other, f"set_{side}label")(text)
+    other = add("right" if side == "y" else "top", functions=(lambda a: a * factor, lambda a: a / factor))
     low, high = getattr(axes, f"get_{side}lim")()
     # it would take them when it is drawn, too late for the layout to leave space for its numbers
-    getattr(other, f"set_{side}lim")(low * factor, high * factor)
+    other.set(**{f"{side}lim": (low * factor, high * factor), f"{side}label": text})
     if getattr(axes, f"get_{side}scale")() == "log":
         log_ticks(getattr(other, f"{side}axis"), high / low)
 
@@ -359,13 +318,8 @@ def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> N
 def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, zeros: bool = False) -> float:
     """A logarithmic ordinate that shows what is above `least`, and no more than seven decades.
 
-    With `zeros` curves come from below the axis: it begins at `least`.  Returns what may be drawn for values of zero:
-    a number below the end of the axis.
-
-    Raises
-    ------
-    InputError
-        No value is above zero.
+    With `zeros` curves come from below the axis: it begins at `least`.  Returns a number below the end of the axis,
+    that may be drawn for zero.  InputError: no value is above zero.
     """
     finite = values[np.isfinite(values)]
     there = finite[finite > 0]

@@ -40,28 +40,11 @@ Kept = slice | Sequence[Place]
 
 
 class Result:
-    """A result that is drawn.
+    """A result that is drawn: a dataset, and what it is called in errors.  Only what is drawn of it is read.
 
-    Parameters
-    ----------
-    data : Dataset
-        As a function of slipsweep returns it, or `slipsweep.open_result`: only what is drawn of it is read.
-    name : str or Path
-        What it is called in errors.
-
-    Attributes
-    ----------
-    sort : str
-        What it is a result of: "sweep", "statistics", "record", "suite", or one of `OTHER_SORTS`.
-    variables : list of str
-        Names of its results.
-    dims : list of str
-        Dimensions of its results.
-
-    Raises
-    ------
-    InputError
-        It is no result, does not say what was solved, or has other units than slipsweep writes.
+    `sort` says what it is a result of: "sweep", "statistics", "record", "suite", or one of `OTHER_SORTS`, of which only
+    limits have `variables`, the names of its results, and `dims`, their dimensions.  InputError: it is no result, does
+    not say what was solved, or has other units than slipsweep writes.
     """
 
     def __init__(self, data: xr.Dataset, name: str | Path) -> None:
@@ -122,10 +105,7 @@ class Result:
     def places(self, at: Mapping[str, At]) -> dict[str, list[Place]]:
         """Where on the axes the values requested are.
 
-        Raises
-        ------
-        InputError
-            As `slipsweep.files.selection.find`, or a value between those of the result where no slice can be solved.
+        InputError as `slipsweep.files.selection.find`, or for a value between those of the result where none is solved.
         """
         found = find(self.data, at, self.name)
         for name, places in found.items():
@@ -146,20 +126,9 @@ class Result:
     def select(self, names: Iterable[str], keep: Mapping[str, Kept], at: Mapping[str, At]) -> xr.Dataset:
         """The cells of a slice, read, or solved where they are not in the result.
 
-        Parameters
-        ----------
-        names : iterable of str
-            Results; of a sweep those that are not in the file are solved for the slice.
-        keep : mapping of axis to slice or places
-            The axes that stay, and what of them; a result may lack some.
-        at : mapping of axis to value
-            Where to cut the other axes.  Those not named are cut in the middle, `polarity` at 1.
-
-        Returns
-        -------
-        Dataset
-            With every parameter as a coordinate.  The attribute ``picked`` has the names of the case and motion that
-            were selected.
+        Results of a sweep that are not in the file are solved for the slice.  `keep` has what stays of the axes that
+        stay; the others are cut where `at` says, else in the middle, `polarity` at 1.  Every parameter is a coordinate,
+        and the attribute ``picked`` has the names of the case and motion that were selected.
         """
         cuts, index, exact, picked = self.places(at), {}, {}, {}
         for dim in self.dims:
@@ -210,7 +179,7 @@ class Result:
         self, options: Options, names: Sequence[str], x: str | Sequence[str], *, y: Sequence[str] = (),
         curves: Sequence[str] | None = None, keep: Mapping[str, Kept] | None = None, same: Sequence[str] = (),
     ) -> Sheet:  # fmt: skip
-        """The slice of a chart, in panels.
+        """The slice of a chart, in panels (InputError if an axis that was chosen is not there, or none is left).
 
         Parameters
         ----------
@@ -219,19 +188,12 @@ class Result:
             Results that it needs; the chart can be drawn over the axes of the first.
         x : str, or sequence of str
             What it is drawn over; or axes in order of preference, of which the user may choose another.
-        y : sequence of str
-            Of a map, vertical axes in order of preference.
-        curves : sequence of str, optional
-            Axes that tell curves apart, in order of preference, if one is there; without, there is one curve.
+        y, curves : sequence of str
+            Of a map, vertical axes; of curves, axes that tell them apart, if one is there; in order of preference.
         keep : mapping of axis to slice or places
             What else stays.
         same : sequence of str
             Axes that the results do not vary along in fact: no panels are made of them.
-
-        Raises
-        ------
-        InputError
-            An axis that was chosen is not there, or none is left.
         """
         kept: dict[str, Any] = {}
         at, places = dict(options.at), self.places(options.at)

@@ -44,18 +44,9 @@ def is_newmark(data: xr.Dataset) -> bool:
 
 
 def solve(data: xr.Dataset, names: Iterable[str], model: Model | None = None, **changed: Any) -> xr.Dataset:
-    """Solve the cells of a slice as the slice's result was solved.
+    """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate.
 
-    Parameters
-    ----------
-    data : Dataset
-        Gives the parameters and, in its attributes, model, excitation and solver.
-    names : iterable of str
-        Results.
-    model : Model, optional
-        Another model.
-    changed : DataArray, float or None
-        Parameters that differ; None stands for the model's own estimate.
+    The slice gives the parameters and, in its attributes, model, excitation and solver.
     """
     chosen = model or MODELS.from_attributes(data.attrs)
     block = ("yield_coefficient",) if "yield_coefficient" in data.coords else _BLOCK
@@ -128,15 +119,10 @@ def sides_of(limit: xr.DataArray) -> dict[str, Any]:
 
 
 def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray]:
-    """Where the displacement of a slice has a trend that no block has.
+    """Where the displacement of a slice has a trend that no block has, two arrays.
 
-    Returns
-    -------
-    DataArray of bool
-        Where it is smaller than at an amplitude that is 1 % smaller; of recorded motions than at the next smaller
-        amplitude of the slice.
-    DataArray of bool
-        Where it is less than half of that of Newmark's block, `theirs`.
+    It is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next smaller amplitude of
+    the slice; it is less than half of that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
     drive = next((name for name in ("displacement_amplitude", *STRENGTHS) if name in data.coords), "")

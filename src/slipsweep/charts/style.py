@@ -94,20 +94,10 @@ _WIDE = 5.0
 
 @dataclass
 class Options:
-    """What a user chooses about a chart: the parameters of `SlipsweepAccessor.chart`, checked.
+    """What a user chooses about a chart: the parameters of `SlipsweepAccessor.chart`, checked (InputError).
 
-    Attributes
-    ----------
-    heights : list of float
-        The levels as numbers in the variable's own unit, in order.
-    more_panels : bool
-        Panels lie along axes that would have one value otherwise.
-
-    Raises
-    ------
-    InputError
-        A level is no number with a unit of the variable, or not above zero; no figure can be so wide; there are more
-        than two axes of panels.
+    `heights` has the levels as numbers in the variable's own unit, in order.  With `more_panels` panels lie along axes
+    that would have one value otherwise.
     """
 
     x: str | None = None
@@ -158,10 +148,7 @@ class Options:
 
 
 def ratio_colours(number: int) -> ListedColormap:
-    """Colours of ratios, `number` below 1 and above: orange, grey at 1, blue.
-
-    Lightness falls from the least ratio to the largest, so that grey print is unambiguous.
-    """
+    """Colours of ratios, `number` below 1 (orange) and above (blue), darker from least to largest; grey at 1."""
     below, above = (
         LinearSegmentedColormap.from_list("", ends)(np.linspace(0, 1, number))
         for ends in (["#FFF4DF", "#F0BE7E"], ["#A4BCDC", "#3C68A8"])
@@ -267,11 +254,7 @@ _WORDS: dict[Any, str] = {
 
 
 def model_text(attributes: Mapping[Any, Any]) -> str:
-    """What is estimated in a result, its model and its shaking, on two lines.
-
-    Like ``Üy given; λ by Eq. 6, Δμ by Eqs. 10–11: estimated`` and
-    ``Mendez et al. 2012, monotone rise, recoupling by Eq. 12; 10 cycles of a sine``.
-    """
+    """What is estimated in a result, its model and its shaking, on two lines."""
     model = MODELS.from_attributes(attributes)
     words = [_WORDS[model.name], *(_WORDS[value] for value in model.options.values() if value in _WORDS)]
     recorded = next((name for name in ("record", "suite") if name in attributes), None)

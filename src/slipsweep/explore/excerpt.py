@@ -10,11 +10,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from slipsweep.charts.sheet import is_log
+from slipsweep.charts.slices import check_attributes
 from slipsweep.errors import InputError
 from slipsweep.files.opening import open_result
-from slipsweep.model.options import MODELS
+from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
-from slipsweep.motion.waveforms import WAVEFORMS
 from slipsweep.studies.suite_statistics import suite_statistics
 
 #: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
@@ -90,19 +91,14 @@ class Excerpt:
 
     def values(self, dim: str) -> NDArray[np.float64]:
         """The values along a dimension; one without a coordinate, such as `case`, counts from 1."""
-        return self.table[dim].values if dim in self.table.coords else np.arange(1.0, 1.0 + self.sizes[dim])
+        return axis_numbers(self.table, dim)
 
     def is_log(self, dim: str) -> bool:
         """Whether an axis is drawn by factors: the frequency, and others that are spread so."""
         values = self.values(dim)
         if values.size < 2 or values[0] <= 0.0 or dim in self.labels:
             return False
-        if dim == "frequency":
-            return True
-        if values.size < 3 or values[-1] < 3.0 * values[0]:
-            return False
-        steps, factors = np.diff(values), np.diff(np.log(values))
-        return bool(np.std(factors) / np.mean(factors) < np.std(steps) / np.mean(steps))
+        return dim == "frequency" or bool(values[-1] >= 3.0 * values[0] and is_log(values))
 
 
 def read_excerpt(path: Path, cells: int) -> Excerpt:
@@ -126,7 +122,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     if 0 in lengths.values():
         raise InputError(f"{path}: holds no cells")
     map_dims = _map_dims(path, lengths)
-    _check_attributes(path, result.attrs)
+    check_attributes(result.attrs, str(path))
     left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
     if math.prod(left.values()) > cells:
         raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
@@ -138,7 +134,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             raise InputError(f"{path}: {name}: lies along {beyond[0]}, along which no displacement does")
         about = (STATISTICS | RESULTS)[name]
         table[name] = table[name].astype(SHOWN[name]).assign_attrs(about)
-    labels = {dim: _labels(table, dim) for dim in lengths if dim not in PARAMETERS}
+    labels = {dim: axis_labels(table, dim) for dim in lengths if dim not in PARAMETERS}
     table = xr.Dataset({name: table[name].variable for name in names}, _coordinates(path, table), result.attrs)
     if "motion" in left and {"permanent_displacement", "validity"} <= {*names}:
         table = _with_statistics(table)
@@ -152,14 +148,6 @@ def _ascending(result: xr.Dataset, dim: str) -> NDArray[np.intp]:
     return np.arange(result.sizes[dim]) if values is None else np.argsort(values, kind="stable")
 
 
-def _labels(table: xr.Dataset, dim: str) -> list[str]:
-    """Names along a dimension that has no numbers: of cases and motions."""
-    name = "label" if dim == "case" and "label" in table.variables else dim
-    if name not in table.coords or table[name].dtype.kind not in "OUST":
-        return []
-    return [text.decode(errors="replace") if isinstance(text, bytes) else str(text) for text in table[name].values]
-
-
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
     found = suite_statistics(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES)
@@ -170,17 +158,6 @@ def _with_statistics(table: xr.Dataset) -> xr.Dataset:
         found[name] = found[name].astype(SHOWN[name]).assign_attrs(long_name=text)
     added = {name: found[name].variable for name in names}
     return table.assign(added).assign_coords({dim: found[dim].variable for dim in ("quantile", "threshold")})
-
-
-def _check_attributes(path: Path, attrs: Mapping[Any, Any]) -> None:
-    """Refuse a file that does not say any more what was solved (InputError)."""
-    recorded = bool({"record", "suite"} & attrs.keys())
-    for name in ("model", "g", *(() if recorded else ("waveform", "cycles"))):
-        if name not in attrs:
-            raise InputError(f"{path}: attribute {name!r}: missing; it says what was solved")
-    MODELS.from_attributes(attrs)
-    if not recorded:
-        WAVEFORMS.from_attributes(attrs)
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:

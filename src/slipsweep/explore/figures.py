@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, is_acceleration, length_text, unit
+from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, Options, axis_label, is_acceleration, length_text
 from slipsweep.explore.excerpt import Excerpt
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
 
@@ -25,10 +25,8 @@ def scale_of(name: str) -> str:
 
 def label(name: str, log: bool = False) -> str:
     """Long name, symbol and unit of a dimension, and its scale where it is no linear one."""
-    units = unit(name) if name in PARAMETERS else ""
-    symbol = SYMBOLS.get(name, "")
-    parts = [about(name)["long_name"], "" if len(symbol) > 4 else symbol, units and f"({units})"]
-    return " ".join(filter(None, parts)) + (", logarithmic scale" if log else "")
+    text = axis_label(name, Options()) if name in SYMBOLS else about(name)["long_name"]
+    return f"{text}{', logarithmic scale' * log}"
 
 
 def decades(excerpt: Excerpt) -> tuple[int, int]:

@@ -202,9 +202,8 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
         "cautions": int(flags_of(FlagKind.CAUTION)),
         "unsound": int(flags_of(FlagKind.CAUTION) | flags_of(FlagKind.NO_VALUE)),
         "g": float(table.attrs["g"]),
-        "histories": None
-        if histories is None
-        else {
+        "histories": histories
+        and {
             "keep": {dim: indices.tolist() for dim, indices in histories.keep.items()},
             "phase": histories.phase.tolist(),
             "ground": histories.ground.tolist(),
@@ -227,27 +226,24 @@ def _dimension(name: str) -> dict[str, Any]:
 
 def _thinned(excerpt: Excerpt) -> list[tuple[str, str]]:
     """Axes of which some values are left out, and those that are kept."""
-    return [
-        (
-            f"{dim}: {excerpt.sizes[dim]} of {length} values",
-            ", ".join(f"{value:.5g}" for value in excerpt.values(dim)) + (f" {unit(dim)}" if dim in PARAMETERS else ""),
-        )
-        for dim, length in excerpt.lengths.items()
-        if excerpt.sizes[dim] < length
-    ]
+    found = []
+    for dim, length in excerpt.lengths.items():
+        if excerpt.sizes[dim] < length:
+            values = ", ".join(f"{value:.5g}" for value in excerpt.values(dim))
+            units = f" {unit(dim)}" if dim in PARAMETERS else ""
+            found.append((f"{dim}: {excerpt.sizes[dim]} of {length} values", values + units))
+    return found
 
 
 def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
     """What the page leaves out, and how."""
-    shown = {dim: excerpt.sizes[dim] for dim in excerpt.lengths}
-    notes = []
-    if shown == excerpt.lengths:
-        notes.append(f"All {math.prod(shown.values()):,} cells of the file are in this page.")
-    else:
-        notes.append(
-            f"Thinned: {math.prod(shown.values()):,} of the file's {math.prod(excerpt.lengths.values()):,} cells are "
-            "in this page. Of each axis evenly spaced values are kept, with the first and last. Nothing is averaged."
-        )
+    shown, whole = (math.prod(sizes[dim] for dim in excerpt.lengths) for sizes in (excerpt.sizes, excerpt.lengths))
+    notes = [f"All {shown:,} cells of the file are in this page."]
+    if shown < whole:
+        notes = [
+            f"Thinned: {shown:,} of the file's {whole:,} cells are in this page. Of each axis evenly spaced values are "
+            "kept, with the first and last. Nothing is averaged."
+        ]
     low, high = decades(excerpt)
     notes.append(
         "Each cell is drawn half way to its neighbours. Displacements are kept in single precision; those beyond "
