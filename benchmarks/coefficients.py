@@ -1,4 +1,4 @@
-"""Coefficients of the polynomials of `slipsweep.jit.elementary` and `slipsweep.kernels.sine.newmark`, by mpmath.
+"""Coefficients of the polynomials of `slipsweep.jit.elementary`, by mpmath.
 
     python -m benchmarks.coefficients
 
@@ -90,12 +90,6 @@ def newmark_displacement(ratio: Any) -> Any:
     return mpmath.cos(onset) * slid - (mpmath.sin(stop) - ratio) - ratio * slid**2 / 2
 
 
-def _newmark_slide(z: Any) -> Any:
-    """What is left of W/A beside ε², ε = 1 − Üy/A, over z = 2√(Üy/A) − 1."""
-    ratio = ((z + 1) / 2) ** 2
-    return newmark_displacement(ratio) / (1 - ratio) ** 2
-
-
 with mpmath.workdps(DIGITS):
     #: A rounded quotient may leave a little more than ln 2 / 2.
     _HALF_LN2 = mpmath.log(2) / 2 * mpmath.mpf("1.0001")
@@ -108,7 +102,6 @@ APPROXIMATIONS = {
     "angle_minus_sine": Approximation("z", _after(3, lambda x: x - mpmath.sin(x)), 0, _QUARTER, 9),
     "half_square_minus_versine": Approximation("z", _after(4, lambda x: x**2 / 2 - 1 + mpmath.cos(x)), 0, _QUARTER, 9),
     "inverse_versine": Approximation("z", _after(1, mpmath.asin), 0, 0.5, 20, 4),
-    "newmark_slide": Approximation("z", _newmark_slide, -1, 1, 26, 4),
 }
 
 

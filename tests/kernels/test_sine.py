@@ -27,7 +27,6 @@ from slipsweep.kernels.block import (
     Options,
 )
 from slipsweep.kernels.grid import CELL
-from slipsweep.kernels.sine.newmark import solve_newmark_sine
 from slipsweep.kernels.sine.solve import solve_sine
 from tests.support.cases import read_cases
 
@@ -52,7 +51,7 @@ class Found(NamedTuple):
 
 def solve(cells: Cells, options: Options = PLAIN) -> Found:
     results = np.full((len(Motion._fields), cells.size), np.nan)
-    left = (solve_newmark_sine if options.rise == NEWMARK else solve_sine)(cells, options, results)
+    left = solve_sine(cells, options, results)
     return Found(results[0], results[1], results[2], results[3].astype(int), left)
 
 
@@ -78,7 +77,8 @@ def test_reference_cases(category: str) -> None:
     left = 0
     for case in (case for case in read_cases() if case.category == category and not case.uplift):
         rise = NEWMARK if case.model == "newmark" else {"monotone": MONOTONE, "literal": LITERAL}[case.rise]
-        options = Options(rise, {"eq12": EQ12, "integrate": INTEGRATE}[case.recoupling], case.cycles, True, G)
+        recoupling = EQ12 if case.recoupling == "eq12" and rise != NEWMARK else INTEGRATE
+        options = Options(rise, recoupling, case.cycles, True, G)
         inputs = (np.array([value]) for value in (case.theta, case.mu_s, case.amplitude))
         found = solve(cells_of(*inputs, **{name: np.array([value]) for name, value in case.given}), options)
         left += found.left

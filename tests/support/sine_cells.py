@@ -47,7 +47,6 @@ def event_by_event() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(solvers, "solve_sine", leave)
-        patch.setattr(solvers, "solve_newmark_sine", leave)
         yield
 
 

@@ -11,11 +11,10 @@ from slipsweep.kernels.block import UNSOLVED, Motion, Options
 from slipsweep.kernels.exact import workspace_of
 from slipsweep.kernels.grid import find_parameters
 from slipsweep.kernels.record import solve_record
-from slipsweep.kernels.sine.newmark import solve_newmark_sine
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.step import solve_steps
 from slipsweep.kernels.waves import solve_waves
-from slipsweep.model.options import Mendez, Newmark, Step
+from slipsweep.model.options import Mendez, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion.cutting import wave_of, wave_of_record
 from slipsweep.motion.records import Record
@@ -82,10 +81,9 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solv
 
     if not isinstance(motion, Sine) or motion.ramp_in or motion.ramp_out:
         return under_wave, 16
-    in_batches = solve_newmark_sine if isinstance(problem.model, Newmark) else solve_sine
 
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
-        if in_batches(cells, options, results):
+        if solve_sine(cells, options, results):
             left = np.flatnonzero(results[ROWS["validity"]] == UNSOLVED)
             found = np.empty((len(Motion._fields), left.size))
             under_wave(cells[left], found)

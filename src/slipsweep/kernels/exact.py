@@ -36,7 +36,7 @@ from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
 from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START, Wave
+from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, LAST, START, Wave
 
 #: Signs at the start of a phase are read this fraction of the phase inside it, but no closer to the start than this
 #: fraction of that: where a phase ends at a turn of E, the sign just behind is known only beyond rounding.
@@ -58,22 +58,18 @@ LOG = np.dtype(
 )  # fmt: skip
 
 
-#: What Eq. 4 gains over a piece (`eq4.Lag`), and the most that V gains on it up to a zero of D (−∞, if it has none).
-GAINS = np.dtype([("first", "f8"), ("second", "f8"), ("first_x", "f8"), ("second_x", "f8"), ("highest", "f8")])
-
-
 class Workspace(NamedTuple):
     """What the exact kernels write into, one for all cells.
 
     `log` has one row for each part of a pulse if a history is requested, else none, and `logged`, (1,), is how many
-    are in use; `gains` has a row for each piece of a cycle, and `zeros`, (2, MOST_PHASES), is for zeros of D on either
-    side of Üg = 0 (`continuous`); `known` is for pulses that come again (`train`).
+    are in use; `zeros`, (2, MOST_PHASES), is for zeros of D on either side of Üg = 0, and `zero_counts`, (2,), for how
+    many there are (`continuous`); `known` is for pulses that come again (`train`).
     """
 
     log: np.ndarray
     logged: np.ndarray
-    gains: np.ndarray
     zeros: np.ndarray
+    zero_counts: np.ndarray
     known: np.ndarray
 
 
@@ -121,8 +117,8 @@ def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
     return Workspace(
         log=np.empty(logged, LOG),
         logged=np.zeros(1, np.int64),
-        gains=np.empty(int(np.diff(wave.cycle).max()), GAINS),
         zeros=np.empty((2, MOST_PHASES)),
+        zero_counts=np.zeros(2, np.int64),
         known=np.empty((wave.height.size, 2)),
     )
 
@@ -131,8 +127,8 @@ def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
 def uncounted_workspace(workspace: Workspace) -> Workspace:
     """The same workspace (`decorators.uncounted`)."""
     return Workspace(
-        uncounted(workspace.log), uncounted(workspace.logged), uncounted(workspace.gains), uncounted(workspace.zeros),
-        uncounted(workspace.known),
+        uncounted(workspace.log), uncounted(workspace.logged), uncounted(workspace.zeros),
+        uncounted(workspace.zero_counts), uncounted(workspace.known),
     )  # fmt: skip
 
 
@@ -354,27 +350,6 @@ def follow(block: Block, pieces: np.ndarray, p: int, velocity: float, start: flo
     return Part(end, last, moved, max(last, velocity), min(last, velocity), stops)
 
 
-@scalar
-def glide(pieces: np.ndarray, p: int, end: int, amplitude: float, state: State) -> tuple[int, State]:
-    """`hold` along whole straight pieces from p on, before `end`, as long as V neither turns nor vanishes on one.
-
-    Most pieces of a record are such.  Returns the first piece that is not.
-    """
-    held, velocity, displacement, peak, least = state.held, state.velocity, state.displacement, state.peak, state.least
-    while p < end and pieces[p, DEGREE] <= 1.0:
-        rate, rate_end = amplitude * pieces[p, FIRST] - held, amplitude * pieces[p, LAST] - held
-        width = pieces[p, FINISH] - pieces[p, BEGIN]
-        last = velocity + 0.5 * (rate + rate_end) * width
-        if not last > 0.0 or opposite(rate, rate_end):
-            break
-        displacement += (velocity + (rate / 3.0 + rate_end / 6.0) * width) * width
-        velocity, peak, least = last, max(peak, last), min(least, last)
-        p += 1
-    return p, State(
-        velocity, displacement, held, state.sliding, peak, least, state.stopped_at, state.slips, state.logged
-    )
-
-
 # ------------------------------------------------------------------ along the pieces of a pulse
 
 
@@ -422,8 +397,6 @@ def rise(
             if not state.sliding or p == until:
                 break
             p += 1
-            if not phase.follows and log.size == 0:
-                p, state = glide(pieces, p, until, amplitude, state)
             tau = pieces[p, BEGIN]
         if not state.sliding and (p < until or tau < tau_until):
             if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
@@ -462,14 +435,6 @@ def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
 
 
 @scalar
-def end_of_fall(pieces: np.ndarray, p: int, end: int) -> int:
-    """The first piece from p on, up to piece `end`, on which the base's acceleration does not go on to fall."""
-    while p < end and pieces[p, FIRST] > pieces[p, LAST] and pieces[p, JUMPS] == 0.0:
-        p += 1
-    return p
-
-
-@scalar
 def hold_on(
     pieces: np.ndarray, p: int, amplitude: float, start: float, end: float, state: State, log: np.ndarray
 ) -> State:
@@ -491,8 +456,6 @@ def recouple(
     stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
     if recoupling == INTEGRATE:
         while state.sliding and q < min(p + 1, count):
-            if log.size == 0:
-                q, state = glide(pieces, q, min(p, count), block.amplitude, state)
             end = tau if q == p else pieces[min(q, count - 1), FINISH]
             if q < count and end > pieces[q, BEGIN]:
                 state = hold_on(pieces, q, block.amplitude, pieces[q, BEGIN], end, state, log)
@@ -552,9 +515,6 @@ def pulse(
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
                     state = hold_on(pieces, q, block.amplitude, part.end, pieces[q, FINISH], state, log)
-            elif state.sliding and log.size == 0:
-                q, state = glide(pieces, q + 1, end_of_fall(pieces, q + 1, end), block.amplitude, state)
-                q -= 1
         q += 1
         x, tau = block.amplitude * pieces[min(q, end - 1), FIRST], pieces[min(q, end - 1), BEGIN]
     if state.sliding:

@@ -13,15 +13,20 @@ from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     NEAR_MODE_LIMIT,
+    NEWMARK,
     NO_VALUE,
     UNSOLVED,
     Block,
     Motion,
+    response,
     settled,
     without_estimates,
 )
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.motion.pieces import BEGIN, FIRST, JUMPS, LAST, Wave
+
+#: Intervals of a rise at whose ends `yield_seems_to_govern` looks at Eq. 4.
+_INTERVALS = 32
 
 
 class Pulse(NamedTuple):
@@ -73,6 +78,21 @@ def rises_anew(pieces: np.ndarray, p: int) -> bool:
     first, last = pieces[p, FIRST], pieces[p, LAST]
     fell = p > 0 and pieces[p - 1, FIRST] > pieces[p - 1, LAST]
     return pieces[p, JUMPS] > 0.0 or (first > 0.0 and (first == last or (first < last and fell)))
+
+
+@scalar
+def yield_seems_to_govern(block: Block, wave: Wave) -> bool:
+    """Whether Eq. 4, by any law, stays at or below Üy on all rises; not said of Newmark's block, which has none."""
+    largest = -math.inf if block.rise != NEWMARK else math.inf
+    for i in range(wave.rises.shape[0]):
+        low, high = block.amplitude * wave.rises[i, 0], block.amplitude * wave.rises[i, 1]
+        low, before, now = max(low, block.yield_acceleration), math.inf, -math.inf
+        for j in range(_INTERVALS + 1 if high > block.yield_acceleration else 0):
+            eq4 = response(block, low + (high - low) * (j / _INTERVALS))
+            if before < now > eq4:  # the vertex of the parabola through three
+                largest = max(largest, now + (eq4 - before) * (eq4 - before) / (8.0 * (2.0 * now - before - eq4)))
+            largest, before, now = max(largest, eq4), now, eq4
+    return largest <= block.yield_acceleration
 
 
 @scalar

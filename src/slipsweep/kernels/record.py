@@ -37,15 +37,14 @@ from slipsweep.kernels.block import (
     stays_below_yield,
     store,
 )
-from slipsweep.kernels.continuous import zeros_of_relative_acceleration
-from slipsweep.kernels.eq4 import eq4_integrals
+from slipsweep.kernels.continuous import find_zeros, follow_eq4
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
-from slipsweep.kernels.excitation import offset_at, phase_at
+from slipsweep.kernels.excitation import phase_at
 from slipsweep.kernels.grid import cell_at, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
-from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, LAST, TOP, Wave
+from slipsweep.motion.pieces import BEGIN, END, LAST, TOP, Wave
 
 
 class Following(NamedTuple):
@@ -117,38 +116,6 @@ def end_of_following(block: Block, wave: Wave, k: int, following: int) -> Follow
 
 
 @scalar
-def follow_straight(
-    block: Block, wave: Wave, p: int, tau: float, until: Following, wants_peak: bool, workspace: Workspace
-) -> tuple[float, float, float]:
-    """Eq. 4 from rest, τ on piece p, to where it ends: gains of V and W, the largest V."""
-    pieces = wave.pieces
-    velocity, displacement, peak, up, down = 0.0, 0.0, 0.0, 0, 0
-    if wants_peak:
-        zeros = zeros_of_relative_acceleration(block, wave, workspace)
-        up, down = zeros.up, zeros.down
-        if min(up, down) < 0:
-            return math.nan, math.nan, math.nan
-    for q in range(p, min(until.piece + 1, pieces.shape[0])):
-        start = tau if q == p else pieces[q, BEGIN]
-        end = until.tau if q == until.piece else pieces[q, FINISH]
-        if not end > start:
-            continue
-        upper = pieces[q, TOP] > 0.0
-        first, last = block.amplitude * pieces[q, FIRST], block.amplitude * pieces[q, LAST]
-        for i in range(up if upper else down):
-            zero = workspace.zeros[0 if upper else 1, i]
-            if min(first, last) < zero < max(first, last):
-                at = offset_at(pieces, q, block.amplitude, zero)
-                if start < at < end:
-                    peak = max(peak, velocity + eq4_integrals(block, pieces, q, start, at)[0])
-        gained, displaced = eq4_integrals(block, pieces, q, start, end)
-        displacement += velocity * (end - start) + displaced
-        velocity += gained
-        peak = max(peak, velocity)
-    return velocity, displacement, peak
-
-
-@scalar
 def continuous_pulse(
     block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float,
     workspace: Workspace,
@@ -160,7 +127,9 @@ def continuous_pulse(
     """
     p, tau = beginning(block, wave, k)
     until = end_of_following(block, wave, k, following)
-    gained, displaced, most = follow_straight(block, wave, p, tau, until, options.wants_peak, workspace)
+    if not find_zeros(block, options.wants_peak, wave, workspace):
+        return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
+    gained, displaced, most = follow_eq4(block, wave, workspace, p, tau, until.piece, until.tau)
     after = velocity + gained
     displacement = velocity * (until.ends - phase_at(wave.pieces, p, tau)) + displaced
     if until.begins > until.ends:

@@ -28,8 +28,8 @@ from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
 from slipsweep.kernels.grid import cell_at
-from slipsweep.kernels.pulse import Pulse, beginning, motion_of, validity_before
-from slipsweep.kernels.series import series_of, yield_governs
+from slipsweep.kernels.pulse import Pulse, beginning, motion_of, validity_before, yield_seems_to_govern
+from slipsweep.kernels.series import Gain, series_of
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
@@ -382,13 +382,13 @@ _train = train_of(pulse)
 
 
 @scalar
-def follow(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, last: int, until: float) -> State:
-    """Eq. 4 throughout, from rest at τ on piece p to `until` on piece `last`."""
+def follow(block: Block, wave: Wave, steps: Steps, c: int, p: int, tau: float) -> Gain:
+    """Eq. 4 throughout, from rest at τ on piece p to the end of cycle c."""
     state = State(0.0, 0.0, 0.0, 0.0, 0.0, True, -math.inf, 0.0)
-    for q in range(p, last + 1):
-        begin, end = tau if q == p else pieces[q, BEGIN], until if q == last else pieces[q, FINISH]
-        state = walk(block, pieces, steps, q, begin, end, FOLLOWED, state)
-    return state
+    for q in range(p, wave.cycle[c + 1]):
+        begin = tau if q == p else wave.pieces[q, BEGIN]
+        state = walk(block, wave.pieces, steps, q, begin, wave.pieces[q, FINISH], FOLLOWED, state)
+    return Gain(state.velocity, state.displacement, state.peak)
 
 
 _slide_continuously = series_of(follow)
@@ -403,7 +403,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps
     if block.sliding_mode == eq.CONTINUOUS:
         found = _slide_continuously(block, wave, steps)
     elif block.sliding_mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
-        validity |= physics.YIELD_GOVERNS if yield_governs(block, wave) else 0
+        validity |= physics.YIELD_GOVERNS if yield_seems_to_govern(block, wave) else 0
         found = _train(block, options, wave, steps, steps.known)
     return motion_of(block, validity, found)
 

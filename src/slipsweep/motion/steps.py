@@ -10,9 +10,6 @@ from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, 
 #: Rules by which steps are taken.
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
-#: Cycles from which on the rounding of V over one (1e-14) is kept from adding up (`kernels.series`).
-_MANY = 64
-
 
 class Steps(NamedTuple):
     """The steps of a wave: `counts[p]` of one length on piece p, so that they end where it does.
@@ -21,8 +18,6 @@ class Steps(NamedTuple):
     ----------
     rule, per_cycle : int
         The rule by which they are taken (`kernels.step`), and how many are in 2π of phase, at least.
-    mirrored : bool
-        Whether the halves of a cycle that is repeated often are, but for the sign, the same.
     counts, at : ndarray of int, shape (pieces,)
         ``w[at[p] + 2 * i]`` is w where step i of piece p begins; w at its middle and at its end follow.
     w : ndarray, shape (values,)
@@ -33,7 +28,6 @@ class Steps(NamedTuple):
 
     rule: int
     per_cycle: int
-    mirrored: bool
     counts: np.ndarray
     at: np.ndarray
     w: np.ndarray
@@ -55,18 +49,10 @@ def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
     w += pieces[p, TOP]
     w[at], w[at + 2 * counts] = pieces[:, FIRST], pieces[:, LAST]
     w = np.copysign(np.maximum(np.copysign(1.0, pieces[p, TOP]) * w, 0.0), pieces[p, TOP])
-    mirrored = wave.repeats >= _MANY and _is_mirrored(w, at, wave.cycle[wave.lead], wave.cycle[wave.lead + 1])
     rates, known = np.empty(2 * int(counts.max()) + 1), np.empty((wave.height.size, 2))
-    return Steps(rule, steps_per_cycle, mirrored, counts, at, w, rates, known)
+    return Steps(rule, steps_per_cycle, counts, at, w, rates, known)
 
 
 def own_steps(steps: Steps) -> Steps:
     """The same steps with workspaces of their own, for another thread."""
     return steps._replace(rates=np.empty_like(steps.rates), known=np.empty_like(steps.known))
-
-
-def _is_mirrored(w: np.ndarray, at: np.ndarray, low: int, high: int) -> bool:
-    """Whether w(φ + π) = −w(φ) on pieces `low` to `high`."""
-    end = at[high] if high < at.size else w.size
-    first, second = w[at[low] : at[(low + high) // 2]], w[at[(low + high) // 2] : end]
-    return first.size == second.size and bool(np.allclose(first, -second, rtol=0.0, atol=1e-14))

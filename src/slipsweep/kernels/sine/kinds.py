@@ -7,7 +7,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
-from slipsweep.kernels.block import MONOTONE, Options, decay_rate_of, interface_of
+from slipsweep.kernels.block import MONOTONE, NEWMARK, Options, decay_rate_of, interface_of
 from slipsweep.kernels.sine.batch import (
     MOST_E_FOLDINGS,
     SLIDING_MODE,
@@ -20,8 +20,8 @@ from slipsweep.kernels.sine.batch import (
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
-#: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout, or b = Üy and then Eq. 4, or
-#: at rest until Eq. 4 falls below Üg; and Eq. 4 all the time.
+#: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's block, too), or
+#: b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; and Eq. 4 all the time.
 YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON = range(4)
 KINDS = 4
 #: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg; and any other.
@@ -83,6 +83,10 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
     for j in range(WIDTH):
         batch.decay_rate[j] = decay_rate_of(given(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g)
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
+    if options.rise == NEWMARK:
+        for j in range(WIDTH):
+            batch.kind[j] = YIELD_GOVERNS if batch.sliding_mode[j] == STICK_SLIP else RESTS
+        return
     lagging = 0
     if sticks > 0:
         for j in range(WIDTH):

@@ -6,7 +6,7 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar
-from slipsweep.kernels.block import UNSOLVED, Options, settled, without_estimates
+from slipsweep.kernels.block import NEWMARK, UNSOLVED, Options, settled, without_estimates
 from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
 from slipsweep.kernels.sine.batch import BATCH, DISPLACEMENT, PEAK_VELOCITY, VALIDITY, WIDTH, Batch, load
 from slipsweep.kernels.sine.continuous import find_peak_velocity, slide_on
@@ -45,7 +45,7 @@ def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) 
         rise(batch, kind, options.g)
         fall(batch, options)
         repeat(batch, kind, options)
-    governs = YIELD_GOVERNS_FLAG if kind == YIELD_GOVERNS else 0
+    governs = YIELD_GOVERNS_FLAG if kind == YIELD_GOVERNS and options.rise != NEWMARK else 0
     unsolved = 0
     for k in range(used):
         cell, displacement = batch.cell[k], batch.displacement[k]
