@@ -32,13 +32,9 @@ def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
     attributes = result.attrs
     recorded = is_recorded(result.data)
+    left_out = "; left out of contours and curves unless their caption says that it is drawn"
     hatched = [
-        f"{style.flag_name(flag)} ({flag.kind}): {flag.text}"
-        + (
-            "; left out of contours and curves unless their caption says that it is drawn"
-            if flag in style.LEFT_OUT
-            else ""
-        )
+        f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in style.LEFT_OUT else ''}"
         for flag in HATCHES
     ]
     sections: dict[str, list[str]] = {
@@ -59,9 +55,8 @@ def title_page(result: Result) -> Figure:
         ],
     }
     figure = Figure(figsize=(8.27, 11.69))
-    figure.text(
-        0.08, 0.94, style.plain(textwrap.fill(str(attributes.get("title", "")), 54)), fontsize="xx-large", va="top"
-    )
+    title = style.plain(textwrap.fill(str(attributes.get("title", "")), 54))
+    figure.text(0.08, 0.94, title, fontsize="xx-large", va="top")
     lines = []
     for heading, texts in sections.items():
         lines += ["", heading.upper()]
@@ -77,11 +72,10 @@ def _inputs(result: Result) -> list[str]:
     for name in PARAMETERS:
         if name not in result.data.coords:
             continue
-        values = np.unique(result.data[name].values)
-        ends = f"{values[0]:.4g} to {values[-1]:.4g}" if len(values) > 1 else f"{values[0]:.4g}"
-        number = f", {len(values)} values" if len(values) > 1 else ""
-        texts.append(
-            f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}: {style.with_unit(ends, style.unit(name))}{number}"
-        )
+        values, units = np.unique(result.data[name].values), style.unit(name)
+        text = style.with_unit(f"{values[0]:.4g}", units)
+        if len(values) > 1:
+            text = f"{values[0]:.4g} to {style.with_unit(f'{values[-1]:.4g}', units)}, {len(values)} values"
+        texts.append(f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}: {text}")
     labels = {dim: axis_labels(result.data, dim) for dim in NAMED if dim in result.dims}
     return texts + [f"{dim}s: {style.plain(', '.join(names))}" for dim, names in labels.items() if names]

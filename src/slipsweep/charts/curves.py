@@ -45,14 +45,14 @@ _ANSWERS: dict[str, dict[str, Any]] = {
 
 
 def families(result: Result, options: Options) -> Figure:
-    """Curves of a result over one axis, one for each value of another, and Newmark's beside displacements."""
+    """Curves of a result over one axis, one for each value of another, with Newmark's of displacements."""
     first = ("frequency", "yield_coefficient", "mu_s", "theta")
     name = result.quantity(options.variable)
     return _drawn(result.sheet(options, result.compared(name), DRIVES, curves=[*first, *result.wide]), name)
 
 
 def curve(result: Result, options: Options) -> Figure:
-    """One curve of a result over one axis, and Newmark's beside a displacement."""
+    """One curve of a result over one axis, with Newmark's of a displacement."""
     name = result.quantity(options.variable)
     return _drawn(result.sheet(options, result.compared(name), (*DRIVES, "yield_coefficient", "frequency")), name)
 
@@ -268,7 +268,7 @@ def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, l
 
 
 def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]) -> None:
-    """Draw Newmark's curve beside one of a family, with the same dash; beside one curve, dashed."""
+    """Draw Newmark's curve: thin, with the dash of its curve of a family; dashed where there is one curve."""
     single = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
     look = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
     panel.axes.plot(*_above_zero(curve), gid="newmark", **look)

@@ -168,7 +168,7 @@ def _fill_panels(
         xs, ys = panel.values(panel.x), panel.values(str(panel.y))
         with np.errstate(divide="ignore", invalid="ignore"):
             logs = np.log10(np.maximum(panel.grid("drawn"), least))
-        # what contours leave open beside the mode limit and cells without a value has the colours of the cells
+        # what contours leave open along the mode limit and cells without a value has the colours of the cells
         cells = np.ma.masked_invalid(logs)
         panel.axes.pcolormesh(xs, ys, cells, shading="nearest", zorder=0.4, rasterized=True, **look)
         sides = [np.ones_like(logs, bool)]
@@ -221,8 +221,7 @@ def _levels(name: str, values: Floats) -> list[float]:
         low, high = max(low, _LEAST), min(high, _MOST)
     else:
         low = max(low, high * 1e-5)
-    decades = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1)
-    every = [float(f"{digit}e{decade}") for decade in decades for digit in (1, 3)]
+    every = [float(f"{digit}e{decade}") for decade in range(-20, 20) for digit in (1, 3)]
     inside = [level for level in every if low * (1 - 1e-9) <= level <= high * (1 + 1e-9)]
     if len(inside) < 2:  # values of about one size: levels among them
         return [float(f"{level:.3g}") for level in np.geomspace(low, high, 6)] if high > low * 1.01 else []

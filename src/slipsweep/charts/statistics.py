@@ -72,7 +72,7 @@ def quantiles(result: Result, options: Options) -> Figure:
     for panel in sheet.panels:
         floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
         values = over(panel.data["displacement_quantile"], panel.data, ("quantile", panel.x)) * 1000.0
-        shown, xs = np.where(np.isnan(values), np.nan, np.maximum(values, floor)), panel.values(panel.x)
+        shown, xs = np.maximum(values, floor), panel.values(panel.x)
         pairs = [(low, shares.size - 1 - low) for low in range(shares.size // 2)]
         for number, (low, high) in enumerate(pairs):
             colour = mpl.colormaps["Blues"](0.2 + 0.3 * number / len(pairs))

@@ -74,7 +74,7 @@ def motions(result: Result, options: Options) -> Figure:
         draw_suite(sheet.legend, panel.axes, xs, lines, _band(panel.data, panel.x), floor)
         if "newmark_displacement" in panel.data:
             theirs = panel.data.assign({DISPLACEMENT: panel.data["newmark_displacement"]})
-            median = _raised(_band(theirs, panel.x)[1], floor)
+            median = np.maximum(_band(theirs, panel.x)[1], floor)
             sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(xs, median, gid="newmark", **_NEWMARK)[0]
     _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
     sheet.note_left_out(DISPLACEMENT)
@@ -196,7 +196,7 @@ def draw_suite(
 
     What is below `floor` is drawn there; that is outside of a logarithmic axis.
     """
-    lines, quantiles = _raised(lines, floor), _raised(quantiles, floor)
+    lines, quantiles = np.maximum(lines, floor), np.maximum(quantiles, floor)
     axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
     for row in lines:
         plot_curve(axes, xs, row, gid="motion", **_THIN)
@@ -207,11 +207,6 @@ def draw_suite(
     legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=BLUE, linestyle="--")
     if len(lines):
         legend["a motion"] = Line2D([], [], **_THIN)
-
-
-def _raised(values: Floats, floor: float) -> Floats:
-    """Values not below `floor`; NaN stays."""
-    return np.where(np.isnan(values), np.nan, np.maximum(values, floor))
 
 
 def suite_text(sizes: Mapping[Hashable, int]) -> str:

@@ -11,7 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.charts.sheet import is_log
-from slipsweep.charts.slices import check_attributes
+from slipsweep.charts.slices import Result
+from slipsweep.charts.solved import with_amplitude
 from slipsweep.errors import InputError
 from slipsweep.files.opening import open_result
 from slipsweep.files.selection import axis_labels, axis_numbers
@@ -111,7 +112,8 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     InputError
         The file cannot be read, or holds no displacement over two parameters.
     """
-    result = open_result(path)
+    result = Result(open_result(path), path).data  # checked, in increasing order
+    result = result.sortby([dim for dim in ("polarity",) if dim in result.dims])
     names = [name for name in SHOWN if name in result.data_vars]
     layers = [name for name in names if name in LAYERS]
     if not layers:
@@ -119,15 +121,12 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             f"{path}: holds no permanent_displacement to draw; add it to output.variables and run the sweep again"
         )
     lengths = {str(dim): size for name in layers for dim, size in result[name].sizes.items()}
-    if 0 in lengths.values():
-        raise InputError(f"{path}: holds no cells")
     map_dims = _map_dims(path, lengths)
-    check_attributes(result.attrs, str(path))
     left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
     if math.prod(left.values()) > cells:
         raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
-    keep = {dim: _ascending(result, dim)[evenly(length, left[dim])] for dim, length in lengths.items()}
-    table = result[names].isel(keep).transpose(*lengths, ...).load(scheduler="single-threaded")
+    keep = {dim: evenly(length, left[dim]) for dim, length in lengths.items()}
+    table = with_amplitude(result[names].isel(keep).transpose(*lengths, ...).load(scheduler="single-threaded"))
     for name in names:
         beyond = [dim for dim in table[name].dims if dim not in lengths]
         if beyond:
@@ -140,12 +139,6 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
         table = _with_statistics(table)
         left |= {dim: table.sizes[dim] for dim in ("quantile", "threshold")}
     return Excerpt(table, map_dims, lengths, left, {dim: texts for dim, texts in labels.items() if texts})
-
-
-def _ascending(result: xr.Dataset, dim: str) -> NDArray[np.intp]:
-    """The order in which the values of a dimension increase; that of the file where it is none of numbers."""
-    values = result[dim].values if dim in PARAMETERS and dim in result.coords else None
-    return np.arange(result.sizes[dim]) if values is None else np.argsort(values, kind="stable")
 
 
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
@@ -183,14 +176,6 @@ def _coordinates(path: Path, table: xr.Dataset) -> dict[str, Any]:
         for name, about in (PARAMETERS | STATISTIC_COORDINATES).items()
         if name in table.coords and table[name].dtype.kind in "iuf"
     }
-    if {"displacement_amplitude", "frequency"} <= coords.keys() and "amplitude" not in coords:
-        amplitude = (table["displacement_amplitude"] * (2.0 * math.pi * table["frequency"]) ** 2).variable
-        coords["amplitude"] = (amplitude.dims, amplitude.values, PARAMETERS["amplitude"])
-    if "waveform" in table.attrs and not any(name in STATISTICS for name in table.data_vars):
-        interface = () if "yield_coefficient" in coords else ("theta", "mu_s")
-        for name in (*interface, "amplitude", "frequency"):
-            if name not in coords:
-                raise InputError(f"{path}: {name}: not in the file, but the page needs it")
     for name, (_, values, _) in coords.items():
         if not (np.abs(values) < _MOST).all():
             raise InputError(f"{path}: {name}: values are missing, or too large to draw")
