@@ -124,15 +124,6 @@ def test_the_name_of_the_output(tmp_path: Path, text: str, arguments: tuple[str,
     assert names(tmp_path) == {"small.toml", name}
 
 
-def test_an_existing_output_is_replaced_only_with_overwrite(small: Path) -> None:
-    (small / "small.nc").write_text("mine")
-    assert_fails(command(small, "run", "small.toml"), 2, "small.nc: exists already; give --overwrite")
-    assert (small / "small.nc").read_text() == "mine"
-    assert command(small, "run", "small.toml", "--overwrite").returncode == 0
-    assert command(small, "info", "small.nc").returncode == 0
-    assert names(small) == {"small.toml", "small.nc"}
-
-
 def test_a_sweep_from_standard_input(tmp_path: Path) -> None:
     done = subprocess.run([*SLIPSWEEP, "run", "-", "-o", "a.nc"], cwd=tmp_path, input=SMALL, text=True, check=False)
     assert done.returncode == 0

@@ -116,11 +116,8 @@ def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.limiting_acceleration, eq7, rtol=1e-6)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_words(folder: Path, tmp_path: Path, suffix: str) -> None:
-    if suffix == ".parquet":
-        pytest.importorskip("pyarrow")
-    codes, words = tmp_path / f"codes{suffix}", tmp_path / f"words{suffix}"
+def test_words(folder: Path, tmp_path: Path) -> None:
+    codes, words = tmp_path / "codes.csv", tmp_path / "words.csv"
     for path, wanted in ((codes, False), (words, True)):
         export.export(folder / "cases.nc", path, words=wanted)
     coded, worded = bare(read(codes)), bare(read(words))
@@ -363,29 +360,9 @@ def test_what_has_no_flags(data: xr.Dataset | xr.DataArray, message: str) -> Non
         slipsweep.flags(data)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_packed_numbers_are_unpacked(folder: Path, tmp_path: Path, suffix: str) -> None:
-    """By scale_factor and add_offset, as programs that pack leave them."""
-    if suffix == ".parquet":
-        pytest.importorskip("pyarrow")
-    packed, path = tmp_path / "packed.nc", tmp_path / f"t{suffix}"
-    with xr.open_dataset(folder / "cases.nc") as data:
-        encoding = {"dtype": ">i2", "scale_factor": 0.001, "add_offset": -1.0, "_FillValue": -32768}
-        expected = data.permanent_displacement.values.ravel()
-        data.drop_encoding().to_netcdf(packed, encoding={"permanent_displacement": encoding})
-    export.export(packed, path, words=True)
-    table = bare(read(path))
-    np.testing.assert_allclose(table["permanent_displacement"], expected, atol=0.0005)
-    assert np.isnan(expected).any()
-    assert set(table["sliding_mode"].dropna()) <= {"stuck", "stick_slip", "continuous"}
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_words_of_one_cell(folder: Path, tmp_path: Path, suffix: str) -> None:
+def test_words_of_one_cell(folder: Path, tmp_path: Path) -> None:
     """A file without dimensions is a table of one row."""
-    if suffix == ".parquet":
-        pytest.importorskip("pyarrow")
-    cell, path = tmp_path / "cell.nc", tmp_path / f"t{suffix}"
+    cell, path = tmp_path / "cell.nc", tmp_path / "t.csv"
     with xr.open_dataset(folder / "cases.nc", mask_and_scale=False) as data:
         data.isel(case=0, frequency=1).to_netcdf(cell)
     assert export.export(cell, path, words=True) == 1

@@ -70,7 +70,7 @@ class Started:
 
     def finished(self, status: int | None = 0) -> str:
         """What it has said on standard error; it must end with a status, and never with a traceback."""
-        self.process.join(300)
+        self.process.join(900)  # kernels may have to be compiled
         errors = self.errors.read_text()
         assert "Traceback" not in errors, errors
         assert status is None or self.process.exitcode == status, (self.process.exitcode, errors)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import dask.array as da
 import numpy as np
 import xarray as xr
 
@@ -91,6 +90,8 @@ class Job:
 
     def outline(self, command: str) -> xr.Dataset:
         """As `described`, but with lazy arrays where the results will stand."""
+        import dask.array as da  # takes as long as xarray: only for runs in chunks
+
         template = self.plan.template()
         for name, one in template.data_vars.items():
             template[name] = (one.dims, da.zeros(one.shape, dtype=one.dtype, chunks=-1), one.attrs)

@@ -23,7 +23,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import dask.array as da
 import numpy as np
 import xarray as xr
 from fsspec.core import url_to_fs
@@ -36,7 +35,6 @@ from slipsweep.files.opening import check_zarr, read_result
 from slipsweep.files.outputs import appear, check_outputs, complete_or_absent, writing
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, chunk_lengths, grid_chunks, places
-from slipsweep.grid.graph import chunk_at, solved_chunks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
 
@@ -229,6 +227,8 @@ class _Chunks:
 
     def chunk(self, number: int) -> Chunk:
         """Where a chunk lies in the grid."""
+        from slipsweep.grid.graph import chunk_at  # imports dask: only for runs in chunks
+
         return chunk_at(self.cut, tuple(map(int, np.unravel_index(number, self.shape))))
 
     @contextmanager
@@ -448,6 +448,8 @@ class _ZarrChunks(_Chunks):
         return {"store": self.store, "place": self.place, "cut": self.cut, "results": results}
 
     def written(self, solved: Any) -> Any:
+        import dask.array as da
+
         meta = np.empty((0,) * solved.ndim, bool)
         return da.map_blocks(_write_region, solved, **self._about, dtype=bool, meta=meta)
 
@@ -477,6 +479,8 @@ def _write_region(
     block_id: tuple[int, ...],
 ) -> NDArray[np.bool_]:
     """Write a chunk to its region of a Zarr store, then its mark, in this process or a worker."""
+    from slipsweep.grid.graph import chunk_at
+
     arrays, chunk = solved.item() if isinstance(solved, np.ndarray) else solved, chunk_at(cut, block_id)
     for name, (dims, dtype) in results.items():
         one = xr.Dataset({name: (dims, arrays[name].astype(dtype, copy=False))})
@@ -494,6 +498,8 @@ def _write_region(
 
 def _solve_here(chunks: _Chunks, progress: Callable[[int], None]) -> None:
     """Compute the chunks that are missing; one thread writes each while the next is computed."""
+    from slipsweep.grid.graph import solved_chunks
+
     solved = solved_chunks(chunks.job.plan, chunks.cut)
     with ThreadPoolExecutor(1) as writer:
         waiting: Future[None] | None = None
@@ -511,6 +517,8 @@ def _solve_elsewhere(
     chunks: _Chunks, workers: int | None, scheduler: str | None, progress: Callable[[int], None]
 ) -> None:
     """Have the chunks that are missing computed by workers, and written by them or here as they come back."""
+    from slipsweep.grid.graph import solved_chunks
+
     solved = solved_chunks(chunks.job.plan, chunks.cut)
     written = chunks.written(solved)
     with cluster.connected(workers, scheduler) as client:
