@@ -220,8 +220,8 @@ def test_hard_cases_converge_at_first_order(rule: str) -> None:
     """Slides and layers of friction shorter than steps, 10^6 cycles, rounding at its worst: worst of three step counts.
 
     Sixteen times the steps, a twelfth of the error, until it is 100 times what one ulp of the inputs does, or
-    1e-16 A/omega^2 (a slide of less than that, at a tangential onset).  Over 1000 cycles and more the rounding of V in one,
-    1e-14 A/omega, adds up with their square (docs/hard-cases.md).
+    1e-16 A/omega^2 (a slide of less than that, at a tangential onset).  Over 1000 cycles and more the rounding of V in
+    one, 1e-14 A/omega, adds up with their square (docs/hard-cases.md).
     """
     counts = [1024, 1192, 1360]
     coarse = [solve_cases(HARD_CASES, rule, count) for count in counts]
@@ -234,7 +234,7 @@ def test_hard_cases_converge_at_first_order(rule: str) -> None:
             assert isfinite(run[case.case][0]), f"displacement of case {case}"
             assert 0 <= run[case.case][1] < np.inf, f"peak velocity of case {case}"
         before, after = (max(case.times_bound(run[case.case][0]) for run in runs) for runs in (coarse, fine))
-        rounding = 1e-14 * case.cycles**2 if case.cycles >= 1000 else 1e-16
+        rounding = pi * 1e-14 * case.cycles**2 if case.cycles >= 1000 else 1e-16
         least = rounding * case.displacement_scale / float(case.displacement_bound)
         if not after <= max(100.0, least, before / 16**0.9):
             slow.append(f"case {case}: {before:.1e} to {after:.1e} times the conditioning bound")
