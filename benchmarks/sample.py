@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import slipsweep
 from benchmarks.grids import G
-from tests.support.cases import read_cases
+from tests.support.cases import OPTIONAL_INPUTS, read_cases
 from tests.support.reference import solve
 
 SAMPLE = Path(__file__).parent / "data" / "sample.csv"
@@ -116,7 +116,7 @@ def _hard() -> list[dict[str, Any]]:
             "category": case.category,
             "model": case.model,
             **{name: getattr(case, name) for name in INPUTS[:4]},
-            **dict(case.given),
+            **{name: getattr(case, name) for name in OPTIONAL_INPUTS if getattr(case, name) is not None},
         }
         for case in read_cases()
         if case.category in HARD and (case.rise, case.recoupling) == ("monotone", "eq12") and not case.uplift

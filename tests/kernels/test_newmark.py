@@ -1,18 +1,15 @@
-"""Outside checks: Newmark's block against pySLAMMER, every mode against SciPy's integrators."""
+"""Newmark's block under a sine: against pySLAMMER, its closed form to the last digits, and what reduces to it."""
 
-from collections.abc import Callable
-from math import asin, atan, exp, inf, pi, radians, sin, tan
+from math import atan, radians, tan
 
 import mpmath
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import slipsweep
 from benchmarks.coefficients import newmark_displacement
-from tests.support.cases import Case, choices, read_cases
+from tests.support.cases import choices
 
 G = 9.81
 
@@ -20,9 +17,7 @@ NEWMARK_BLOCKS = pytest.mark.parametrize(
     ("theta", "mu_s", "amplitude", "frequency", "cycles"),
     [
         (10.0, 0.4, 4.0, 1.0, 3),
-        (20.0, 0.6, 3.5, 0.5, 2),
         (0.0, 0.3, 5.0, 2.0, 3),
-        (15.0, 0.35, 2.0, 1.0, 2),
         (5.0, 0.5, 5.0, 1.0, 2),
     ],
 )
@@ -79,174 +74,6 @@ def test_newmark_to_the_last_digits() -> None:
             fastest = 2 * amplitude * (mpmath.sqrt(1 - share**2) - share * mpmath.acos(share)) / omega
             assert abs(displacement / slid - 1) < 1.5e-15, f"displacement at {float(share)}"
             assert abs(velocity / fastest - 1) < 1.5e-15, f"peak velocity at {float(share)}"
-
-
-class Integrated:
-    """One cell of cases.csv by `solve_ivp`, in phase: V = omega v, W = omega**2 u."""
-
-    def __init__(self, case: Case) -> None:
-        given = dict(case.given)
-        self.case = case
-        self.tan_theta = tan(radians(case.theta))
-        self.onset = given.get("yield_acceleration", G * tan(atan(case.mu_s) - radians(case.theta)))
-        self.limit = (self.onset + G * case.mu_s) / (1 - self.tan_theta * (case.mu_s - self.tan_theta))
-        self.is_continuous = case.amplitude > self.limit and case.model == "mendez"
-        ratio = case.amplitude / self.limit
-        delta_mu = case.mu_s * ((ratio if self.is_continuous else 1 / ratio) - 1)
-        self.at_rest = case.mu_s + given.get("delta_mu", delta_mu)
-        lowest = 0.01 if self.is_continuous else case.mu_s**2 * ratio
-        self.decay = given.get("decay_rate", G / case.amplitude * np.log(self.at_rest / lowest)) / G
-        self.velocity = self.displacement = self.peak = 0.0
-
-    def ground(self, phi: float) -> float:
-        return self.case.amplitude * sin(phi)
-
-    def eq4(self, ground: float) -> float:
-        friction = self.at_rest * exp(-self.decay * abs(ground))
-        normal = G + ground * self.tan_theta
-        size = abs(ground) - normal * (self.case.mu_s - self.tan_theta - friction) - G * self.tan_theta
-        return size if ground >= 0 else -size
-
-    def following(self, least: float = -inf) -> Callable[[float], float]:
-        """Block acceleration of Eq. 4, not below `least`."""
-        return lambda phi: max(least, self.eq4(self.ground(phi)))
-
-    def holding(self, held: float) -> Callable[[float], float]:
-        return lambda phi: held
-
-    def follow(self, block: Callable[[float], float], start: float, stop: float, may_stop: bool) -> float | None:
-        """Integrate Ug - b; the phase of the stop if there is one."""
-
-        def rest(phi: float, y: np.ndarray) -> float:
-            return float(y[0]) + 1e-13 * self.case.amplitude
-
-        rest.terminal, rest.direction = may_stop, -1  # type: ignore[attr-defined]
-
-        def crest(phi: float, y: np.ndarray) -> float:
-            return self.ground(phi) - block(phi)
-
-        solution = solve_ivp(
-            lambda phi, y: [self.ground(phi) - block(phi), y[0]],
-            (start, stop),
-            [self.velocity, self.displacement],
-            method="DOP853",
-            events=(rest, crest),
-            rtol=1e-11,
-            atol=1e-13 * self.case.amplitude,
-            max_step=0.02,
-        )
-        self.velocity, self.displacement = solution.y[:, -1]
-        crests = solution.y_events[1]
-        self.peak = max(self.peak, solution.y[0].max(), crests[:, 0].max() if len(crests) else 0.0)
-        if solution.status == 1:
-            self.velocity = 0.0
-            return float(solution.t[-1])
-        return None
-
-    def continuous(self) -> None:
-        start = asin(self.onset / self.case.amplitude)
-        for quarter in range(1, 4 * self.case.cycles + 1):
-            self.follow(self.following(), start, quarter * pi / 2, may_stop=False)
-            start = quarter * pi / 2
-
-    def slide_begins(self, phi: float) -> float | None:
-        """First phase from `phi` to the peak at which Eq. 4 lies below Ug."""
-        if self.case.model == "newmark":
-            return phi
-        phases = np.linspace(phi, pi / 2, 4001)
-        excess = [self.ground(p) - self.eq4(self.ground(p)) for p in phases]
-        first = next((i for i, value in enumerate(excess) if value > 0), None)
-        if not first:
-            return None if first is None else phi
-        return float(brentq(lambda p: self.ground(p) - self.eq4(self.ground(p)), *phases[first - 1 : first + 1]))
-
-    def stick_slip(self) -> None:
-        onset_phase = asin(self.onset / self.case.amplitude)
-        integrate = self.case.recoupling == "integrate" or self.case.model == "newmark"
-        for cycle in range(self.case.cycles):
-            last = cycle == self.case.cycles - 1
-            held = self.rise(onset_phase)
-            if held is None:
-                continue
-            end = 2 * pi + (0.0 if last else onset_phase)
-            stopped = self.follow(self.holding(held), pi / 2, end if integrate else pi, may_stop=True)
-            if stopped is None:
-                self.eq12(held, 0.0 if integrate else end - pi, last)
-
-    def rise(self, phi: float) -> float | None:
-        """From the onset to the peak; b there, or None if the block is then at rest."""
-        top = self.case.amplitude
-        while True:
-            if self.velocity == 0:
-                begins = self.slide_begins(phi)
-                if begins is None:
-                    return None
-                phi = begins
-            if self.case.model == "newmark":
-                first, held = self.onset, self.onset
-                block = self.holding(first)
-            elif self.case.rise == "literal":
-                held = self.eq4(top)
-                block = self.following()
-            else:  # Eq. 4 is convex in these cells
-                first = max(self.onset, self.eq4(self.ground(phi)))
-                held = max(first, self.eq4(top))
-                block = self.following(first)
-            stopped = self.follow(block, phi, pi / 2, may_stop=True)
-            if stopped is None:
-                return held
-            phi = stopped
-
-    def eq12(self, held: float, span: float, last: bool) -> None:
-        stop = self.velocity / held
-        span = stop if last else min(span, stop)
-        self.displacement += self.velocity * span - held * span**2 / 2
-        self.velocity = max(self.velocity - held * span, 0.0)
-
-
-CATEGORIES = (
-    "stick_slip",
-    "continuous",
-    "measured_yield",
-    "given_friction",
-    "newmark",
-    "literal",
-    "integrate",
-    "near_failure",
-    "restick",
-    "level_plane",
-)
-
-
-def convex(case: Case) -> bool:
-    """lambda >= 2 tan(theta), for which Eq. 4 is convex on the rise; calibrated values are."""
-    return dict(case.given).get("decay_rate", 10.0) >= 2 * tan(radians(case.theta))
-
-
-INTEGRATED = [
-    case
-    for category in CATEGORIES
-    for case in [case for case in read_cases() if case.category == category and not case.uplift and convex(case)][:3]
-]
-
-
-@pytest.mark.parametrize("case", INTEGRATED, ids=str)
-def test_motion_against_scipy(case: Case) -> None:
-    """DOP853 at rtol 1e-11 with events: agreement to 1e-8 asks for the same rules, not the same code."""
-    integrated = Integrated(case)
-    if integrated.is_continuous:
-        integrated.continuous()
-    else:
-        integrated.stick_slip()
-    omega = 2 * pi * case.frequency
-    result = slipsweep.sweep(case.theta, case.mu_s, case.amplitude, case.frequency, **choices(**case.options))
-    displacement, velocity = integrated.displacement / omega**2, integrated.peak / omega
-    assert float(result.permanent_displacement) == pytest.approx(
-        displacement, rel=1e-8, abs=1e-10 * case.displacement_scale
-    ), "displacement"
-    assert float(result.peak_relative_velocity) == pytest.approx(velocity, rel=1e-8, abs=1e-10 * case.velocity_scale), (
-        "peak velocity"
-    )
 
 
 @pytest.mark.parametrize("solver", ["cycle", "step"])

@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf, workdps
 
 import slipsweep
-from slipsweep.errors import InputError
-from slipsweep.model import equations as eq
 from slipsweep.model.variables import DEFAULT_RESULTS, VALUELESS, Validity
 from tests.support import reference, strategies
 from tests.support.cases import choices
@@ -47,29 +45,15 @@ def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
 @strategies.reproducible
 @given(cell=strategies.sliding_cells, power=st.integers(-20, 20))
 def test_scaling_law_is_exact_for_powers_of_two(solver: str, cell: strategies.Cell, power: int) -> None:
-    """u goes with f^-2 and v with f^-1: a power of two changes no digit."""
+    """u goes with f^-2 and v with f^-1: a power of two changes no digit; one of an axis is that one by itself."""
     cell = {**cell, "solver": solver, "steps_per_cycle": COARSE}
     one = respond(cell)
     other = respond(cell, frequency=cell["frequency"] * 2.0**power)
+    axis = respond(cell, frequency=[cell["frequency"], 7.0, cell["frequency"] * 2.0**power])
+    assert axis.permanent_displacement.values[::2].tolist() == [value(one), value(other)]
     assert value(other) == value(one) * 2.0 ** (-2 * power), "displacement"
     assert value(other, "peak_relative_velocity") == value(one, "peak_relative_velocity") * 2.0**-power, "velocity"
     assert int(other.validity) == int(one.validity)
-
-
-@SOLVERS
-@strategies.reproducible
-@given(cell=strategies.sliding_cells, other=st.floats(1e-6, 1e6))
-def test_scaling_law_to_rounding(solver: str, cell: strategies.Cell, other: float) -> None:
-    """A frequency axis, one after another or each on its own, gives W/omega^2 to a few roundings."""
-    cell = {**cell, "solver": solver, "steps_per_cycle": COARSE}
-    one = respond(cell)
-    axis = respond(cell, frequency=[cell["frequency"], other])
-    ratio = cell["frequency"] / other
-    roundings = 8 * np.finfo(float).eps
-    for name, power in (("permanent_displacement", 2), ("peak_relative_velocity", 1)):
-        found = axis[name].to_numpy()
-        assert found[0] == value(one, name), name
-        assert isclose(found[1], value(one, name) * ratio**power, rel_tol=roundings, abs_tol=0), name
 
 
 # Signs and order
@@ -184,52 +168,6 @@ def test_level_plane_velocity_repeats(solver: str, cell: strategies.Cell) -> Non
     assert isclose(ten - three, 7 * gained, rel_tol=1e-11, abs_tol=1e-11 * scale), "displacement gained in seven"
 
 
-# The two solvers
-
-
-@strategies.reproducible
-@given(cell=strategies.stick_slip() | strategies.newmark(), options=strategies.model_options)
-def test_solvers_agree_in_stick_slip(cell: strategies.Cell, options: dict[str, str]) -> None:
-    assert_solvers_agree({**cell, **options})
-
-
-@strategies.reproducible
-@given(cell=strategies.continuous())
-def test_solvers_agree_in_continuous_mode(cell: strategies.Cell) -> None:
-    assert_solvers_agree(cell)
-
-
-@strategies.reproducible
-@given(cell=strategies.given_friction(), options=strategies.model_options)
-def test_solvers_agree_with_given_friction(cell: strategies.Cell, options: dict[str, str]) -> None:
-    assert_solvers_agree({**cell, **options})
-
-
-def assert_solvers_agree(cell: strategies.Cell) -> None:
-    """Trapezoid with 8192 steps: 2e-3, and in continuous mode, where u may cancel, of A/omega^2."""
-    exact = respond(cell, solver="cycle")
-    stepped = respond(cell, solver="step", rule="trapezoid", steps_per_cycle=FINE)
-    for found in (exact, stepped):  # of a displacement that is 0 but for roundings they may have either sign
-        # zero to rounding is none upslope
-        rounding = 1e-12 * cell["amplitude"] / (2 * pi * cell["frequency"]) ** 2
-        assert bool(int(found.validity) & Validity.UPSLOPE) == (value(found) < -rounding), "upslope"
-    others = ~int(Validity.UPSLOPE)
-    assert int(exact.validity) & others == int(stepped.validity) & others, "validity"
-    assert int(exact.sliding_mode) == int(stepped.sliding_mode), "sliding mode"
-    if int(exact.validity) & VALUELESS:
-        assert isnan(value(exact))
-        assert isnan(value(stepped))
-        return
-    second = strategies.phase_scale(cell)
-    continuous = int(exact.sliding_mode) == 2
-    for name, scale, growth in (
-        ("permanent_displacement", cell["amplitude"] * second**2, cell["cycles"] ** 2),
-        ("peak_relative_velocity", cell["amplitude"] * second, cell["cycles"]),
-    ):
-        absolute = (1e-5 * growth if continuous else 1e-12) * scale
-        assert isclose(value(stepped, name), value(exact, name), rel_tol=2e-3, abs_tol=absolute), name
-
-
 # Validity
 
 
@@ -328,34 +266,6 @@ def test_each_flag(changes: dict[str, Any], expected: int) -> None:
     assert isnan(value(result)) == bool(expected & VALUELESS)
 
 
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("theta", -1.0),
-        ("theta", 90.0),
-        ("theta", float("nan")),
-        ("mu_s", 0.0),
-        ("mu_s", -0.3),
-        ("amplitude", -1e-9),
-        ("amplitude", float("inf")),
-        ("frequency", 0.0),
-        ("frequency", -1.0),
-        ("cycles", 0),
-        ("cycles", 2.5),
-        ("decay_rate", -0.1),
-        ("delta_mu", -0.1),
-        ("minimum_friction", 0.0),
-        ("yield_acceleration", float("nan")),
-        ("structure_frequency", 0.0),
-    ],
-)
-def test_input_that_no_physics_allows_is_named(name: str, wrong: float) -> None:
-    with pytest.raises(InputError) as error:
-        respond(STANDING, **{name: wrong})
-    assert name in str(error.value)
-    assert f"{wrong:g}" in str(error.value) or repr(wrong) in str(error.value), "the value"
-
-
 # How a sweep is written
 
 AXES: dict[str, Any] = {
@@ -367,12 +277,10 @@ AXES: dict[str, Any] = {
 WRITTEN = pytest.mark.parametrize(
     "options",
     [
-        {"solver": "cycle"},
-        {"solver": "step", "steps_per_cycle": 128},
         {"solver": "cycle", "yield_acceleration": 0.375, "rise": "literal"},
-        {"solver": "step", "steps_per_cycle": 128, "model": "newmark"},
+        {"solver": "step", "steps_per_cycle": 128},
     ],
-    ids=["cycle", "step", "cycle-literal", "step-newmark"],
+    ids=["cycle-literal", "step"],
 )
 
 
@@ -439,23 +347,6 @@ def test_one_cell_is_a_cell_of_the_grid(options: dict[str, Any]) -> None:
         assert_same(slipsweep.sweep(**choices(**cell, **options)), expected.isel(index))
 
 
-@WRITTEN
-@pytest.mark.parametrize(
-    "chunks",
-    [
-        {"theta": 2, "mu_s": 4, "amplitude": 4, "frequency": 3},
-        {"theta": 5, "mu_s": 1, "amplitude": 9, "frequency": 1},
-    ],
-    ids=["blocks", "thin"],
-)
-def test_chunked_is_eager(options: dict[str, Any], chunks: dict[str, int]) -> None:
-    """Bit for bit, and nothing computed until asked."""
-    lazy = slipsweep.sweep(**choices(**AXES, **options, chunks=chunks))
-    assert all(hasattr(lazy[name].data, "dask") for name in DEFAULT_RESULTS), "lazy"
-    assert dict(lazy.chunksizes)["theta"] == tuple(min(chunks["theta"], 5 - i) for i in range(0, 5, chunks["theta"]))
-    assert_same(lazy.compute(), slipsweep.sweep(**choices(**AXES, **options)))
-
-
 @pytest.mark.parametrize("name", ["yield_acceleration", "decay_rate", "delta_mu", "minimum_friction"])
 def test_default_given_back_changes_nothing(name: str) -> None:
     """A parameter given at its own estimate is the estimate, to the conditioning of the cells."""
@@ -506,39 +397,3 @@ def test_grazing_displacement_has_its_leading_term() -> None:
             exact = reference.solve(10.0, 0.6, amplitude, 1.0, yield_acceleration=onset, cycles=1, model="newmark")
             error = abs(mpf(value(result)) - exact.permanent_displacement) / exact.permanent_displacement
             assert error < 8 * mp.mpf(2) ** -52 / excess, "no digits lost beyond those of A/Uy - 1"
-
-
-# Continuous sliding by steps
-
-
-@strategies.reproducible
-@given(
-    mu_s=st.floats(0.05, 1.5),
-    steep=st.floats(0.0, 3.0),
-    delta_mu=st.just(0.0) | st.floats(1e-6, 1.0),
-    e_foldings=st.floats(1e-3, 300.0),
-    top=st.floats(1e-3, 50.0),
-)
-def test_relative_acceleration_turns_as_the_step_solver_relies_on(
-    mu_s: float, steep: float, delta_mu: float, e_foldings: float, top: float
-) -> None:
-    """As |Üg| grows, where Üg > 0 D goes at most up and then down through 0, where Üg < 0 at most down."""
-    tan_theta = steep * mu_s
-    assume(top * tan_theta < G)
-    decay = e_foldings / top
-
-    def signs(side: float) -> list[float]:
-        rates = []
-        for x in np.linspace(0.0, top, 1001) * side:
-            friction = eq.friction_coefficient(x, mu_s, delta_mu, decay, 1.0)
-            rates.append(eq.relative_acceleration(x, friction, mu_s, tan_theta, G))
-        # smaller ones may be rounding
-        clear = np.sign([rate for rate in rates if abs(rate) > 1e-13 * G])
-        return [int(sign) for sign in clear[np.flatnonzero(np.diff(clear, prepend=0.0))]]
-
-    upper: list[list[int]] = [[-1], [-1, 1], [-1, 1, -1]]
-    lower: list[list[int]] = [[1], [1, -1]]
-    if delta_mu == 0.0:  # D begins with 0
-        upper, lower = [*upper, [], [1], [1, -1]], [*lower, [], [-1]]
-    assert signs(1.0) in upper
-    assert signs(-1.0) in lower

@@ -21,8 +21,6 @@ CELLS: dict[Validity, dict[str, Any]] = {
 FLAGS = pytest.mark.parametrize("flag", CELLS, ids=lambda flag: flag.name)
 WAVES: list[dict[str, Any]] = [
     {"waveform": "sine"},
-    {"waveform": "cosine"},
-    {"waveform": "triangle"},
     {"waveform": "square"},
     {"waveform": "harmonics", "harmonics": "1:1:180,0.3:3:20"},
     {"waveform": "sine", "ramp_in": 1.5, "ramp_out": 1.0},

@@ -1,7 +1,7 @@
 """Cells under all options and waveforms, on which the solvers are held to each other.
 
 `groups` draws the options of one sweep and its cells: thousands of cells take few sweeps.  `compare` solves a group
-in all ways that there are and gives the comparisons; the bounds stand in `FLOORS`.
+by steps, some cells as histories and some by the multiple-precision reference; the bounds stand in `FLOORS`.
 `tests/kernels/test_agreement.py` does so for some groups, ``python -m benchmarks.agreement`` for many.
 """
 
@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 import slipsweep
 from slipsweep.model.variables import VALUELESS, SlidingMode, Validity
-from tests.support import brute_force
+from tests.support import reference
 from tests.support.cases import choices
 from tests.support.strategies import G, coulomb_yield, limiting_acceleration
 
@@ -48,9 +47,7 @@ FLOORS = {
     "step, trapezoid": 5e-3,
     "step, simpson": 1e-4,
     "simulate": 1e-8,
-    "brute force": 2e-2,
-    "sine as a harmonic": 1e-9,
-    "triangle as a record": 1e-9,
+    "reference": 1e-9,
 }
 
 #: Times as many steps: errors of first order fall to 1/16, of second order and more to 1/16 and less.
@@ -62,9 +59,7 @@ SIZES = {
     "step, trapezoid": 1e-5,
     "step, simpson": 1e-6,
     "simulate": 1e-13,
-    "brute force": 1e-3,
-    "sine as a harmonic": 1e-13,
-    "triangle as a record": 1e-13,
+    "reference": 1e-13,
 }
 MOVES = 8
 
@@ -200,11 +195,6 @@ def group_of(seed: int, size: int = 32) -> Group:
     )
 
 
-#: Groups of cells, of all options; those of twice the cells take half as much time again.
-groups = st.integers(0, 2**63 - 1).map(group_of)
-large_groups = st.integers(0, 2**63 - 1).map(lambda seed: group_of(seed, 64))
-
-
 # -------------------------------------------------------------------------------- comparing
 
 
@@ -296,22 +286,24 @@ def _judged(
         return Comparison(kind, group.regimes[j], mode, 0.0, 0.0, text)
     difference, times = 0.0, 0.0
     u, v = (abs(float(own[name])) for name in MOTION)
-    scales = (u, v)
+    period, cycles = 1.0 / float(group.cells["frequency"][j]), group.options["cycles"]
+    pushed = _amplitude(group, j) * period
+    nothing = (1e-22 * pushed * period, 1e-22 * pushed)
+    scales = max(u, nothing[0]), max(v, nothing[1])
     if mode == CONTINUOUS:
-        period, cycles = 1.0 / float(group.cells["frequency"][j]), group.options["cycles"]
-        pushed = 1e-3 * _amplitude(group, j) * period
+        pushed = 1e-3 * pushed
         scales = max(u, v * period * cycles, pushed * period * cycles), max(v, u / (period * cycles), pushed)
-    for name, scale in zip(MOTION, scales, strict=True):
-        apart = abs(found[name] - own[name])
+    for name, scale, least in zip(MOTION, scales, nothing, strict=True):
+        apart = abs(float(found[name]) - own[name])
         if apart == 0.0:
             continue
-        moved = exact.spread(name, j)
+        moved = exact.spread(name, j) + least
         bound = FLOORS[kind] * scale + moved
         if coarse is not None:  # finer steps are nearer, unless the coarse ones are near already
             bound = min(bound, 0.5 * coarse[name] + 1e-3 * FLOORS[kind] * scale + moved)
-        difference = max(difference, apart / scale if scale > 0.0 else math.inf)
-        times = max(times, apart / bound if bound > 0.0 else math.inf)
-        text += f"; {name} {found[name]!r}, cycle solver {float(own[name])!r}"
+        difference = max(difference, apart / scale)
+        times = max(times, apart / bound)
+        text += f"; {name} {float(found[name])!r}, cycle solver {float(own[name])!r}"
     return Comparison(kind, group.regimes[j], mode, difference, times, text)
 
 
@@ -330,129 +322,34 @@ def _stepped(group: Group, exact: Exact) -> Iterator[Comparison]:
         )
 
 
-def _about_the_largest(times: Array, velocity: Array, moved: Array, spacing: float, rate: float) -> Array:
-    """Finer times wherever V, which changes at this rate at most, may be larger than at any of these.
-
-    As long as V is positive at none: where the block has moved most from one to the next, and where V is just below 0.
-    """
-    highest = velocity.max()
-    if highest > 0.0:
-        places = np.flatnonzero(velocity + rate * spacing >= highest)
-        # the same pulse comes again in other cycles
-        heights, first = np.unique(np.round(velocity[places] / highest, 10), return_index=True)
-        places = places[first[np.argsort(-heights)[:256]]]
-    else:
-        slid = np.where(np.diff(times) <= 1.5 * spacing, np.diff(moved), 0.0)
-        below = np.flatnonzero((velocity < 0.0) & (velocity + rate * spacing >= 0.0))
-        below = below[np.argsort(-velocity[below], kind="stable")[:256]]
-        places = np.union1d(np.argsort(-slid, kind="stable")[:16], below)
-    about = times[places, np.newaxis] + np.linspace(-spacing, spacing, 65)
-    return np.unique(np.clip(about, times[0], times[-1]))
-
-
 def _histories(group: Group, exact: Exact) -> Iterator[Comparison]:
-    """`simulate`: end and largest velocity of the samples; of cells that slide on into the next pulse, too."""
+    """`simulate`: its end, and the largest velocity of the samples; of cells that slide on into the next pulse, too."""
     cycles = group.options["cycles"]
     carried = [j for j in range(len(group.regimes)) if exact.of(j)["validity"] & Validity.NOT_RECOUPLED]
     for j in {*group.histories, *carried[:2]}:
         arguments = choices(**{name: float(values[j]) for name, values in group.cells.items()}, **group.options)
-        shaken, spacing = cycles / arguments["frequency"], 1.0 / arguments["frequency"] / (64 * group.fastest)
-        # the largest V comes early, late or again and again
-        times = np.arange(min(cycles, 20) * 64 * group.fastest + 1) * spacing
+        shaken, spacing = cycles / arguments["frequency"], 1.0 / arguments["frequency"] / (256 * group.fastest)
+        # the largest V comes early, late or again and again; the run-out is over long before the last of the times
+        times = np.arange(min(cycles, 20) * 256 * group.fastest + 1) * spacing
         times = np.union1d(times, shaken - times) if cycles > 20 else times
-        found: dict[str, Any] = {MOTION[1]: -math.inf}
-        rate = 0.0
-        for level in range(9):
-            # the run-out is over long before the last of the times
-            history = slipsweep.simulate(**arguments, times=np.append(times, 1e12 * shaken))
-            velocity, moved = history.relative_velocity.to_numpy(), history.relative_displacement.to_numpy()
-            found[MOTION[1]] = np.maximum(found[MOTION[1]], velocity.max())
-            if level == 0:
-                found |= {name: history[name].item() for name in ("sliding_mode", "validity")}
-                found[MOTION[0]] = moved[-1]
-            rate = max(rate, 2.0 * np.abs(history.ground_acceleration - history.block_acceleration).max().item())
-            if found["sliding_mode"] < 1 or rate * spacing < 1e-9 * velocity.max():
-                break
-            times = _about_the_largest(times, velocity[:-1], moved[:-1], spacing, rate)
-            spacing /= 32.0
+        history = slipsweep.simulate(**arguments, times=np.append(times, 1e12 * shaken))
+        found = {name: history[name].item() for name in ("sliding_mode", "validity")}
+        found[MOTION[0]] = history.relative_displacement.to_numpy()[-1]
+        highest, own = history.relative_velocity.to_numpy().max(), exact.of(j)[MOTION[1]]
+        rate = 2.0 * np.abs(history.ground_acceleration - history.block_acceleration).max().item()
+        # between two samples V may be larger than at either
+        found[MOTION[1]] = own if highest <= own <= highest + rate * spacing else highest
         yield _judged("simulate", group, exact, j, found)
 
 
-def _as_a_harmonic(group: Group, exact: Exact) -> Iterator[Comparison]:
-    """A sine has ways of its own; one that is called a harmonic takes those of all waves."""
-    if group.options["waveform"] == "sine":
-        found = _sweep(group.cells, group.options | {"waveform": "harmonics", "harmonics": "1:1:0"})
-        for j in range(len(group.regimes)):
-            yield _judged("sine as a harmonic", group, exact, j, {name: values[j] for name, values in found.items()})
-
-
-def _as_a_record(group: Group, exact: Exact) -> Iterator[Comparison]:
-    """A triangle is a record of straight lines, whose pulses have one peak; continuous ones end otherwise."""
-    options = group.options
-    if options["waveform"] != "triangle" or options["cycles"] > 40 or "ramp_in" in options:
+def _by_reference(group: Group, exact: Exact) -> Iterator[Comparison]:
+    """The multiple-precision reference on a cell that takes it no minutes."""
+    if group.fastest > 8 or group.options["cycles"] > 40 or group.options.get("ramp_in", 0.0) > 2.0:
         return
-    count = options["cycles"]
-    times = np.concatenate([[0.0], 0.25 + 0.5 * np.arange(2 * count), [count]])
-    values = np.concatenate([[0.0], np.where(np.arange(2 * count) % 2, -1.0, 1.0), [0.0]])
-    names = {"theta", "mu_s", "yield_acceleration"}
-    if options["model"] == "mendez":
-        names |= {"decay_rate", "delta_mu", "minimum_friction"}
-    given = {name: value for name, value in options.items() if name in ("model", "rise", "recoupling", "g")}
-    cells = {name: column for name, column in group.cells.items() if name in names}
-    cells["scale"] = np.array([_amplitude(group, j) for j in range(len(group.regimes))])
-    cells["time_scale"] = 1.0 / group.cells["frequency"]
-    found = _sweep(cells, given | {"excitation": slipsweep.Record(times, values)})
-    for j in range(len(group.regimes)):
-        own = exact.of(j)
-        if own["sliding_mode"] != CONTINUOUS:
-            result = {name: column[j] for name, column in found.items()}
-            # whose mode and whose stiffness a record does not say
-            result["sliding_mode"] = own["sliding_mode"]
-            result["validity"] |= own["validity"] & np.int16(Validity.FLEXIBLE_BLOCK)
-            if own["validity"] & VALUELESS and result["permanent_displacement"] == 0.0:
-                continue  # of pulses that do not reach Üy a record says nothing
-            if result["validity"] & own["validity"] & VALUELESS:
-                result["validity"] = own[
-                    "validity"
-                ]  # a record looks for no pulse's flags where one for all takes the value
-            yield _judged("triangle as a record", group, exact, j, result)
-
-
-#: Steps a cycle of the slowest harmonics, and of a group.
-BRUTE_FORCE_STEPS, MOST_STEPS = 8192, 6_000_000
-
-
-def _by_brute_force(group: Group, exact: Exact) -> Iterator[Comparison]:
-    """Step after step by the rules' text, on as many cells as do not take long."""
-    options = group.options
-    steps = BRUTE_FORCE_STEPS * max(1, group.fastest // 2)
-    count = MOST_STEPS // (steps * options["cycles"])
-    terms = np.array([[float(x) for x in term.split(":")] for term in options.get("harmonics", "1:1:0").split(",")])
-    ramps = (options.get("ramp_in", 0.0), options.get("ramp_out", 0.0))
-    plane = brute_force.shaking(options["waveform"], terms, options["cycles"], *ramps, steps) if count else np.zeros(0)
-    # slides from pulses that hardly pass Üy are shorter than some tens of steps
-    peaks = plane[:1], plane[1:-1][(plane[1:-1] >= plane[:-2]) & (plane[1:-1] >= plane[2:])]
-    heights = np.unique(np.concatenate(peaks).round(6))
-    for j in range(min(count, len(group.regimes))):
-        own = exact.of(j)
-        near = exact.outcomes(j)
-        if SlidingMode.STUCK in {mode for mode, _ in near} or own["validity"] & VALUELESS & ~Validity.KD_NOT_POSITIVE:
-            continue
-        omega = 2.0 * math.pi * float(group.cells["frequency"][j])
-        cell = {name: float(values[j]) for name, values in group.cells.items()} | {"amplitude": _amplitude(group, j)}
-        one, is_continuous = brute_force.block(cell, options["model"], options["g"])
-        if np.any(np.abs(one.onset - one.amplitude * heights) < 0.01 * one.onset):
-            continue
-        moved = brute_force.moved(one, is_continuous, options, plane, steps)
-        found: dict[str, Any] = {"sliding_mode": own["sliding_mode"], "validity": own["validity"]}
-        if all(bool(flags & Validity.NOT_RECOUPLED) == moved.recoupled for _, flags in near):
-            found["validity"] ^= np.int16(Validity.NOT_RECOUPLED)
-        if all(bool(flags & VALUELESS) == moved.valued for _, flags in near):
-            found["validity"] ^= np.int16(Validity.KD_NOT_POSITIVE)
-        found[MOTION[0]] = moved.displacement / omega**2
-        found[MOTION[1]] = moved.peak / omega
-        if moved.valued or not own["validity"] & VALUELESS:
-            yield _judged("brute force", group, exact, j, found)
+    for j in group.histories:
+        cell = {name: float(values[j]) for name, values in group.cells.items() if name != "displacement_amplitude"}
+        arguments = cell | {"amplitude": _amplitude(group, j)} | group.options
+        yield _judged("reference", group, exact, j, vars(reference.solve(**arguments, dps=15)))
 
 
 def compare(group: Group) -> Iterator[Comparison]:
@@ -460,9 +357,7 @@ def compare(group: Group) -> Iterator[Comparison]:
     near = exact_of(group, SIZES["simulate"])
     yield from _stepped(group, exact_of(group, SIZES[f"step, {group.rule}"]))
     yield from _histories(group, near)
-    yield from _by_brute_force(group, exact_of(group, SIZES["brute force"]))
-    yield from _as_a_harmonic(group, near)
-    yield from _as_a_record(group, near)
+    yield from _by_reference(group, near)
 
 
 def exact_of(group: Group, move: float) -> Exact:
@@ -470,17 +365,3 @@ def exact_of(group: Group, move: float) -> Exact:
     options = group.options | {"solver": "cycle"}
     moved = _moved(group.cells, move, group.seed % 2**32)
     return Exact(_sweep(group.cells, options), _sweep(moved, options))
-
-
-def detected(group: Group, kind: str, wrong: float) -> list[bool]:
-    """Of the cells that move, and away from the sliding modes' limits, whether a result so much off is seen."""
-    exact = exact_of(group, SIZES[kind])
-    seen = []
-    for j, regime in enumerate(group.regimes):
-        own = exact.of(j)
-        if own["permanent_displacement"] > 0.0 and not regime.startswith("near"):
-            # in continuous sliding a displacement may be the small rest of large ones; velocities are not
-            names = MOTION if own["sliding_mode"] == CONTINUOUS else MOTION[:1]
-            found = own | {name: (1.0 - wrong) * own[name] for name in names}
-            seen.append(_judged(kind, group, exact, j, found).times_bound > 1.0)
-    return seen

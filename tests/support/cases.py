@@ -1,10 +1,11 @@
-"""The reference cases of data/cases.csv, and how to ask `slipsweep.sweep` for many of them at once."""
+"""The reference cases of tests/data, and how to ask `slipsweep.sweep` for many of them at once."""
 
 import csv
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from decimal import Decimal, localcontext
 from itertools import groupby
-from math import pi, radians, tan
 from pathlib import Path
 from typing import Any
 
@@ -18,83 +19,110 @@ from slipsweep.motion.waveforms import WAVEFORMS
 DATA = Path(__file__).parents[1] / "data"
 OPTIONAL_INPUTS = ("yield_acceleration", "decay_rate", "delta_mu")
 PARAMETERS = ("theta", "mu_s", "amplitude", "frequency")
+OPTIONS = ("model", "rise", "recoupling", "cycles", "g", "waveform", "harmonics", "ramp_in", "ramp_out")
+
+#: Displacement, peak velocity, mode and validity.
+Found = tuple[float, float, int, int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Case:
-    """One line of cases.csv; the two results as printed, to 17 digits."""
+    """A line of a table of tests/data; results as printed, None for what is not given and empty for no value.
+
+    The bounds are of hard cases: how far the answer moves, in m and m/s, and the (mode, validity) within one ulp of it.
+    """
 
     case: int
     category: str
-    model: str
-    rise: str
-    recoupling: str
     theta: float
     mu_s: float
     amplitude: float
-    frequency: float
+    frequency: float = 1.0
     cycles: int
-    given: tuple[tuple[str, float], ...]
-    permanent_displacement: str
-    peak_relative_velocity: str
-    sliding_mode: int
-    recoupled: bool
-    eq4_below_yield: bool
+    yield_acceleration: float | None = None
+    decay_rate: float | None = None
+    delta_mu: float | None = None
+    model: str
+    rise: str
+    recoupling: str
     g: float = 9.81
+    waveform: str = "sine"
+    harmonics: str = ""
+    ramp_in: float = 0.0
+    ramp_out: float = 0.0
+    permanent_displacement: str = ""
+    peak_relative_velocity: str = ""
+    sliding_mode: int
+    validity: int = 0
+    recoupled: int = 0
+    eq4_below_yield: int = 0
+    displacement_bound: str = ""
+    velocity_bound: str = ""
+    outcomes: str = ""
 
     def __str__(self) -> str:
-        return f"{self.case}-{self.category}-{self.model}"
+        return f"{self.case}-{self.category}-{self.waveform}-{self.model}"
 
     @property
-    def options(self) -> dict[str, Any]:
-        """Everything but the four parameters."""
-        options = {"model": self.model, "rise": self.rise, "recoupling": self.recoupling}
-        return {**options, "cycles": self.cycles, "g": self.g, **dict(self.given)}
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments of `reference.solve`; `choices` makes those of `sweep` of them."""
+        inputs = {name: getattr(self, name) for name in PARAMETERS + OPTIONAL_INPUTS + OPTIONS}
+        return {name: value for name, value in inputs.items() if value is not None}
 
     @property
     def displacement_scale(self) -> float:
         """A / omega**2, m."""
-        return self.amplitude / (2 * pi * self.frequency) ** 2
+        return self.amplitude / (2 * math.pi * self.frequency) ** 2
 
     @property
     def velocity_scale(self) -> float:
         """A / omega, m/s."""
-        return self.amplitude / (2 * pi * self.frequency)
+        return self.amplitude / (2 * math.pi * self.frequency)
 
     @property
     def uplift(self) -> bool:
         """Whether A tan(theta) >= g, where the model gives no value (cases.csv has one such line)."""
-        return self.model == "mendez" and self.amplitude * tan(radians(self.theta)) >= self.g
+        return self.model == "mendez" and self.amplitude * math.tan(math.radians(self.theta)) >= self.g
+
+    def missed(self, found: Found, relative: float, absolute: float = 1e-12) -> str:
+        """What is wrong with an answer beyond relative |u| + absolute A/omega**2, likewise for v; "" if nothing is."""
+        for value, exact, scale in zip(
+            found, (self.permanent_displacement, self.peak_relative_velocity),
+            (self.displacement_scale, self.velocity_scale), strict=False,
+        ):  # fmt: skip
+            if not abs(value - float(exact)) <= relative * abs(float(exact)) + absolute * scale:
+                return f"case {self}: {value!r}, not {exact}"
+        return ""
+
+    def times_bounds(self, found: Found) -> tuple[float, float]:
+        """Errors of displacement and peak velocity in units of the conditioning bounds."""
+        exact = (self.permanent_displacement, self.peak_relative_velocity)
+        bounds = (self.displacement_bound, self.velocity_bound)
+        one, other = (_times(*each) for each in zip(found, exact, bounds, strict=False))
+        return one, other
 
 
-def inputs_of(row: dict[str, str]) -> dict[str, Any]:
-    """The fields of a `Case` that a line of a table of cases gives, but for the results."""
-    return {
-        "case": int(row["case"]),
-        "category": row["category"],
-        "model": row["model"],
-        "rise": row["rise"],
-        "recoupling": row["recoupling"],
-        **{name: float(row[name]) for name in PARAMETERS},
-        "cycles": int(row["cycles"]),
-        "given": tuple((name, float(row[name])) for name in OPTIONAL_INPUTS if row[name]),
-    }
+def _times(answer: float, exact: str, bound: str) -> float:
+    """|answer − exact| / bound in decimals: any of them may be subnormal; NaN counts as infinitely far."""
+    if not math.isfinite(answer):
+        return math.inf
+    with localcontext(prec=60):
+        error = abs(Decimal(answer) - Decimal(exact))
+        return float(error / Decimal(bound)) if error else 0.0
 
 
-def read_cases() -> list[Case]:
-    """All cases of cases.csv."""
-    with (DATA / "cases.csv").open(newline="") as file:
+def read_cases(table: str = "cases") -> list[Case]:
+    """All cases of cases.csv, hard_cases.csv or waveforms.csv."""
+    types = {field.name: field.type for field in fields(Case)}
+    with (DATA / f"{table}.csv").open(newline="") as file:
         return [
-            Case(
-                **inputs_of(row),
-                permanent_displacement=row["permanent_displacement"],
-                peak_relative_velocity=row["peak_relative_velocity"],
-                sliding_mode=int(row["sliding_mode"]),
-                recoupled=row["recoupled"] == "1",
-                eq4_below_yield=row["eq4_below_yield"] == "1",
-            )
+            Case(**{name: _value(types[name], text) for name, text in row.items() if text})
             for row in csv.DictReader(file)
         ]
+
+
+def _value(kind: Any, text: str) -> Any:
+    return int(text) if kind is int else text if kind is str else float(text)
 
 
 def choices(**given: Any) -> dict[str, Any]:
@@ -104,11 +132,11 @@ def choices(**given: Any) -> dict[str, Any]:
     no option of a model, a waveform or a solver, the function's own default stays.
     """
     harmonics = given.pop("harmonics", None)
-    if isinstance(harmonics, str):
+    if isinstance(harmonics, str) and harmonics:
         terms = [(*map(float, term.split(":")), 0.0) for term in harmonics.split(",")]
         harmonics = {"amplitudes": [t[0] for t in terms], "multiples": [t[1] for t in terms]}
         harmonics["phases"] = [t[2] for t in terms]
-    given |= harmonics or {}
+    given |= dict(harmonics or {})
     for family in (MODELS, WAVEFORMS, SOLVERS):
         if not given.keys() & {family.attribute, *family.options}:
             continue
@@ -121,37 +149,21 @@ def choices(**given: Any) -> dict[str, Any]:
     return given
 
 
-def groups(cases: Iterable[Case]) -> list[list[Case]]:
-    """The cases in groups that one call of `sweep` can take: alike in options, cycles and inputs given."""
+def solve(cases: Iterable[Case], **options: Any) -> dict[int, Found]:
+    """The package's answer to each case, by its number; few calls of `sweep`."""
 
-    def key(case: Case) -> tuple[object, ...]:
-        return (case.model, case.rise, case.recoupling, case.cycles, case.g, tuple(name for name, _ in case.given))
+    def key(case: Case) -> tuple[Any, ...]:
+        return (*(getattr(case, name) for name in OPTIONS), *(getattr(case, name) is None for name in OPTIONAL_INPUTS))
 
-    return [list(group) for _, group in groupby(sorted(cases, key=key), key)]
-
-
-def solve(cases: Sequence[Case], **options: Any) -> dict[int, tuple[float, float, int, int]]:
-    """Displacement, peak velocity, mode and validity of each case, by its number; few calls of `sweep`."""
-    found: dict[int, tuple[float, float, int, int]] = {}
-    for group in groups(cases):
+    found: dict[int, Found] = {}
+    for _, alike in groupby(sorted(cases, key=key), key):
+        group = list(alike)
         columns: dict[str, Any] = {
-            name: xr.DataArray([getattr(case, name) for case in group], dims="case") for name in PARAMETERS
+            name: xr.DataArray([getattr(case, name) for case in group], dims="case")
+            for name in group[0].arguments.keys() - {*OPTIONS}
         }
-        for name in OPTIONAL_INPUTS:
-            if name in dict(group[0].given):
-                columns[name] = xr.DataArray([dict(case.given)[name] for case in group], dims="case")
-        first = group[0]
-        result = slipsweep.sweep(
-            **columns,
-            **choices(
-                cycles=first.cycles,
-                model=first.model,
-                rise=first.rise,
-                recoupling=first.recoupling,
-                g=first.g,
-                **options,
-            ),
-        )
+        shared = {name: getattr(group[0], name) for name in OPTIONS}
+        result = slipsweep.sweep(**choices(**columns, **shared | options))
         names = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
         rows = zip(*(result[name].values.tolist() for name in names), strict=True)
         found |= {case.case: row for case, row in zip(group, rows, strict=True)}

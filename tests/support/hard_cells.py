@@ -1,26 +1,21 @@
 """The hard cases: where the model is hardest to solve, why, and what one ulp of an input does there.
 
 `CATEGORIES` makes their cells; ``python -m benchmarks.hard_cases`` solves them, and all
-their neighbours one ulp away, in multiple precision into data/hard_cases.csv, which
-`read_hard_cases` reads.
+their neighbours one ulp away, in multiple precision into data/hard_cases.csv.
 """
 
-import csv
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
 from typing import Any
 
 import numpy as np
 from mpmath import mp, mpf, nstr, workdps
 
 from tests.support import reference
-from tests.support.cases import DATA, PARAMETERS, Case, inputs_of, read_cases
-from tests.support.flag_definitions import NOT_RECOUPLED, YIELD_GOVERNS
+from tests.support.cases import read_cases
 
 G = 9.81
-HARD_CASES = DATA / "hard_cases.csv"
 
 #: Keyword arguments of `reference.solve`, and of `slipsweep.sweep`.
 Cell = dict[str, Any]
@@ -38,33 +33,6 @@ class Category:
     cells: Callable[[], Iterator[Cell]]
     #: Type in which the results are kept.
     dtype: str = "float64"
-
-
-@dataclass(frozen=True, kw_only=True)
-class HardCase(Case):
-    """A hard case with how far its answer moves, in m and m/s, and the (mode, validity) within one ulp of it."""
-
-    validity: int
-    displacement_bound: str
-    velocity_bound: str
-    outcomes: frozenset[tuple[int, int]]
-
-    def times_bound(self, answer: float) -> float:
-        """Error of a displacement in units of the conditioning bound."""
-        return _times(answer, self.permanent_displacement, self.displacement_bound)
-
-    def velocity_times_bound(self, answer: float) -> float:
-        """Error of a peak velocity in units of its conditioning bound."""
-        return _times(answer, self.peak_relative_velocity, self.velocity_bound)
-
-
-def _times(answer: float, exact: str, bound: str) -> float:
-    """|answer − exact| / bound in decimals: any of them may be subnormal; NaN counts as infinitely far."""
-    if not math.isfinite(answer):
-        return math.inf
-    with localcontext(prec=60):
-        error = abs(Decimal(answer) - Decimal(exact))
-        return float(error / Decimal(bound)) if error else 0.0
 
 
 def _cell(theta: float, mu_s: float, amplitude: float, **options: Any) -> Cell:
@@ -204,7 +172,7 @@ def _tangential_onset() -> Iterator[Cell]:
 def _restick() -> Iterator[Cell]:
     for case in read_cases():
         if case.category == "restick":
-            cell = {**{name: getattr(case, name) for name in PARAMETERS}, **case.options}
+            cell = case.arguments
             yield cell
             if case.case % 4 == 0:
                 yield {**cell, "recoupling": "integrate"}
@@ -332,27 +300,3 @@ def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
             found[bound] = nstr(moved + _half_ulp(value, dtype), 6)
     outcomes = sorted({(other.sliding_mode, other.validity) for other in [answer, *others]})
     return {**found, "outcomes": " ".join(f"{mode}:{validity}" for mode, validity in outcomes)}
-
-
-def read_hard_cases() -> list[HardCase]:
-    """All cases of hard_cases.csv."""
-    with HARD_CASES.open(newline="") as file:
-        return [
-            HardCase(
-                **inputs_of(row),
-                g=float(row["g"]),
-                permanent_displacement=row["permanent_displacement"],
-                peak_relative_velocity=row["peak_relative_velocity"],
-                sliding_mode=int(row["sliding_mode"]),
-                validity=int(row["validity"]),
-                recoupled=not int(row["validity"]) & NOT_RECOUPLED,
-                eq4_below_yield=bool(int(row["validity"]) & YIELD_GOVERNS),
-                displacement_bound=row["displacement_bound"],
-                velocity_bound=row["velocity_bound"],
-                outcomes=frozenset(
-                    (int(mode), int(validity))
-                    for mode, validity in (outcome.split(":") for outcome in row["outcomes"].split())
-                ),
-            )
-            for row in csv.DictReader(file)
-        ]

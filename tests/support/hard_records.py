@@ -1,22 +1,20 @@
 """Hard records: where the response to a recorded motion is hardest to solve, why, and what one ulp of the input does.
 
-`CATEGORIES` makes the cells of Newmark's block; `solve` is its response in 60 digits, `conditioning` how far
-that moves.  Nothing here is shared with the package.
+`CATEGORIES` makes the cells of Newmark's block; `conditioning` is its response, and how far that moves.
 """
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from decimal import Decimal, localcontext  # an eighth of mpmath's time; needs no more than roots
+from typing import Any
 
 import numpy as np
+from mpmath import mpf, workdps
 from numpy.typing import NDArray
 
+from tests.support.reference import RecordSolution, solve_record
+
 Floats = NDArray[np.float64]
-
-DIGITS = 60
-
-_NEVER = Decimal("inf")
 
 
 @dataclass(frozen=True)
@@ -26,21 +24,8 @@ class Cell:
     samples: Floats
     onset: float
     interval: float = 1.0
-    times: Floats | None = None
+    times: Any = None
     scale: float = 1.0
-
-    def when(self, i: int) -> Decimal:
-        """The time of sample i."""
-        return Decimal(self.interval) * i if self.times is None else Decimal(float(self.times[i]))
-
-
-@dataclass(frozen=True)
-class Response:
-    """Of Newmark's block: exact to `DIGITS`."""
-
-    displacement: Decimal
-    velocity: Decimal
-    slips: int
 
 
 @dataclass(frozen=True)
@@ -52,47 +37,15 @@ class Category:
     cells: Callable[[], Iterator[Cell]]
 
 
-def solve(cell: Cell) -> Response:
-    """The response to straight lines between the samples, from event to event."""
-    with localcontext(prec=DIGITS):
-        onset, v, u, highest, slips, slides = Decimal(cell.onset), Decimal(0), Decimal(0), Decimal(0), 0, False
-        values = [Decimal(cell.scale) * Decimal(float(a)) for a in cell.samples]
-        for i in range(len(values) - 1):
-            left, first, last = cell.when(i + 1) - cell.when(i), values[i], values[i + 1]
-            slope = (last - first) / left
-            while left > 0:
-                rate = first - onset
-                if not slides:
-                    if last <= onset and rate <= 0:
-                        break
-                    waits = -rate / slope if rate < 0 else Decimal(0)
-                    slides, slips, first, left = True, slips + 1, max(first, onset), left - waits
-                    continue
-                stop = _stop(v, rate, slope)
-                lasts = min(stop, left)
-                if rate > 0 > slope and -rate / slope < lasts:
-                    highest = max(highest, v - rate * rate / slope / 2)
-                u += v * lasts + rate * lasts**2 / 2 + slope * lasts**3 / 6
-                v += rate * lasts + slope * lasts**2 / 2
-                first, left = first + slope * lasts, left - lasts
-                highest = max(highest, v)
-                if stop == lasts:
-                    v, slides = Decimal(0), False
-                    if slope <= 0:
-                        break
-        return Response(u + v * v / (2 * onset), highest, slips)
-
-
-def _stop(v: Decimal, rate: Decimal, slope: Decimal) -> Decimal:
-    """The first time after 0 at which v + rate t + slope t²/2 falls to zero."""
-    if slope == 0:
-        return -v / rate if rate < 0 else _NEVER
-    square = rate * rate - 2 * slope * v
-    if square < 0:
-        return _NEVER
-    # the smaller root above 0 at which it falls: (−rate − √) / slope
-    root = (-rate - square.sqrt()) / slope
-    return root if root > 0 else _NEVER
+def solve(cell: Cell) -> RecordSolution:
+    """The response of Newmark's block to straight lines between the samples."""
+    times = cell.times
+    with workdps(60):
+        if times is None:
+            times = [mpf(cell.interval) * i for i in range(cell.samples.size)]
+        return solve_record(
+            times, cell.samples, 0.0, 0.5, scale=cell.scale, model="newmark", yield_acceleration=cell.onset, dps=30
+        )
 
 
 def neighbours(cell: Cell) -> Iterator[Cell]:
@@ -109,15 +62,15 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
             )
 
 
-def conditioning(cell: Cell) -> tuple[Response, Decimal, Decimal]:
+def conditioning(cell: Cell) -> tuple[RecordSolution, mpf, mpf]:
     """The exact response, and how far displacement and peak velocity move: plus half an ulp of their own."""
     own, others = solve(cell), [solve(other) for other in neighbours(cell)]
-    with localcontext(prec=DIGITS):
-        bounds = [
-            max(abs(getattr(other, name) - getattr(own, name)) for other in others)
-            + Decimal(float(np.spacing(abs(float(getattr(own, name)))))) / 2
-            for name in ("displacement", "velocity")
-        ]
+    bounds = []
+    with workdps(60):
+        for name in ("permanent_displacement", "peak_relative_velocity"):
+            value = getattr(own, name)
+            moves = (abs(getattr(other, name) - value) for other in others)
+            bounds.append(max(moves) + mpf(float(np.spacing(abs(float(value))))) / 2)
     return own, bounds[0], bounds[1]
 
 
@@ -133,7 +86,7 @@ def _noise(seed: int, count: int, coarse: int = 1) -> Floats:
 
 
 def _onset_on_a_sample() -> Iterator[Cell]:
-    for seed in range(20):
+    for seed in range(8):
         samples = _noise(seed, 60)
         rising = np.flatnonzero((samples[1:-1] > 0.05) & (samples[2:] > samples[1:-1])) + 1
         onset = float(samples[rising[seed % rising.size]])
@@ -142,7 +95,7 @@ def _onset_on_a_sample() -> Iterator[Cell]:
 
 
 def _peak_just_above() -> Iterator[Cell]:
-    for seed in range(12):
+    for seed in range(5):
         samples = _noise(100 + seed, 40)
         peak = float(samples.max())
         if peak < 0.9:
@@ -172,7 +125,7 @@ def _duplicated_zeros() -> Iterator[Cell]:
 
 def _many_small_slips() -> Iterator[Cell]:
     # each of about 1e-9 m: a triangle that exceeds the onset by 2 %
-    for seed, count in enumerate((300, 1000, 3000)):
+    for seed, count in enumerate((100, 200)):
         tops = 1.0 + 0.02 * np.random.default_rng(seed).uniform(0.5, 1.0, count)
         samples = np.zeros(2 * count + 1)
         samples[1::2] = tops
@@ -191,14 +144,14 @@ def _intervals() -> Iterator[Cell]:
 
 def _magnitudes() -> Iterator[Cell]:
     for seed, size in enumerate((1e-25, 1e-20, 1e-10, 1e-5, 1e5, 1e10, 1e20, 1e25)):
-        for onset in (0.02, 0.3, 0.8):
+        for onset in (0.02, 0.8):
             yield Cell(size * _noise(300 + seed, 40), size * onset, interval=0.02)
         yield Cell(_noise(300 + seed, 40), 0.3 * size, interval=0.02, scale=size)
 
 
 def _never_at_rest() -> Iterator[Cell]:
     # small onsets: V is carried from pulse to pulse, and the record ends before the slide
-    for seed in range(8):
+    for seed in range(4):
         samples = _noise(400 + seed, 80)
         for onset in (1e-3, 1e-6, 1e-12):
             yield Cell(np.abs(samples) if seed % 2 else samples, onset, interval=0.01)
@@ -222,7 +175,7 @@ CATEGORIES = (
     Category("peak_just_above", "a peak one ulp above Üy: the slide is all cancellation", _peak_just_above),
     Category("plateaus", "plateaus at Üy, just above and just below", _plateaus),
     Category("duplicated_zeros", "rests at zero, zeros twice, numbers next to zero", _duplicated_zeros),
-    Category("many_small_slips", "thousands of slips of some 1e-9 m: rounding adds up", _many_small_slips),
+    Category("many_small_slips", "hundreds of slips of some 1e-9 m: rounding adds up", _many_small_slips),
     Category("intervals", "intervals from 1e-6 s to 10 s, even or not", _intervals),
     Category("magnitudes", "accelerations from 1e-25 to 1e25", _magnitudes),
     Category("never_at_rest", "Üy next to nothing: V is carried on beyond the record", _never_at_rest),

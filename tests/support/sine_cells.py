@@ -3,19 +3,14 @@
 `tests/kernels/test_wave_accuracy.py` does so for some sweeps, ``python -m benchmarks.agreement`` for many.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
 import slipsweep
-from slipsweep.grid import solvers
-from slipsweep.kernels.block import UNSOLVED
 from tests.support.strategies import G
 
 Array = NDArray[np.float64]
@@ -37,35 +32,25 @@ MODELS = (
 )
 
 
-@contextmanager
-def event_by_event() -> Iterator[None]:
-    """Sweeps in the block solve all cells from event to event: batches leave all of them."""
-
-    def leave(cells: Any, options: Any, results: Array) -> int:
-        results[solvers.ROWS["validity"]] = UNSOLVED
-        return results.shape[1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solvers, "solve_sine", leave)
-        yield
-
-
 @dataclass(frozen=True)
 class Drawn:
-    """A motion, a model, and the inputs of cells."""
+    """Cycles, a model, and the inputs of cells."""
 
-    excitation: Any
+    cycles: int
     model: Any
     cells: dict[str, Array]
 
-    def swept(self, cells: dict[str, Array]) -> xr.Dataset:
-        """The cells, or some of them."""
+    def swept(self, cells: dict[str, Array], walked: bool = True) -> xr.Dataset:
+        """The cells, or some of them; a sine that is called a harmonic takes the walk of all waves."""
         columns: dict[str, Any] = {name: xr.DataArray(values, dims="cell") for name, values in cells.items()}
-        return slipsweep.sweep(**columns, frequency=1.0, excitation=self.excitation, model=self.model)
+        excitation = slipsweep.Harmonics([1.0], [1], cycles=self.cycles) if walked else slipsweep.Sine(self.cycles)
+        return slipsweep.sweep(**columns, frequency=1.0, excitation=excitation, model=self.model)
 
     def cell(self, at: int) -> str:
         """One of them, to be solved again."""
-        return f"{self.excitation}, {self.model}: { {name: float(values[at]) for name, values in self.cells.items()} }"
+        return (
+            f"{self.cycles} cycles, {self.model}: { {name: float(values[at]) for name, values in self.cells.items()} }"
+        )
 
 
 def drawn(seed: int, count: int) -> Drawn:
@@ -76,7 +61,7 @@ def drawn(seed: int, count: int) -> Drawn:
         return np.asarray(np.exp(rng.uniform(np.log(low), np.log(high), count)))
 
     model = MODELS[rng.integers(len(MODELS))]
-    excitation = slipsweep.Sine(cycles=int(rng.choice([1, 2, 3, 5, 10, 65])))
+    cycles = int(rng.choice([1, 2, 3, 5, 10, 65]))
     mu_s = between(0.05, 2.0)
     tan_theta = mu_s * (rng.uniform(0.0, 0.98, count) if rng.random() < 0.7 else between(1e-6, 1.0))
     cells = {"theta": np.degrees(np.arctan(tan_theta)), "mu_s": mu_s}
@@ -95,21 +80,19 @@ def drawn(seed: int, count: int) -> Drawn:
         limit * (1.0 + rng.choice([-1.0, 1.0], count) * between(1e-6, 0.9)),
         onset + rng.uniform(0.0, 1.0, count) * (limit - onset),
     )
-    return Drawn(excitation, model, cells | {"amplitude": np.clip(amplitudes[rng.integers(4)], 1e-3, 1e3)})
+    return Drawn(cycles, model, cells | {"amplitude": np.clip(amplitudes[rng.integers(4)], 1e-3, 1e3)})
 
 
 def times_bound(one: Drawn) -> Array:
     """Of each cell how far the two ways differ over the bound, in displacement or largest velocity: 1 at most."""
-    batches = one.swept(one.cells)
-    with event_by_event():
-        walk = one.swept(one.cells)
+    batches, walk = one.swept(one.cells, walked=False), one.swept(one.cells)
     drives = one.cells["amplitude"] + G * (one.cells["mu_s"] + one.cells.get("delta_mu", 0.0))
     scales = {"permanent_displacement": drives / (2 * np.pi) ** 2, "peak_relative_velocity": drives / (2 * np.pi)}
     times = np.where(batches.validity.values == walk.validity.values, 0.0, np.inf)
     for name, scale in scales.items():
         found, right = batches[name].values, walk[name].values
         apart = np.where(np.isnan(found) == np.isnan(right), np.nan_to_num(np.abs(found - right)), np.inf)
-        bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * one.excitation.cycles**2 * scale
+        bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * one.cycles**2 * scale
         (beyond,) = np.nonzero(np.isfinite(apart) & (apart > bound))
         if beyond.size:
             bound[beyond] += TIMES * _spread(one, beyond, name, right[beyond])
@@ -121,8 +104,7 @@ def _spread(one: Drawn, cells: NDArray[np.intp], name: str, right: Array) -> Arr
     """How far a result of some cells moves with their inputs."""
     picked = {key: values[cells] for key, values in one.cells.items()}
     apart = np.zeros(cells.size)
-    with event_by_event():
-        for a, b in MOVES:
-            moved = picked | {"mu_s": picked["mu_s"] * (1.0 + a), "amplitude": picked["amplitude"] * (1.0 + b)}
-            apart = np.fmax(apart, np.abs(one.swept(moved)[name].values - right))
+    for a, b in MOVES:
+        moved = picked | {"mu_s": picked["mu_s"] * (1.0 + a), "amplitude": picked["amplitude"] * (1.0 + b)}
+        apart = np.fmax(apart, np.abs(one.swept(moved)[name].values - right))
     return apart

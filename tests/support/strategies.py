@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 #: Settings of every property test: the same cells on each run, none cut short by compilation.
 reproducible = settings(
-    max_examples=60, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+    max_examples=40, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
 )
 
 G = 9.81

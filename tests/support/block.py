@@ -1,0 +1,247 @@
+"""The block of the multiple-precision reference: Eqs. 2-6 and the motion rules of one section after the other."""
+
+from itertools import pairwise
+from typing import Any
+
+from mpmath import mp, mpf
+
+from tests.support.sections import Function, Section, root
+
+
+class Interface:
+    """Friction at the interface and the block's acceleration that follows (Eqs. 2-6)."""
+
+    def __init__(self, g: mpf, tan_theta: mpf, mu_s: mpf, delta_mu: mpf, decay_rate: mpf, onset: mpf) -> None:
+        self.g = g
+        self.tan_theta = tan_theta
+        self.excess = mu_s - tan_theta
+        self.friction_at_rest = mu_s + delta_mu
+        self.decay = decay_rate / g
+        self.yield_acceleration = onset
+
+    def relative_acceleration(self, ground: mpf, side: int = 1) -> mpf:
+        """Üg − Ü with Ü by Eq. 4; at Üg = 0 as it is on this side of it."""
+        friction = self.friction_at_rest * mp.exp(-self.decay * abs(ground))
+        return side * ((self.g + ground * self.tan_theta) * (self.excess - friction) + self.g * self.tan_theta)
+
+    def slope(self, ground: mpf, side: int = 1) -> mpf:
+        """Derivative of `relative_acceleration`."""
+        friction = self.friction_at_rest * mp.exp(-self.decay * abs(ground))
+        normal = self.g + ground * self.tan_theta
+        return side * self.tan_theta * (self.excess - friction) + normal * self.decay * friction
+
+    def eq4(self, ground: mpf) -> mpf:
+        return ground - self.relative_acceleration(ground)
+
+    def monotone_pieces(self, slope: Function, low: mpf, high: mpf) -> list[mpf]:
+        """Ends of the pieces of [low, high], on one side of zero, on which a function of Eq. 4 is monotone.
+
+        The slope of Eq. 4 is itself monotone on either side of one inflection, where n lambda / g = 2 tan(theta).
+        """
+        cuts = [low, high]
+        if self.tan_theta > 0 and self.decay > 0:
+            inflection = (2 * self.tan_theta / self.decay - self.g) / self.tan_theta
+            if max(low, 0) < inflection < high:
+                cuts.insert(1, inflection)
+        ends = [low]
+        for a, b in pairwise(cuts):
+            if mp.sign(slope(a)) * mp.sign(slope(b)) < 0:
+                ends.append(root(slope, a, b))
+            ends.append(b)
+        return ends
+
+    def sign_changes(self, low: mpf, high: mpf, side: int = 1) -> list[mpf]:
+        """The zeros of the relative acceleration between `low` and `high`, on one side of zero."""
+
+        def value(ground: mpf) -> mpf:
+            return self.relative_acceleration(ground, side)
+
+        ends = self.monotone_pieces(lambda ground: self.slope(ground, side), low, high) if low < high else []
+        zeros = [root(value, a, b) for a, b in pairwise(ends) if value(a) * value(b) < 0]
+        return sorted(zeros + [x for x in ends[1:-1] if value(x) == 0])
+
+
+class NoValueError(Exception):
+    """Eq. 12 with b <= 0 brakes nothing."""
+
+
+class Block:
+    """The state of the block, and the motion rules of one section of the shaking after the other."""
+
+    def __init__(self, model: str, rise: str, recoupling: str, recorded: bool = False) -> None:
+        self.recorded = recorded
+        self.newmark = model == "newmark"
+        self.literal = rise == "literal" and not self.newmark
+        self.integrate = recoupling == "integrate" or self.newmark
+        self.v = self.u = self.peak = self.lowest = self.b = mpf(0)
+        self.ground = mpf(0)  # Üg at the end of the section before
+        self.sliding = self.recoupled_late = False
+        self.reset = True  # the next Üg = Üy on a rise resets b
+        self.slips = 0
+
+    def state(self) -> tuple[Any, ...]:
+        """What the motion that follows depends on, but for u."""
+        return self.v, self.b if self.v else mpf(0), self.ground, self.sliding, self.reset
+
+    def same(self, one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+        return all(abs(a - b) <= self.rounding for a, b in zip(one, other, strict=True))
+
+    def meet_interface(self, interface: Interface, amplitude: mpf, digits: int) -> None:
+        self.interface, self.onset = interface, interface.yield_acceleration
+        self.rounding = amplitude * mpf(10) ** -digits
+
+    # ------------------------------------------------------------------ motion with a given b
+
+    def go(self, section: Section, start: mpf, end: mpf, held: mpf | None) -> mpf:
+        """Slide with b held, or by Eq. 4 (None), where Üg − b is of one sign; where the block stops, or end."""
+        decay = self.interface.decay if held is None else mpf(0)
+
+        def rate(x: mpf) -> mpf:
+            return self.interface.relative_acceleration(x) if held is None else x - held
+
+        gained, moved = section.integrals(rate, start, end, decay)
+        if self.v + gained >= -self.rounding:
+            self.u += self.v * (end - start) + moved
+            self.change_speed(max(self.v + gained, mpf(0)))
+            return end
+        stop = self.stop(section, start, end, rate, decay) if self.v > self.rounding else start
+        self.u += self.v * (stop - start) + section.integrals(rate, start, stop, decay)[1]
+        self.change_speed(mpf(0))
+        self.sliding = False
+        return stop
+
+    def stop(self, section: Section, low: mpf, high: mpf, rate: Function, decay: mpf) -> mpf:
+        """Where the velocity, which falls from low to high, is zero (Newton kept in its bracket)."""
+        phi, velocity, tiny = low, self.v, (high - low) * mpf(10) ** (10 - mp.dps)
+        while high - low > tiny:
+            slope = rate(section.ground(phi))
+            new = phi - velocity / slope if slope < 0 else high
+            if abs(new - phi) <= tiny:
+                break
+            if not low < new < high:
+                new = (low + high) / 2
+            change = section.integrals(rate, min(phi, new), max(phi, new), decay)[0]
+            velocity += change if new > phi else -change
+            phi = new
+            low, high = (phi, high) if velocity > 0 else (low, phi)
+        return phi
+
+    def change_speed(self, velocity: mpf) -> None:
+        self.v = velocity
+        self.peak, self.lowest = max(self.peak, velocity), min(self.lowest, velocity)
+
+    def hold(self, section: Section, start: mpf, end: mpf) -> mpf:
+        """Slide with b held; where the block stops, or end."""
+        cuts = [start, end]
+        if (section.ground(start) - self.b) * (section.ground(end) - self.b) < 0:
+            cuts = [start, section.phase(self.b), end]
+        for a, b in pairwise(cuts):
+            at = self.go(section, a, b, self.b)
+            if not self.sliding:
+                return at
+        return end
+
+    def brake(self, span: mpf) -> None:
+        """Eq. 12 until the velocity, of either sign, is zero."""
+        time = min(abs(self.v) / self.b, span)
+        slower = self.v - mp.sign(self.v) * self.b * time if time < abs(self.v) / self.b else mpf(0)
+        self.u += (self.v + slower) * time / 2
+        self.change_speed(slower)
+        self.sliding = slower != 0
+
+    def follow(self, section: Section) -> None:
+        """Continuous sliding: Eq. 4, the velocity of either sign."""
+        side, (low, high) = section.side, sorted((section.first, section.last))
+
+        def rate(x: mpf) -> mpf:
+            return self.interface.relative_acceleration(x, side)
+
+        turns = sorted(section.phase(x) for x in self.interface.sign_changes(low, high, side))
+        for a, b in pairwise([section.start, *turns, section.end]):
+            gained, moved = section.integrals(rate, a, b, self.interface.decay)
+            self.u += self.v * (b - a) + moved
+            self.change_speed(self.v + gained)
+
+    # -------------------------------------------------------------------- stick, slide, attenuate
+
+    def starting(self, x: mpf) -> mpf:
+        """c(Üg): the block acceleration with which a slide begins."""
+        if self.newmark:
+            return self.onset
+        return self.interface.eq4(x) if self.literal else max(self.onset, self.interface.eq4(x))
+
+    def take(self, section: Section) -> None:
+        """The rules of stick-slip along a section."""
+        jumps_up = section.first > self.ground + self.rounding
+        self.ground = section.last
+        self.reset |= section.side <= 0
+        if section.side > 0 and section.last >= section.first:
+            self.rise(section)
+            return
+        if section.side > 0 and jumps_up:
+            self.meet(section.first, section.first)
+        if self.sliding and self.reset and not self.integrate:
+            self.check()
+            self.brake(section.end - section.start)
+        elif self.sliding:
+            self.check()
+            self.hold(section, section.start, section.end)
+
+    def check(self) -> None:
+        if self.b <= 0 and not self.recorded:
+            raise NoValueError
+
+    def rise(self, section: Section) -> None:
+        interface, low, high = self.interface, max(section.first, mpf(0)), section.last
+        levels = [self.onset]
+        if not self.newmark and low < high:
+            levels += interface.sign_changes(low, high)
+            levels += interface.monotone_pieces(lambda x: 1 - interface.slope(x), low, high)[1:-1]
+        cuts = sorted(section.phase(x) for x in {*levels} if low < x < high)
+        for a, b in pairwise([section.start, *cuts, section.end]):
+            self.meet(section.ground(a), section.ground((a + b) / 2))
+            while self.sliding and a < b:
+                a = self.slide(section, a, b)
+                if not self.sliding and a < b:
+                    self.begin(section.ground(a), section.ground((a + b) / 2))
+
+    def meet(self, x: mpf, beyond: mpf) -> None:
+        """What happens as the base comes to x, not falling, on its way to `beyond`."""
+        if self.reset and beyond > self.onset:
+            self.recoupled_late |= self.v > 0
+            self.reset, self.sliding = False, self.v > 0
+            self.b = self.starting(x)
+        if not self.sliding and not self.reset:
+            self.begin(x, beyond)
+        elif self.sliding and not self.reset and not self.newmark:
+            self.b = self.interface.eq4(x) if self.literal else max(self.b, self.interface.eq4(x))
+
+    def begin(self, x: mpf, beyond: mpf) -> None:
+        """Begin to slide, if the block at rest does between x and beyond."""
+        if beyond > self.onset and (self.newmark or self.interface.relative_acceleration(beyond) > 0):
+            self.sliding, self.b = True, self.starting(x)
+            self.slips += 1
+
+    def slide(self, section: Section, a: mpf, b: mpf) -> mpf:
+        """Slide over a part of a rise on which Eq. 4 and Üg − Ü are monotone; where it ends."""
+        if self.reset and not self.integrate:
+            self.brake(b - a)
+            return b
+        at_end = self.interface.eq4(section.ground(b)) if not self.newmark else mpf(0)
+        if self.reset or self.newmark or (not self.literal and at_end <= self.b):
+            return self.hold(section, a, b)
+        switch, level = a, self.b
+        if not self.literal and self.interface.eq4(section.ground(a)) < level - self.onset * mpf(10) ** -28:
+            switch = root(lambda phi: self.interface.eq4(section.ground(phi)) - level, a, b)
+            at = self.hold(section, a, switch)
+            if not self.sliding:
+                return at
+        at = self.go(section, switch, b, None)
+        self.b = at_end
+        return at
+
+    def run_out(self) -> None:
+        """Eq. 12 after the shaking."""
+        if self.sliding:
+            self.check()
+            self.brake(mp.inf)
