@@ -65,7 +65,9 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
         "amplitude": np.array([2.0, 3.0, 4.5]),
         "frequency": [1.0, 2.0],
     }
-    with pytest.raises(RunError, match=r"theta = 5.0, mu_s = 0.3, amplitude = 3.0, frequency = 1.0: an event") as error:
+    with pytest.raises(
+        RunError, match=r"theta = 5, mu_s = 0.3, amplitude = 3, frequency = 1, g = 9.81: an event"
+    ) as error:
         slipsweep.sweep(**axes, **options)
     assert "\n" not in str(error.value)
 
@@ -74,5 +76,5 @@ def test_a_cell_of_a_record_that_is_not_solved_is_named(monkeypatch: pytest.Monk
     monkeypatch.setattr(solvers, "solve_record", failing)
     record = slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)
     axes: dict[str, Any] = {"theta": [0.0, 5.0], "mu_s": 0.3, "scale": [1.0, 2.0, 3.0], "polarity": -1}
-    with pytest.raises(RunError, match=r"theta = 5.0, mu_s = 0.3, scale = 2.0, .*polarity = -1.0: an event"):
+    with pytest.raises(RunError, match=r"theta = 5, mu_s = 0.3, scale = 2, .*polarity = -1, g = 9.81: an event"):
         slipsweep.sweep(excitation=record, **axes)
