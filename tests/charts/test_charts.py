@@ -622,7 +622,7 @@ def test_formats(path: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> 
         (("--kind", "contours", "--x", "theta", "--at", "theta=3"), "is an axis of this chart"),
         (
             ("-k", "modes", "--at", "theta=6", "--at", "mu_s=0.3", "--at", "frequency=1"),
-            "needs another axis with two values or more",
+            "needs an axis with two values or more",
         ),
         (("-o", "a.png"), "give one --kind"),
         (("-k", "contours", "--levels", "1cm"), "levels: 0.01: must be two different values or more"),
@@ -645,7 +645,7 @@ def test_results_without_an_axis_or_an_attribute(here: Path, capsys: pytest.Capt
     rows = slipsweep.sweep(xr.DataArray([2.0, 12.0], dims="case"), 0.5, 4.0, 1.0)
     rows.to_netcdf("rows.nc")
     assert main(["chart", "rows.nc", "-o", "a.png"]) == 2
-    assert "this chart needs another axis with two values or more" in capsys.readouterr().err
+    assert "this chart needs an axis with two values or more" in capsys.readouterr().err
     kept = {name: value for name, value in rows.attrs.items() if name != "recoupling"}
     for changed, message in (
         (rows.drop_attrs(deep=False).assign_attrs(kept), "attribute 'recoupling': missing; it says what was solved"),

@@ -250,7 +250,7 @@ class Result:
         if found is None:
             fixed = f"; --at fixes {', '.join(options.at)}" if options.at else ""
             raise InputError(
-                f"{self.name}: this chart needs another axis with two values or more{more}; "
+                f"{self.name}: this chart needs {'another' if more else 'an'} axis with two values or more{more}; "
                 f"there are: {', '.join(there) or 'none'}{fixed}"
             )
         return found
