@@ -622,7 +622,7 @@ def test_formats(path: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> 
         (("--kind", "contours", "--x", "theta", "--at", "theta=3"), "is an axis of this chart"),
         (
             ("-k", "modes", "--at", "theta=6", "--at", "mu_s=0.3", "--at", "frequency=1"),
-            "needs an axis with two values or more",
+            "needs another axis with two values or more",
         ),
         (("-o", "a.png"), "give one --kind"),
         (("-k", "contours", "--levels", "1cm"), "levels: 0.01: must be two different values or more"),
