@@ -49,33 +49,22 @@ def table_cycle(wave: Wave, n: int) -> int:
 
 
 @scalar
-def fill_base(block: Block, cycles: int, wave: Wave, phases: np.ndarray, found: History) -> None:
-    """Fill the base's acceleration under a waveform; at a jump, the value after it."""
+def fill_base(amplitude: float, cycles: int, wave: Wave, phases: np.ndarray, found: History) -> None:
+    """Fill the base's acceleration at increasing phases; at a jump, the value after it."""
+    pieces, p = wave.pieces, 0
+    end = pieces[pieces.shape[0] - 1, END] + 2.0 * math.pi * max(wave.repeats - 1, 0)
     for at in range(phases.size):
         found.ground_acceleration[at] = 0.0
-        if phases[at] < 2.0 * math.pi * cycles:
-            n = min(int(phases[at] / (2.0 * math.pi)), cycles - 1)
+        if pieces[0, START] <= phases[at] < end:
+            n = min(max(int(phases[at] / (2.0 * math.pi)), 0), cycles - 1)
             c = table_cycle(wave, n)
             phi = phases[at] - 2.0 * math.pi * (n - c)
-            p = wave.cycle[c]
-            while p + 1 < wave.cycle[c + 1] and wave.pieces[p, END] <= phi:
+            if not wave.cycle[c] <= p < wave.cycle[c + 1] or phi < pieces[p, START]:
+                p = wave.cycle[c]
+            while p + 1 < wave.cycle[c + 1] and pieces[p, END] <= phi:
                 p += 1
-            begin, finish = wave.pieces[p, BEGIN], wave.pieces[p, FINISH]
-            tau = min(max(begin + (phi - wave.pieces[p, START]), begin), finish)
-            found.ground_acceleration[at] = base_acceleration(wave.pieces, p, block.amplitude, tau)
-
-
-@scalar
-def fill_recorded_base(wave: Wave, scale: float, times: np.ndarray, found: History) -> None:
-    """Fill the base's acceleration under a record; at a jump, the value after it."""
-    p, pieces = 0, wave.pieces.shape[0]
-    for at in range(times.size):
-        found.ground_acceleration[at] = 0.0
-        while p < pieces and wave.pieces[p, END] <= times[at]:
-            p += 1
-        if p < pieces and times[at] >= wave.pieces[p, START]:
-            tau = wave.pieces[p, BEGIN] + (times[at] - wave.pieces[p, START])
-            found.ground_acceleration[at] = base_acceleration(wave.pieces, p, scale, min(tau, wave.pieces[p, FINISH]))
+            tau = min(max(pieces[p, BEGIN] + (phi - pieces[p, START]), pieces[p, BEGIN]), pieces[p, FINISH])
+            found.ground_acceleration[at] = base_acceleration(pieces, p, amplitude, tau)
 
 
 @scalar
@@ -263,7 +252,7 @@ def record_history(
     cell: Cell, options: Options, wave: Wave, workspace: Workspace, times: np.ndarray, found: History
 ) -> None:
     """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
-    fill_recorded_base(wave, cell.amplitude, times, found)
+    fill_base(cell.amplitude, 1, wave, times, found)
     rest(found)
     block = block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
     at, velocity, displacement = 0, 0.0, 0.0
@@ -290,7 +279,7 @@ def wave_history(
 ) -> None:
     """Fill a history under a waveform at increasing phases."""
     block = block_of(exponential(), cell, options.rise, options.g)
-    fill_base(block, options.cycles, wave, phases, found)
+    fill_base(block.amplitude, options.cycles, wave, phases, found)
     rest(found)
     if block.sliding_mode == eq.CONTINUOUS:
         continuous_history(block, options.cycles, wave, phases, found)

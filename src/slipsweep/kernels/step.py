@@ -11,9 +11,8 @@ trapezoid   start, end             2      linear acceleration
 simpson     start, middle, end     4      Runge-Kutta 4 for a rate free of V
 ==========  =====================  =====  ==================================
 
-`advance` is one step, `acceleration` is Ü while the block slides (option `rise`), `walk` goes step by step, `cut_step`
-finds the events in one, `pulse` is t1 to t5 and Eq. 12, `follow` is Eq. 4 throughout.  Any friction law
-will do: of `block.law` only μ(Üg) is used.  docs/numerics.md#step-solver
+`advance` is one step, `acceleration` is Ü of a block that slides (option `rise`), `cut_step` finds the events in a
+step, `pulse` is t1 to t5 and Eq. 12.  Of a friction law only μ(Üg) is used.  docs/numerics.md#step-solver
 """
 
 import math
@@ -38,18 +37,16 @@ from slipsweep.motion.steps import RECTANGLE, TRAPEZOID, Steps
 
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
 HELD, FOLLOWED = 3, 4
-
 #: No slide up to its greatest rate is covered by fewer than N/64 steps, N a cycle; no step is shorter than the other.
 SHARE_OF_CYCLE, LEAST_STEP = 64.0, 1e-14
-
 #: Accelerations nearer to each other than this part of Üg are one.
 ROUNDING = 1e-12
 
 
 class State(NamedTuple):
-    """The block: V, W, its acceleration b while it slides, the largest and the least V, and whether it slides.
+    """The block: V, W, its acceleration b while it slides, the largest and the least V, whether it slides.
 
-    The slide `began` at a phase, and its rate `grows` for another; that limits steps (`longest_step`).
+    The slide `began` at a phase, and its rate `grows` for another: that limits steps (`longest_step`).
     """
 
     velocity: float
@@ -114,8 +111,7 @@ def advance(
     if stops:
         low, high = (turn, 1.0) if extreme > state.velocity else (0.0, turn)
         taken = _stop((state.velocity, h, c0, c1, c2), low, high, 0.5 * (low + high), 0.0)
-        velocity = least = 0.0
-    h *= taken
+        velocity, least, h = 0.0, 0.0, taken * h
     displacement = state.displacement + (state.velocity + (0.5 * c0 + taken * (c1 / 6.0 + taken * c2 / 12.0)) * h) * h
     peak, least = max(state.peak, velocity, extreme), min(state.least, least)
     return taken, State(
@@ -206,8 +202,7 @@ def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Poin
 @inlined
 def begun(block: Block, at: Point, phase: float, grows: float, state: State) -> State:
     """The block as it begins to slide (t1), after which its rate grows for a phase."""
-    least = block.yield_acceleration
-    b = min(acceleration(block.rise, least, least, at.base - at.rate), at.base)
+    b = min(acceleration(block.rise, block.yield_acceleration, block.yield_acceleration, at.base - at.rate), at.base)
     return State(state.velocity, state.displacement, b, state.peak, state.least, True, phase, grows)
 
 
@@ -296,7 +291,7 @@ def cut_step(
     return state
 
 
-@inlined
+@scalar
 def walk(
     block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, until: float, how: int, state: State
 ) -> State:
@@ -311,8 +306,7 @@ def walk(
         # a second difference of (32/N)² of what friction takes off Üg at most, or of rounding
         most = (block.g + amplitude * block.tan_theta) * physics.friction(block, 0.0)
         limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * most + ROUNDING * amplitude
-    first = i if begin == 0.0 else i - count
-    start = point_at(block, pieces, p, tau)
+    first, start = i if begin == 0.0 else i - count, point_at(block, pieces, p, tau)
     while i < count and start.tau < until and (state.sliding or how != HELD):
         end = Point((first + 1) * h, amplitude * w[at + 2 * i + 2], rates[2 * i + 2])
         middle = Point((first + 0.5) * h, amplitude * w[at + 2 * i + 1], rates[2 * i + 1])
@@ -327,12 +321,6 @@ def walk(
             after = cut_step(block, pieces, p, rule, per_cycle, how, start, end, limit, state)
         state, start, i, first = after, end, i + 1, first + 1
     return state
-
-
-@scalar
-def hold(block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, until: float, state: State) -> State:
-    """From τ on piece p with b held, to `until` or to the stop."""
-    return walk(block, pieces, steps, p, tau, until, HELD, state)
 
 
 @single
@@ -356,11 +344,10 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
             state = walk(block, pieces, steps, q, begin, pieces[q, FINISH], block.rise, state)
         else:
             validity = physics.KD_NOT_POSITIVE if state.sliding and state.held <= 0.0 else validity
-            state = hold(block, pieces, steps, q, begin, pieces[q, FINISH], state)
+            state = walk(block, pieces, steps, q, begin, pieces[q, FINISH], HELD, state)
     if state.sliding and state.held <= 0.0:
         return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
-    # t5: Üg = 0
-    started = stopped_at = pieces[end - 1, END]
+    started = stopped_at = pieces[end - 1, END]  # t5: Üg = 0
     next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
     if following < wave.height.size:
         next_p, next_tau = beginning(block, wave, following)
@@ -369,16 +356,13 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
         for q in range(end, min(next_p + 1, pieces.shape[0])):
             if state.sliding:
                 until = next_tau if q == next_p else pieces[q, FINISH]
-                state = hold(block, pieces, steps, q, pieces[q, BEGIN], until, state)
+                state = walk(block, pieces, steps, q, pieces[q, BEGIN], until, HELD, state)
                 stopped_at = math.inf if state.sliding else pieces[q, END]
     velocity, displacement = state.velocity, state.displacement
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
         velocity = eq.attenuated_velocity(velocity, state.held, begins - started)
     return Pulse(velocity, displacement, state.peak, min(state.least, velocity), stopped_at, 0.0, validity)
-
-
-_train = train_of(pulse)
 
 
 @scalar
@@ -391,6 +375,7 @@ def follow(block: Block, wave: Wave, steps: Steps, c: int, p: int, tau: float) -
     return Gain(state.velocity, state.displacement, state.peak)
 
 
+_train = train_of(pulse)
 _slide_continuously = series_of(follow)
 
 
