@@ -15,7 +15,7 @@ import xarray as xr
 import slipsweep
 from slipsweep.errors import InputError
 from slipsweep.files import export, spec
-from slipsweep.files import storing as store
+from slipsweep.files import running as store
 from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import Validity
 from tests.support.commands import command

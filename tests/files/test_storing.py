@@ -11,7 +11,7 @@ import xarray as xr
 
 import slipsweep
 from slipsweep.errors import InputError, RunError
-from slipsweep.files import spec, storing
+from slipsweep.files import running, spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
 
@@ -81,8 +81,8 @@ def job_of(folder: Path, study: str) -> Job:
     return sweep_job(spec.load(folder / f"{study}.toml"))
 
 
-def stored(job: Job, path: Path | str, **options: Any) -> storing.Report:
-    return storing.run(job, path, command="slipsweep run", **options)
+def stored(job: Job, path: Path | str, **options: Any) -> running.Report:
+    return running.run(job, path, command="slipsweep run", **options)
 
 
 def without_time(table: xr.Dataset) -> xr.Dataset:
@@ -95,7 +95,7 @@ def without_time(table: xr.Dataset) -> xr.Dataset:
 def test_every_study_runs_every_way(folder: Path, study: str, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
     job = job_of(folder, study)
     whole = stored(job, folder / "a.nc")
-    monkeypatch.setattr(storing, "CHUNK_CELLS", int(5 * job.plan.cost) + 1)
+    monkeypatch.setattr(running, "CHUNK_CELLS", int(5 * job.plan.cost) + 1)
     parts = stored(job_of(folder, study), folder / output)
     one, other = read_result(folder / "a.nc"), read_result(folder / output)
     xr.testing.assert_identical(without_time(other), without_time(one))
@@ -114,8 +114,8 @@ def test_every_study_runs_every_way(folder: Path, study: str, output: str, monke
 
 @pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
 def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(storing, "CHUNK_CELLS", 6)
-    kind, path = (storing._ZarrChunks if output.endswith("zarr") else storing._NetcdfChunks), folder / output
+    monkeypatch.setattr(running, "CHUNK_CELLS", 6)
+    kind, path = (storing.ZarrChunks if output.endswith("zarr") else storing.NetcdfChunks), folder / output
     write, seen = kind.write, []
 
     def failing(self: Any, number: int, arrays: Any) -> None:
@@ -168,15 +168,15 @@ def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_two_runs_on_one_output(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(storing, "CHUNK_CELLS", 6)
-    solve = storing._solve_here
+    monkeypatch.setattr(running, "CHUNK_CELLS", 6)
+    solve = running._solve_here
 
     def solve_and_run_again(target: Any, *arguments: Any) -> None:
         with pytest.raises(RunError, match=r"a\.nc: another run is writing it"):
             stored(job_of(folder, "sweep"), folder / "a.nc", overwrite=True)
         solve(target, *arguments)
 
-    monkeypatch.setattr(storing, "_solve_here", solve_and_run_again)
+    monkeypatch.setattr(running, "_solve_here", solve_and_run_again)
     stored(job_of(folder, "sweep"), folder / "a.nc")
     assert read_result(folder / "a.nc").sizes["theta"] == 3
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from slipsweep import InputError, read_record, sweep
 from slipsweep.files import export, spec
-from slipsweep.files import storing as store
+from slipsweep.files import running as store
 from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
 from tests.support.commands import command

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, Suite, read_suite, sweep
+from slipsweep.files import running as store
 from slipsweep.files import spec
-from slipsweep.files import storing as store
 from slipsweep.files.jobs import limit_job, sweep_job
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.opening import read_result

@@ -48,7 +48,7 @@ OUTPUTS = ("out.nc", "out.zarr")
 
 #: Processes begin as copies of one that has imported what the command needs.
 _PROCESSES = multiprocessing.get_context("forkserver")
-_PROCESSES.set_forkserver_preload(["slipsweep.cli", "slipsweep.files.jobs", "slipsweep.grid.graph", __name__])
+_PROCESSES.set_forkserver_preload(["slipsweep.cli", "slipsweep.files.running", "slipsweep.grid.graph", __name__])
 
 
 @dataclass
@@ -87,14 +87,14 @@ def start(folder: Path, *arguments: str, cells: int = 25_000, limit: int | None 
 
 def _run(folder: Path, arguments: Sequence[str], cells: int, limit: int | None, errors: Path) -> None:
     from slipsweep.cli import main
-    from slipsweep.files import storing
+    from slipsweep.files import running
 
     os.chdir(folder)
     with errors.open("w") as file:
         os.dup2(file.fileno(), 2)
     sys.stderr = os.fdopen(2, "w", buffering=1)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    storing.CHUNK_CELLS = cells
+    running.CHUNK_CELLS = cells
     if limit is not None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from slipsweep.files.jobs import Job
-    from slipsweep.files.storing import Place, Report
+    from slipsweep.files.running import Report
+    from slipsweep.files.storing import Place
     from slipsweep.grid.tally import Indices, Tally
     from slipsweep.motion.records import Record
 
@@ -178,7 +179,7 @@ def run_job(
     unit: str = "cells",
 ) -> "Report":
     """Solve and write what a command computes, in chunks if need be."""
-    from slipsweep.files import storing
+    from slipsweep.files import running
     from slipsweep.grid.resources import parse_size
 
     if resume and overwrite:
@@ -187,7 +188,7 @@ def run_job(
         )
     nbytes = None if memory is None else parse_size("--memory", memory)
     with progress_bar(job.plan.cells, quiet, unit) as progress:
-        report = storing.run(
+        report = running.run(
             job,
             path,
             command=typed_command(),

@@ -1,7 +1,7 @@
 """Where a chunk is written, and how a run goes on after an interruption.
 
-A run of one chunk is solved and written at once.  The chunks of a larger one, elements of the dask array that
-`slipsweep.grid.graph.solved_chunks` makes of its plan, are written while others are computed:
+The chunks of a run, elements of the dask array that `slipsweep.grid.graph.solved_chunks` makes of its plan, are written
+while others are computed:
 
 - for a netCDF file each to a file of its own, ``OUT.nc.part/000012.chunk``, then to its place in the netCDF file, which
   a run that goes on begins anew from them.  It is written under another name and renamed: a chunk is a complete file
@@ -16,8 +16,8 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,12 +29,12 @@ from fsspec.core import url_to_fs
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.files import cluster, netcdf
-from slipsweep.files.jobs import RUN, Job
+from slipsweep.files import netcdf
+from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr, read_result
-from slipsweep.files.outputs import appear, check_outputs, complete_or_absent, writing
+from slipsweep.files.outputs import appear, writing
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, chunk_lengths, grid_chunks, places
+from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, grid_chunks, places
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
 
@@ -47,95 +47,8 @@ Place = Path | str
 #: The results of a chunk, by name.
 Arrays = Mapping[str, NDArray[Any]]
 
-#: Resident memory of a run, and of a worker of this machine, beside its chunks.
-_BASE_MEMORY, _WORKER_MEMORY = 400_000_000, 250_000_000
-
-#: Chunks for each worker, so that all end at about the same time, and the least work of one, in cells of a sine.
-_CHUNKS_A_WORKER, _LEAST_WORK = 16, 500_000
-
 #: Most cells of a chunk of a Zarr store within one of the run's, which is a shard of the store.
 _ZARR_CELLS = 500_000
-
-
-@dataclass(frozen=True)
-class Report:
-    """What `run` did; `found`: the output was complete by an earlier run, and nothing was computed."""
-
-    path: Place
-    tally: Tally
-    found: bool = False
-
-
-def run(
-    job: Job,
-    path: Place,
-    *,
-    command: str,
-    overwrite: bool = False,
-    resume: bool = False,
-    memory: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> Report:
-    """Solve a plan and write its results, complete or not at all.
-
-    Parameters
-    ----------
-    job : Job
-    path : Path or str
-        The netCDF file, or the Zarr store (a name that ends in .zarr), or the address of a store.
-    command : str
-        The command as typed, for the file's `history`.
-    overwrite, resume : bool
-        Replace `path` and the chunks of an interrupted run; or go on with these, and leave a complete output as it is.
-    memory : int, optional
-        Bytes that the run may take.
-    workers, scheduler : int or str, optional
-        Solve on so many processes of this machine, or on those of the scheduler at an address.
-    progress : callable, optional
-        Called with a number of cells just solved.
-
-    Raises
-    ------
-    InputError
-        The output exists or cannot be written, the grid is too large for disk or memory, or there are chunks of an
-        interrupted run, and neither `resume` nor `overwrite` is given, or they are of another sweep or version.
-    RunError
-        Writing failed, or another run is writing `path`.  A note tells how many chunks are kept.
-    """
-    cluster.check_cluster(workers, scheduler)
-    plan = job.plan
-    if isinstance(path, Path):
-        check_outputs([path], overwrite or resume, reads=job.spec.files)
-    if resume and (complete := _complete(job, path)) is not None:
-        return Report(path, tally_of(complete, plan), found=True)
-    processes = workers or (64 if scheduler else 0)
-    lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, memory, processes, workers or 0), plan.together)
-    is_zarr = isinstance(path, str) or path.suffix == ".zarr"
-    chunks = (_ZarrChunks if is_zarr else _NetcdfChunks)(job, path, lengths)
-    if math.prod(chunks.shape) == 1 and not is_zarr and not processes and not Path(chunks.place).exists():
-        with job.spec.named():
-            table = plan.solve(progress)
-        with complete_or_absent(Path(path), overwrite) as temporary:
-            netcdf.write_table(job.described(table, command), temporary, job.spec.output.compression)
-        return Report(path, tally_of(table, plan))
-
-    def tell(number: int) -> None:
-        if progress is not None:
-            progress(plan.part(chunks.chunk(number)).cells)
-
-    with chunks.locked():
-        chunks.begin(resume, overwrite)
-        with chunks.kept(), job.spec.named():
-            with writing(path), chunks.opened(command):
-                for number in chunks.done:
-                    tell(number)
-                if processes:
-                    _solve_elsewhere(chunks, workers, scheduler, tell)
-                else:
-                    _solve_here(chunks, tell)
-            return Report(path, chunks.finish(command, overwrite))
 
 
 def nbytes_of(path: Place) -> int:
@@ -154,50 +67,8 @@ def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
     return tally
 
 
-def _complete(job: Job, path: Place) -> xr.Dataset | None:
-    """The output, if it is there and of this very sweep."""
-    if isinstance(path, Path) and not path.exists():
-        return None
-    try:
-        found = read_result(path)
-    except InputError:
-        if isinstance(path, Path):
-            raise
-        return None  # nothing is at the address, or a store that is not finished
-    if found.attrs.get(RUN) != job.digest:
-        raise InputError(
-            f"{path}: exists already, and is of another sweep or version; give --overwrite to replace it, or another "
-            "name with -o"
-        )
-    return found
-
-
-def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int) -> int:
-    """How many cells a chunk may have: seconds of work, within the memory, and enough chunks for all processes."""
-    cells = max(1, int(CHUNK_CELLS / plan.cost))
-    if processes:
-        share = math.prod(plan.sizes.values()) // (_CHUNKS_A_WORKER * processes)
-        cells = min(cells, max(math.ceil(_LEAST_WORK / plan.cost), share))
-    if memory is None:
-        return cells
-    base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
-    results = sum(
-        one.dtype.itemsize * math.prod(size for dim, size in one.sizes.items() if dim not in plan.sizes)
-        for one in plan.template().data_vars.values()
-    )
-    # in this process one chunk is solved and one is written; a worker has one, and others are on their way
-    cell = (2 + 3 * workers) * results + plan.cell_memory + 8
-    within = (memory - base) // cell
-    if within < 1000:
-        raise InputError(f"--memory = {size_text(memory)}: must be {size_text(1.01 * (base + 1000 * cell))} at least")
-    return int(min(within, cells) if plan.cost > 1.0 or processes else within)
-
-
-# ------------------------------------------------------------------------------- the chunks
-
-
 @dataclass
-class _Chunks:
+class Chunks:
     """The chunks of a run, numbered in the order of the file, and where they are written."""
 
     job: Job
@@ -357,7 +228,7 @@ class _Chunks:
 
 
 @dataclass
-class _NetcdfChunks(_Chunks):
+class NetcdfChunks(Chunks):
     """Chunks in files of arrays, and in the netCDF file, which is none before its last chunk."""
 
     file: "netCDF4.Dataset | None" = None
@@ -410,7 +281,7 @@ class _NetcdfChunks(_Chunks):
         return self.tally
 
 
-class _ZarrChunks(_Chunks):
+class ZarrChunks(Chunks):
     """Chunks as regions of a Zarr store, each one shard of its arrays, with an empty file to mark that it is there."""
 
     @property
@@ -491,44 +362,3 @@ def _write_region(
     files, folder = url_to_fs(place)
     files.pipe_file(f"{folder}/{number:06}.chunk", b"")
     return np.ones((1,) * len(block_id), bool)
-
-
-# ------------------------------------------------------------------------------- solving them
-
-
-def _solve_here(chunks: _Chunks, progress: Callable[[int], None]) -> None:
-    """Compute the chunks that are missing; one thread writes each while the next is computed."""
-    from slipsweep.grid.graph import solved_chunks
-
-    solved = solved_chunks(chunks.job.plan, chunks.cut)
-    with ThreadPoolExecutor(1) as writer:
-        waiting: Future[None] | None = None
-        for number, index in chunks.missing():
-            found = solved.blocks[index].compute(scheduler="synchronous").item()
-            if waiting is not None:
-                waiting.result()
-            waiting = writer.submit(chunks.write, number, _stored(chunks.job, found))
-            progress(number)
-        if waiting is not None:
-            waiting.result()
-
-
-def _solve_elsewhere(
-    chunks: _Chunks, workers: int | None, scheduler: str | None, progress: Callable[[int], None]
-) -> None:
-    """Have the chunks that are missing computed by workers, and written by them or here as they come back."""
-    from slipsweep.grid.graph import solved_chunks
-
-    solved = solved_chunks(chunks.job.plan, chunks.cut)
-    written = chunks.written(solved)
-    with cluster.connected(workers, scheduler) as client:
-        blocks = ((number, (solved if written is None else written).blocks[at]) for number, at in chunks.missing())
-        for number, found in cluster.computed(client, blocks):
-            if written is None:
-                chunks.write(number, _stored(chunks.job, found.item()))
-            progress(number)
-
-
-def _stored(job: Job, arrays: Arrays) -> Arrays:
-    """The results of a chunk in the types of the file."""
-    return {name: arrays[name].astype(dtype, copy=False) for name, dtype in job.dtypes.items()}
