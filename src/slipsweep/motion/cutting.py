@@ -43,9 +43,6 @@ Exact = NDArray[Any]
 Derivative = Callable[[Exact, int], Exact]
 
 
-# ------------------------------------------------------------------------------ one period
-
-
 class _Period(NamedTuple):
     """One cycle of a waveform without ramps; phases are parts of the cycle.
 
@@ -126,9 +123,6 @@ def _sign_changes(derivative: Derivative, order: int, edges: Exact, depth: int =
     return np.asarray(high)
 
 
-# --------------------------------------------------------------------------------- pieces
-
-
 class _Pieces(NamedTuple):
     """Pieces of one cycle: where they begin and end (parts of the cycle), and their polynomials."""
 
@@ -196,9 +190,6 @@ def _smooth_pieces(derivative: Derivative, fastest: int, low: float, high: float
     at_end = np.abs(values[1:]) > np.abs(values[:-1])
     coefficients = np.where(at_end, series[1:-1, 1:], series[1:-1, :-1]).T.astype(np.float64)
     return _Pieces(places[:-1], places[1:], values[:-1], values[1:], at_end, coefficients)
-
-
-# ------------------------------------------------------------------------------ the table
 
 
 @functools.lru_cache(maxsize=32)
@@ -276,9 +267,6 @@ def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray
     return np.array(joined, np.float64).reshape(-1, 2)
 
 
-# ------------------------------------------------------------------------------- a record
-
-
 #: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two pieces.
 MOST_TABLES = 16
 TABLE_BYTES = 160
@@ -299,9 +287,8 @@ def _spacing(times: NDArray[np.float64]) -> NDArray[np.float64]:
 def wave_of_record(record: Record, polarity: float) -> Wave:
     """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
     times, values = record.times, polarity * record.acceleration
-    with np.errstate(over="ignore"):  # what is infinite then has no finite result, which is refused by name
-        spacing, change = _spacing(times), np.diff(values)
-        slope = change / spacing
+    spacing, change = _spacing(times), np.diff(values)
+    slope = change / spacing
     # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
     own = np.repeat(np.arange(spacing.size), 1 + crosses)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import shown
+from slipsweep.model.parameters import LARGEST, shown
 from slipsweep.motion.reading import UNITS, Reading
 
 Floats = NDArray[np.float64]
@@ -78,9 +78,6 @@ def _format_of(lines: list[str], reading: Reading) -> str:
     header, body = _header(lines)
     has_times = not body or len(_cells(body[0][1])) > 1
     return "csv" if has_times and reading.interval is None and not _interval_in(header) else "values"
-
-
-# ------------------------------------------------------------------------------------- columns
 
 
 def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
@@ -149,9 +146,6 @@ def _interval_in(header: str) -> float | None:
     return float(found[1]) if found else None
 
 
-# -------------------------------------------------------------------- one header, then accelerations
-
-
 def _at2(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), 0)
     if re.search("VELOCITY|DISPLACEMENT", "\n".join(lines[:at]), re.IGNORECASE):
@@ -189,7 +183,7 @@ def _knet(path: Path, lines: list[str], reading: Reading) -> Samples:
             ("Scale Factor", rf".*\(gal\)/{_NUMBER}"),
         )
     )
-    if not (0.0 < frequency < 1e6 and 0.0 < counts < 1e100 and 0.0 < full_scale < 1e100):
+    if not (0.0 < frequency < 1e6 and 0.0 < counts <= LARGEST and 0.0 < full_scale <= LARGEST):
         raise InputError(f"{path}: {frequency:g} Hz, {full_scale:g} gal, {counts:g} counts: must be > 0")
     values = _numbers(path, enumerate(lines[at + 1 :], at + 2)) * (full_scale / counts)
     return Samples(_even(path, values, 1.0 / frequency, round(min(duration * frequency, 1e9))), values, "gal")
@@ -202,8 +196,6 @@ def _in_header(path: Path, header: str, name: str, pattern: str) -> str:
         raise InputError(f"{path}: no {name} in its header, or none that can be read: another format, or damaged")
     return found[1]
 
-
-# ----------------------------------------------------------------------------------- COSMOS
 
 #: Codes of units that are accelerations (Table 2 of the format).
 _COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
@@ -271,9 +263,6 @@ def _cosmos_values(path: Path, lines: list[str], at: int, pattern: str) -> tuple
     return end, values
 
 
-# --------------------------------------------------------------------------------- all formats
-
-
 def _numbers(
     path: Path,
     lines: Iterable[tuple[int, str]],
@@ -294,7 +283,6 @@ def _even(path: Path, values: Floats, interval: float, points: int | None = None
     """Times of evenly sampled values, whose header may say how many they are."""
     if points is not None and values.size != points:
         raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
-    if not 0.0 < interval < 1e300:
+    if not 0.0 < interval <= LARGEST:
         raise InputError(f"{path}: sampling interval {interval:g}: must be a finite number > 0")
-    with np.errstate(over="ignore"):  # what is not finite then is refused
-        return np.arange(values.size, dtype=np.float64) * interval
+    return np.arange(values.size, dtype=np.float64) * interval

@@ -131,9 +131,8 @@ def _drift(record: Motion) -> str:
     """A ground that moves away, as the integral of an offset does."""
     if record.times.size <= _FEWEST:
         return ""
-    with np.errstate(over="ignore", invalid="ignore"):
-        displacement, velocity = peak_displacement(record), peak_velocity(record)
-        end = float(np.trapezoid(record.acceleration, record.times))
+    displacement, velocity = peak_displacement(record), peak_velocity(record)
+    end = float(np.trapezoid(record.acceleration, record.times))
     moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * velocity
     if not moves_on and not displacement > _LARGEST_DISPLACEMENT:
         return ""

@@ -64,7 +64,7 @@ def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
         One of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s), and `time_scale`.  The last two
         grow with the time scale: the target is that of the motion as it shakes the base.
     """
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is infinite then is refused by name
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a motion that is zero throughout: refused by name
         if "scale" in given:
             return given["scale"]
         if "amplitude" in given:
@@ -146,8 +146,7 @@ def _lines(record: Motion) -> "PPoly":
     """The straight lines between the samples."""
     from scipy.interpolate import PPoly  # here: a sweep under a waveform does not wait for it
 
-    with np.errstate(over="ignore"):
-        slope = np.diff(record.acceleration) / np.diff(record.times)
+    slope = np.diff(record.acceleration) / np.diff(record.times)
     return PPoly(np.array([slope, record.acceleration[:-1]]), record.times)
 
 
@@ -156,8 +155,7 @@ def _energy(record: Motion) -> "PPoly":
     from scipy.interpolate import PPoly
 
     slope, first = _lines(record).c
-    with np.errstate(over="ignore"):
-        return PPoly(np.array([slope * slope, 2.0 * slope * first, first * first]), record.times).antiderivative()
+    return PPoly(np.array([slope * slope, 2.0 * slope * first, first * first]), record.times).antiderivative()
 
 
 def _zeros(curve: "PPoly") -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_choice, check_numbers, check_single, shown
+from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion.formats import read_lines, read_samples
 from slipsweep.motion.inspection import check_plausible, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
@@ -90,8 +90,7 @@ class Record:
         """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
         step = check_single("interval", interval)
         values = check_numbers("acceleration", acceleration)
-        with np.errstate(over="ignore"):  # what is not finite then is refused
-            return cls(np.arange(values.size, dtype=np.float64) * step, values, name)
+        return cls(np.arange(values.size, dtype=np.float64) * step, values, name)
 
     @classmethod
     def from_obspy(
@@ -138,11 +137,10 @@ class Record:
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
         degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
-        shape = self.acceleration
-        with np.errstate(all="ignore"):  # what is not finite then is refused
-            if degree is not None:
-                shape = shape - np.polynomial.Polynomial.fit(self.times, shape, degree)(self.times)
-        return replace(self, acceleration=shape, attrs=self.attrs | {"baseline": baseline})
+        values = self.acceleration
+        if degree is not None:
+            values = values - np.polynomial.Polynomial.fit(self.times, values, degree)(self.times)
+        return replace(self, acceleration=values, attrs=self.attrs | {"baseline": baseline})
 
     def summary(self) -> str:
         """One line: duration, interval, peak ground acceleration and velocity, the unit that it was read in.
@@ -167,8 +165,10 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
     for what, values in {"time": times, **columns}.items():
         if values.ndim != 1 or values.shape != times.shape:
             raise InputError(f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be rows")
-        for at in np.flatnonzero(~np.isfinite(values))[:1]:
-            raise InputError(f"{name}: {what} of sample {at + 1} = {values[at]}: must be a finite number")
+        for at in np.flatnonzero(~(np.abs(values) <= LARGEST))[:1]:
+            raise InputError(
+                f"{name}: {what} of sample {at + 1} = {values[at]}: must be a finite number, at most {LARGEST:g}"
+            )
     if times.size < least:
         raise InputError(f"{name}: {times.size} samples: must be at least {least}")
     for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
@@ -273,8 +273,7 @@ def _inspected(
 ) -> Record:
     """A record of values in a unit, looked at before it is used."""
     times, values, missing = without_fill_values(name, times, values, reading.gaps)
-    with np.errstate(over="ignore"):  # what is not finite then is refused
-        record = Record(times, values * UNITS[unit], name, dict(attrs) | {"record_units": unit})
+    record = Record(times, values * UNITS[unit], name, dict(attrs) | {"record_units": unit})
     record = record.corrected(reading.baseline)
     odd = check_plausible(record, unit, reading.implausible, has_gaps=bool(missing))
     found = [text for text in (missing, odd) if text]

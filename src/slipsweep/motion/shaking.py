@@ -78,18 +78,13 @@ class ShakingTest:
         if TABLE not in self.channels:
             raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
         times = check_numbers(f"{self.name}: time", self.times)
-        kept = {
-            name: check_numbers(f"{self.name}: {name}", self.channels[name])
-            for name in CHANNELS
-            if name in self.channels
-        }
-        filled = {
-            name: values if name == TABLE else np.where(np.isnan(values), 0.0, values) for name, values in kept.items()
-        }
+        measured = [name for name in CHANNELS if name in self.channels]
+        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in measured}
+        blank = {name: np.isnan(values) & (name != TABLE) for name, values in kept.items()}
+        filled = {name: np.where(blank[name], 0.0, values) for name, values in kept.items()}
         check_samples(self.name, times, filled, FEWEST_SAMPLES)
-        for name, values in kept.items():
-            if np.isnan(values).all():
-                raise InputError(f"{self.name}: {name}: no sample")
+        for name in (name for name in measured if blank[name].all()):
+            raise InputError(f"{self.name}: {name}: no sample")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "channels", kept)
 

@@ -90,8 +90,7 @@ class Pair:
         from scipy.special import cosdg, sindg  # exact at the quarters of a turn
 
         degrees = check_single("azimuth", azimuth)
-        with np.errstate(over="ignore"):  # what is not finite then is refused
-            acceleration = cosdg(degrees) * self.first.acceleration + sindg(degrees) * self.second.acceleration
+        acceleration = cosdg(degrees) * self.first.acceleration + sindg(degrees) * self.second.acceleration
         return Record(self.times, acceleration, f"{self.name} at {degrees:g} degrees", self.attrs)
 
 
