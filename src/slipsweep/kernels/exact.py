@@ -12,25 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.decorators import scalar, single, uncounted
+from slipsweep.kernels import block as physics
 from slipsweep.kernels import linear
-from slipsweep.kernels.block import (
-    INTEGRATE,
-    KD_NOT_POSITIVE,
-    LITERAL,
-    NEWMARK,
-    Block,
-    Options,
-    inflection,
-    opposite,
-    relative_acceleration,
-    relative_acceleration_root,
-    response,
-    response_root,
-    slope_root,
-    slopes,
-    starting_acceleration,
-    stays_below_yield,
-)
+from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
@@ -188,30 +172,30 @@ def inside(x: float, end: float) -> float:
 def next_break(block: Block, x: float, end: float) -> float:
     """Where, on the way from x to end, one of E, dE/dx and D first ceases to be monotone."""
     inner = inside(x, end)
-    if 0.0 < inner < inflection(block):
-        end = min(inflection(block), end)
-    before, after = slopes(block, inner)[1], slopes(block, end)[1]
+    if 0.0 < inner < physics.inflection(block):
+        end = min(physics.inflection(block), end)
+    before, after = physics.slopes(block, inner)[1], physics.slopes(block, end)[1]
     # dE/dx passes 1 where D turns and 0 where E turns; the one nearer to `before` comes first
     for turn in (1.0, 0.0) if before > after else (0.0, 1.0):
         if min(before, after) < turn < max(before, after):
-            return slope_root(block, turn, inner, end)
+            return physics.slope_root(block, turn, inner, end)
     return end
 
 
 @scalar
 def onset(block: Block, x: float, top: float) -> float:
     """t1: Üg on the rise from x ≥ Üy to `top` at which the block at rest starts to slide (`top` if it does not)."""
-    if block.rise == NEWMARK or relative_acceleration(block, inside(x, top)) > 0.0:
+    if block.rise == physics.NEWMARK or physics.relative_acceleration(block, inside(x, top)) > 0.0:
         return x
     for _ in range(MOST_PHASES):
         if x >= top:
             break
         end = next_break(block, x, top)
         inner = inside(x, end)
-        if relative_acceleration(block, inner) > 0.0:
+        if physics.relative_acceleration(block, inner) > 0.0:
             return x
-        if relative_acceleration(block, end) > 0.0:
-            return relative_acceleration_root(block, inner, end)
+        if physics.relative_acceleration(block, end) > 0.0:
+            return physics.relative_acceleration_root(block, inner, end)
         x = end
     return top if x >= top else math.nan
 
@@ -223,26 +207,26 @@ def phase_on_rise(block: Block, x: float, top: float, held: float, follows: bool
     Newmark: b = Üy to the top.  Literal: b = Eq. 4 throughout.  Monotone: b = max(b, Eq. 4), held until Eq. 4 comes to
     it, followed until Eq. 4 falls.  A phase that follows Eq. 4 ends where D changes its sign, too.
     """
-    if block.rise == NEWMARK:
+    if block.rise == physics.NEWMARK:
         return RisePhase(top, False, False)
     end = top
     inner = inside(x, end)
-    bends = inner < inflection(block)
+    bends = inner < physics.inflection(block)
     if bends:
         end = next_break(block, x, top)
         inner = inside(x, end)
-    eq4, slope, _ = slopes(block, inner)
-    follows = block.rise == LITERAL or (slope > 0.0 and (follows or eq4 >= held))
+    eq4, slope, _ = physics.slopes(block, inner)
+    follows = block.rise == physics.LITERAL or (slope > 0.0 and (follows or eq4 >= held))
     if follows:
         if not bends:  # E is convex, D concave: it may be positive between two places where it is not
             end = next_break(block, x, top)
             inner = inside(x, end)
-        if opposite(relative_acceleration(block, inner), relative_acceleration(block, end)):
-            end = relative_acceleration_root(block, inner, end)
+        if physics.opposite(physics.relative_acceleration(block, inner), physics.relative_acceleration(block, end)):
+            end = physics.relative_acceleration_root(block, inner, end)
         return RisePhase(end, True, True)
-    crosses = response(block, end) > held
+    crosses = physics.response(block, end) > held
     if crosses:
-        end = response_root(block, held, inner, end)
+        end = physics.response_root(block, held, inner, end)
     if x < held < end:  # from there on V grows
         return RisePhase(held, False, False)
     return RisePhase(end, False, crosses)
@@ -254,12 +238,12 @@ def yield_governs(block: Block, wave: Wave) -> bool:
 
     Not said of Newmark's block, which knows no Eq. 4.
     """
-    governs = block.rise != NEWMARK
+    governs = block.rise != physics.NEWMARK
     for i in range(wave.rises.shape[0]):
         high = block.amplitude * wave.rises[i, 1]
         if governs and high > block.yield_acceleration:
             low = max(block.amplitude * wave.rises[i, 0], block.yield_acceleration)
-            governs = stays_below_yield(block, low, high)
+            governs = physics.stays_below_yield(block, low, high)
     return governs
 
 
@@ -279,7 +263,7 @@ def _followed_lost(where: tuple[Block, np.ndarray, int, float, float], tau: floa
     """−V at τ where b follows Eq. 4, and its rate."""
     block, pieces, p, velocity, start = where
     left = velocity + eq4_integrals(block, pieces, p, start, tau)[0]
-    return -left, -relative_acceleration(block, base_acceleration(pieces, p, block.amplitude, tau))
+    return -left, -physics.relative_acceleration(block, base_acceleration(pieces, p, block.amplitude, tau))
 
 
 _held_stop = root_of(_held_lost)
@@ -310,7 +294,7 @@ def hold(pieces: np.ndarray, p: int, amplitude: float, held: float, velocity: fl
     if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
         # nothing slows it: over a part so short that its gain is rounding, it does not stop
         stops, gained = False, max(gained, 0.0)
-    if opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
+    if physics.opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
         # V turns where x = b; one that starts from rest there only seems to fall, by rounding
         if straight:
             turn = start - rate / slope
@@ -370,7 +354,7 @@ def rise(
 ) -> State:  # fmt: skip
     """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
     amplitude, top, p = block.amplitude, block.amplitude * pieces[last, LAST], first
-    follows = block.rise == LITERAL
+    follows = block.rise == physics.LITERAL
     for _ in range(MOST_PHASES * (1 + last - first)):
         if not state.sliding:
             began = top
@@ -382,8 +366,8 @@ def rise(
                 p, tau = place_of(block, pieces, began, p, tau, last)
             # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g μs
             beyond = began > max(x, block.yield_acceleration)
-            b = began if beyond else min(starting_acceleration(block, began), began)
-            state, follows, x = begun(state, b), block.rise == LITERAL, began
+            b = began if beyond else min(physics.starting_acceleration(block, began), began)
+            state, follows, x = begun(state, b), block.rise == physics.LITERAL, began
         phase = phase_on_rise(block, x, top, state.held, follows)
         until, tau_until = place_of(block, pieces, phase.end, p, tau, last)
         while True:
@@ -405,7 +389,7 @@ def rise(
                 x = base_acceleration(pieces, p, amplitude, tau)
             continue
         x, follows = phase.end, phase.follows_after
-        state = with_held(state, response(block, x) if phase.follows else state.held)
+        state = with_held(state, physics.response(block, x) if phase.follows else state.held)
         if x >= top:
             return state
     return State(math.nan, math.nan, state.held, True, math.nan, math.nan, 0.0, state.slips, state.logged)
@@ -415,12 +399,12 @@ def rise(
 def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State) -> State:
     """Reset b of a block that slides where piece p, Üg = x, begins, or begin a slide there (t1), if not by a rise."""
     if state.sliding:
-        if block.rise == NEWMARK:
+        if block.rise == physics.NEWMARK:
             return state
-        eq4 = response(block, x)
-        return with_held(state, eq4 if block.rise == LITERAL else max(state.held, eq4))
+        eq4 = physics.response(block, x)
+        return with_held(state, eq4 if block.rise == physics.LITERAL else max(state.held, eq4))
     if x >= block.yield_acceleration and pieces[p, FIRST] >= pieces[p, LAST]:
-        b = starting_acceleration(block, x)
+        b = physics.starting_acceleration(block, x)
         if b < x:
             return begun(state, b)
     return state
@@ -454,14 +438,14 @@ def recouple(
     count = pieces.shape[0]
     started = pieces[q, START] if q < count else pieces[q - 1, END]
     stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
-    if recoupling == INTEGRATE:
+    if recoupling == physics.INTEGRATE:
         while state.sliding and q < min(p + 1, count):
             end = tau if q == p else pieces[min(q, count - 1), FINISH]
             if q < count and end > pieces[q, BEGIN]:
                 state = hold_on(pieces, q, block.amplitude, pieces[q, BEGIN], end, state, log)
             q += 1
         started, stopped_at = pieces[count - 1, END], math.inf
-    if not state.sliding or (p < count and recoupling == INTEGRATE):
+    if not state.sliding or (p < count and recoupling == physics.INTEGRATE):
         return state
     duration = math.inf if p >= count else phase_at(pieces, p, tau) - started
     logged = state.logged
@@ -490,7 +474,7 @@ def pulse(
     state = State(
         velocity=velocity,
         displacement=0.0,
-        held=starting_acceleration(block, x),
+        held=physics.starting_acceleration(block, x),
         sliding=velocity > 0.0,
         peak=velocity,
         least=velocity,
@@ -519,13 +503,13 @@ def pulse(
         x, tau = block.amplitude * pieces[min(q, end - 1), FIRST], pieces[min(q, end - 1), BEGIN]
     if state.sliding:
         if state.held <= 0.0:
-            return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, KD_NOT_POSITIVE)
+            return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, physics.KD_NOT_POSITIVE)
         next_p, next_tau = pieces.shape[0], 0.0
         if following < wave.height.size:
             next_p, next_tau = beginning(block, wave, following)
         state = recouple(block, options.recoupling, pieces, end, next_p, next_tau, state, log)
     workspace.logged[0] = state.logged
-    validity = KD_NOT_POSITIVE if least_held <= 0.0 else 0
+    validity = physics.KD_NOT_POSITIVE if least_held <= 0.0 else 0
     return Pulse(
         state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.stopped_at,
         state.slips, validity,

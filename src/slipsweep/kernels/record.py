@@ -13,30 +13,8 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
-from slipsweep.kernels.block import (
-    FRICTION_ESTIMATED,
-    FRICTION_NOT_DECAYING,
-    KD_NOT_POSITIVE,
-    LIMIT_UNDEFINED,
-    LITERAL,
-    NEWMARK,
-    NO_VALUE,
-    NOT_RECOUPLED,
-    STATICALLY_UNSTABLE,
-    UNSOLVED,
-    UPLIFT,
-    YIELD_GOVERNS,
-    Block,
-    Cell,
-    Motion,
-    Options,
-    block_of,
-    remarks_on,
-    response,
-    settled,
-    stays_below_yield,
-    store,
-)
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.block import Block, Cell, Motion, Options
 from slipsweep.kernels.continuous import find_zeros, follow_eq4
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
 from slipsweep.kernels.excitation import phase_at
@@ -59,7 +37,7 @@ class Following(NamedTuple):
 @inlined
 def block_in_pulse(law: FrictionLaw, cell: Cell, options: Options, peak: float) -> Block:
     """The block in a pulse of that peak, for Eqs. 7-11 and λ; its `amplitude` is the factor on the record."""
-    own = block_of(
+    own = physics.block_of(
         law,
         Cell(
             cell.tan_theta, cell.mu_s, peak, cell.yield_acceleration, cell.decay_rate, cell.delta_mu,
@@ -80,7 +58,7 @@ def slides_continuously(block: Block, peak: float) -> bool:
 
     Not its own mode, which is missing where the harmonic motion of that peak would uplift.
     """
-    return block.rise != NEWMARK and peak > block.limiting_acceleration
+    return block.rise != physics.NEWMARK and peak > block.limiting_acceleration
 
 
 @scalar
@@ -133,7 +111,7 @@ def continuous_pulse(
     after = velocity + gained
     displacement = velocity * (until.ends - phase_at(wave.pieces, p, tau)) + displaced
     if until.begins > until.ends:
-        held, speed, side = response(block, peak), abs(after), math.copysign(1.0, after)
+        held, speed, side = physics.response(block, peak), abs(after), math.copysign(1.0, after)
         displacement += side * eq.attenuated_displacement(speed, held, until.begins - until.ends)
         after = side * eq.attenuated_velocity(speed, held, until.begins - until.ends)
     slips = 1.0 if velocity == 0.0 else 0.0
@@ -155,15 +133,15 @@ def recorded_pulse(
 @scalar
 def remarks_in(cell: Cell, block: Block, peak: float) -> int:
     """The flags of a pulse of that peak."""
-    if block.rise == NEWMARK:
+    if block.rise == physics.NEWMARK:
         return 0
-    remarks = remarks_on(cell, block.acceleration_ratio) | (block.validity & FRICTION_NOT_DECAYING)
+    remarks = physics.remarks_on(cell, block.acceleration_ratio) | (block.validity & physics.FRICTION_NOT_DECAYING)
     if slides_continuously(block, peak):
         return remarks
-    if stays_below_yield(block, block.yield_acceleration, peak):
-        remarks = YIELD_GOVERNS | (remarks & ~FRICTION_ESTIMATED)
-    if block.rise == LITERAL and response(block, peak) <= 0.0:
-        remarks |= KD_NOT_POSITIVE
+    if physics.stays_below_yield(block, block.yield_acceleration, peak):
+        remarks = physics.YIELD_GOVERNS | (remarks & ~physics.FRICTION_ESTIMATED)
+    if block.rise == physics.LITERAL and physics.response(block, peak) <= 0.0:
+        remarks |= physics.KD_NOT_POSITIVE
     return remarks
 
 
@@ -180,10 +158,10 @@ def added(total: float, lost: float, term: float) -> tuple[float, float]:
 def validity_of_record(law: FrictionLaw, cell: Cell, options: Options, wave: Wave) -> int:
     """What is known before the motion: Üy ≤ 0, no limit by Eq. 7, or n ≤ 0 where Üg is lowest."""
     block = block_in_pulse(law, cell, options, cell.amplitude * max(wave.highest, -wave.lowest))
-    validity = block.validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED)
+    validity = block.validity & (physics.STATICALLY_UNSTABLE | physics.LIMIT_UNDEFINED)
     # n = g + Üg tan θ is least where the base's acceleration is lowest
     lowest = eq.normal_acceleration(cell.amplitude * wave.lowest, cell.tan_theta, options.g)
-    return validity | (UPLIFT if (lowest <= 0.0) & (options.rise != NEWMARK) else 0)
+    return validity | (physics.UPLIFT if (lowest <= 0.0) & (options.rise != physics.NEWMARK) else 0)
 
 
 @single
@@ -195,12 +173,12 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, works
     velocity, displacement, lost, highest, slips = 0.0, 0.0, 0.0, 0.0, 0.0
     stick_slips, continuous = 0.0, 0.0
     k = first_pulse(block, wave, 0)
-    while k < wave.height.size and validity & NO_VALUE == 0:
+    while k < wave.height.size and validity & physics.NO_VALUE == 0:
         following, peak = first_pulse(block, wave, k + 1), scale * wave.height[k]
-        if block.rise != NEWMARK:
+        if block.rise != physics.NEWMARK:
             block = block_in_pulse(law, cell, options, peak)
         validity |= remarks_in(cell, block, peak)
-        if validity & NO_VALUE:
+        if validity & physics.NO_VALUE:
             break
         now = recorded_pulse(block, options, wave, k, following, peak, velocity, workspace)
         if slides_continuously(block, peak):
@@ -209,16 +187,16 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, works
             stick_slips += 1.0
             # of a record there is a value if b > 0 at the end of the last rise
             validity |= now.validity if math.isnan(now.displacement) else 0
-            if now.velocity > 0.0 and following < wave.height.size and block.rise != NEWMARK:
-                validity |= NOT_RECOUPLED
+            if now.velocity > 0.0 and following < wave.height.size and block.rise != physics.NEWMARK:
+                validity |= physics.NOT_RECOUPLED
         velocity, highest, slips = now.velocity, max(now.peak, highest), slips + now.slips
         displacement, lost = added(displacement, lost, now.displacement)
-        if math.isnan(displacement + highest) and validity & NO_VALUE == 0:
-            validity |= UNSOLVED
+        if math.isnan(displacement + highest) and validity & physics.NO_VALUE == 0:
+            validity |= physics.UNSOLVED
         k = following
     displacement += lost
-    validity = settled(validity, displacement, scale * max(wave.highest, -wave.lowest))
-    if validity & NO_VALUE:
+    validity = physics.settled(validity, displacement, scale * max(wave.highest, -wave.lowest))
+    if validity & physics.NO_VALUE:
         return Motion(math.nan, math.nan, math.nan, float(validity), -1.0, -1.0, -1.0)
     return Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous)
 
@@ -228,4 +206,4 @@ def solve_record(cells: np.ndarray, options: Options, wave: Wave, workspace: Wor
     """Solve the cells of a tile under a record exactly; `results` is (fields of `Motion`, cells)."""
     wave, workspace = uncounted_wave(wave), uncounted_workspace(workspace)
     for j in range(cells.size):
-        store(solve_cell(exponential(), cell_at(cells, j), options, wave, workspace), j, results)
+        physics.store(solve_cell(exponential(), cell_at(cells, j), options, wave, workspace), j, results)
