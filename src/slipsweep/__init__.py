@@ -25,12 +25,16 @@ if TYPE_CHECKING:
     from slipsweep.motion.records import Record, read_record
     from slipsweep.motion.suites import Pair, Suite, read_suite
     from slipsweep.motion.waveforms import Cosine, Harmonics, Sine, Square, Triangle
-    from slipsweep.studies.datasets import friction_parameters, limit_amplitude, sample, simulate, sweep
+    from slipsweep.studies.calibration import calibrate
+    from slipsweep.studies.datasets import friction_parameters, sweep
     from slipsweep.studies.decoding import flags
+    from slipsweep.studies.friction import measured_friction
     from slipsweep.studies.hazard import displacement_hazard
     from slipsweep.studies.hazard_curves import HazardCurve
-    from slipsweep.studies.shaking_tests import calibrate, measured_friction
+    from slipsweep.studies.history import simulate
+    from slipsweep.studies.limits import limit_amplitude
     from slipsweep.studies.suite_statistics import suite_statistics
+    from slipsweep.studies.uncertainty import sample
 
 __all__ = [
     "Cosine",
@@ -73,15 +77,17 @@ _LAZY = {
     **dict.fromkeys(("Sine", "Cosine", "Triangle", "Square", "Harmonics"), "slipsweep.motion.waveforms"),
     **dict.fromkeys(("Record", "read_record"), "slipsweep.motion.records"),
     **dict.fromkeys(("Pair", "Suite", "read_suite"), "slipsweep.motion.suites"),
-    **dict.fromkeys(
-        ("friction_parameters", "limit_amplitude", "sample", "simulate", "sweep"), "slipsweep.studies.datasets"
-    ),
+    **dict.fromkeys(("friction_parameters", "sweep"), "slipsweep.studies.datasets"),
+    "limit_amplitude": "slipsweep.studies.limits",
+    "sample": "slipsweep.studies.uncertainty",
+    "simulate": "slipsweep.studies.history",
     "flags": "slipsweep.studies.decoding",
     "open_result": "slipsweep.files.opening",
     "HazardCurve": "slipsweep.studies.hazard_curves",
     "displacement_hazard": "slipsweep.studies.hazard",
     "suite_statistics": "slipsweep.studies.suite_statistics",
-    **dict.fromkeys(("calibrate", "measured_friction"), "slipsweep.studies.shaking_tests"),
+    "calibrate": "slipsweep.studies.calibration",
+    "measured_friction": "slipsweep.studies.friction",
 }
 
 

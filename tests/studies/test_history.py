@@ -9,7 +9,6 @@ import pytest
 
 import slipsweep
 from slipsweep import Cosine, Harmonics, Sine
-from tests.support.commands import command
 
 #: Shaking that leaves Newmark's block with a velocity.
 SHAKEN: dict[str, Any] = {
@@ -27,7 +26,7 @@ def history(yield_acceleration: float, excitation: Any) -> Any:
 
 
 @pytest.mark.parametrize("shaken", SHAKEN)
-@pytest.mark.parametrize("yield_acceleration", [0.3, 1e-2, 1e-4, 1e-7, 1e-12, 1e-30])
+@pytest.mark.parametrize("yield_acceleration", [0.3, 1e-2, 1e-7, 1e-30])
 def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_acceleration: float) -> None:
     whole = history(yield_acceleration, SHAKEN[shaken])
     cycles = SHAKEN[shaken].cycles
@@ -48,20 +47,6 @@ def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_accelera
         # the last interval ends with the slide
         if time.size == 16 * (cycles + 100) + 1:
             assert time[-1] - time[16 * cycles] == pytest.approx(speed / yield_acceleration, rel=1e-9)
-
-
-def test_on_the_command_line(tmp_path: Any) -> None:
-    case = ("simulate", "--theta", "0", "--mu-s", "0.4", "--amplitude", "3", "--frequency", "1", "--waveform", "cosine")
-    for model in ("newmark", "mendez"):
-        for given in ("1e-7", "1e-20"):
-            done = command(
-                tmp_path, *case, "--model", model, "--yield-acceleration", given, "-o", f"{model}{given}.csv"
-            )
-            assert done.returncode in (0, 2), done
-            assert done.stderr.count("\n") == (done.returncode == 2)
-            assert "Traceback" not in done.stderr
-            assert "Warning" not in done.stderr
-    assert (tmp_path / "newmark1e-7.csv").read_text().count("\n") < 512 * 111
 
 
 @pytest.mark.parametrize("solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"])

@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 import slipsweep
 from slipsweep.errors import InputError
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
-from slipsweep.studies.limit_scans import crossings
 from tests.support.cases import choices
 from tests.support.commands import command
 from tests.support.made_up_records import made
@@ -35,31 +34,6 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
             amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
         )
     ).permanent_displacement
-
-
-#: Functions with one change of sign in [1, 2], at that place; the last two lack values, below it and above it.
-SIGNS: dict[str, tuple[float, Any]] = {
-    "smooth": (1.4, lambda x: x**3 - 1.4**3),
-    "steep": (1.4, lambda x: np.expm1(40.0 * (x - 1.4))),
-    "flat": (1.4, lambda x: (x - 1.4) ** 9),
-    "jump": (math.e / 2, lambda x: np.where(x < math.e / 2, -1e-9, 1e9)),
-    "after a gap": (math.e / 2, lambda x: np.where(x < math.e / 2, np.nan, x)),
-    "unbounded": (math.e / 2, lambda x: np.where(x < math.e / 2, x - 9.0, np.inf)),
-}
-
-
-@pytest.mark.parametrize("name", SIGNS)
-@pytest.mark.parametrize("ends", [(1.0, 2.0), (1e-300, 2.0), (1.0, 1e300)])
-def test_an_interval_is_narrowed_to_neighbours(name: str, ends: tuple[float, float]) -> None:
-    place, excess = SIGNS[name]
-
-    def finite(at: np.ndarray, which: np.ndarray) -> np.ndarray:
-        with np.errstate(over="ignore"):
-            return np.asarray(excess(at))
-
-    low, high = crossings(np.array([ends[0]]), np.array([ends[1]]), finite)
-    assert np.nextafter(low, high) == high
-    assert high[0] == pytest.approx(place, rel=1e-14)
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
@@ -193,7 +167,7 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     assert ((limits <= first) & (limits > 0.9 * first)).all()
 
 
-@pytest.mark.parametrize(("seed", "displacement"), [(70, 0.01), (1514, 0.003), (4277, 0.01), (5903, 0.1), (5429, 0.1)])
+@pytest.mark.parametrize(("seed", "displacement"), [(70, 0.01), (1514, 0.003), (5903, 0.1)])
 def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float) -> None:
     """The limit is never above the first of 20 000 amplitudes that reaches the target."""
     one = made(seed)
@@ -224,8 +198,7 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
         "mu_s": [0.3, 0.5, 0.4],
         "frequency": [1.0, 2.0, 0.7],
     }
-    for module in ("limits", "limit_scans"):
-        monkeypatch.setattr(f"slipsweep.studies.{module}.SCANNED", 1024)
+    monkeypatch.setattr("slipsweep.studies.limit_scans.SCANNED", 1024)
     zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
     together = slipsweep.limit_amplitude(**choices(**zipped))
     assert together.limit_amplitude.dims == ("case",)
@@ -292,18 +265,3 @@ def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
     refused = command(tmp_path, "limit", "small.nc", "-d", "50mm", "-o", "one.nc")
     assert refused.returncode == 2
     assert "one.nc" in refused.stderr
-
-
-def test_command_names_what_is_wrong(tmp_path: Path) -> None:
-    (tmp_path / "small.toml").write_text(SWEEP)
-    for arguments, message in (
-        (("-d", "5kg"), '--displacement = "5kg"'),
-        (("-d", "0"), "displacement = 0: must be a finite number > 0"),
-        (("-d", "5cm", "--maximum-amplitude", "2m"), '--maximum-amplitude = "2m"'),
-        (("-d", "5cm", "-o", "small.csv"), "small.csv: the name must end in one of .png, .svg, .pdf, .nc, .zarr"),
-        (("-d", "5cm", "-o", "no/folder/l.nc"), "no/folder"),
-    ):
-        done = command(tmp_path, "limit", "small.toml", *arguments)
-        assert done.returncode == 2, done.stderr
-        assert message in done.stderr
-        assert done.stderr.count("\n") == 1

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Record, Suite, read_record, sample, sweep
+from slipsweep import InputError, Record, Suite, sample, sweep
 from slipsweep.model.variables import Validity
 from slipsweep.studies.sampling import check_sampling
-from tests.support.commands import command
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 SAMPLES = 64
@@ -31,7 +30,7 @@ def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
     sampling = check_sampling(
         uncertain, samples=SAMPLES, method="sobol", seed=0, quantiles=[0.5], thresholds=[0.1], correlation=(), g=9.81
     )
-    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws().items()}
+    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws()[0].items()}
 
 
 NORMAL = {"distribution": "norm", "loc": 0.45, "scale": 0.04}
@@ -163,53 +162,3 @@ def test_what_cannot_be_pooled(shaking: Record, given: dict[str, Any], message: 
     axes: dict[str, Any] = {"theta": 5.0, "time_scale": [1.0, 2.0], "polarity": "both"}
     with pytest.raises(InputError, match=message):
         sample(**axes, **given, uncertain={"mu_s": NORMAL}, excitation=shaking, samples=16)
-
-
-SWEEP = f"""
-[excitation]
-record = "{SYNTHETIC}"
-[axes.theta]
-values = [0, 5]
-[axes.amplitude]
-values = [0.3, 0.6]
-units = "g"
-[axes.time_scale]
-values = [1, 2]
-[uncertainty]
-samples = 64
-thresholds = ["1cm"]
-[uncertainty.mu_s]
-distribution = "norm"
-loc = 0.4
-scale = 0.03
-"""
-
-
-def test_sweep_files(tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(SWEEP)
-    done = command(tmp_path, "run", "a.toml")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "8 grid points (2 theta x 2 amplitude x 2 time_scale), 64 samples each" in done.stdout
-    assert "sliding modes" not in done.stdout
-    assert "flags" in done.stdout
-    expected = sample(
-        theta=[0, 5],
-        amplitude=np.array([0.3, 0.6]) * 9.81,
-        time_scale=[1, 2],
-        uncertain={"mu_s": {"distribution": "norm", "loc": 0.4, "scale": 0.03}},
-        excitation=read_record(SYNTHETIC),
-        samples=64,
-        thresholds=["1cm"],
-    )
-    with xr.open_dataset(tmp_path / "a.nc") as found:
-        for name in expected.data_vars:
-            np.testing.assert_allclose(found[name], expected[name], rtol=1e-14, err_msg=str(name))
-    assert command(tmp_path, "info", "a.nc").returncode == 0
-    again = command(tmp_path, "run", "a.nc", "-o", "b.nc", "-q")
-    assert (again.returncode, again.stderr) == (0, "")
-    with xr.open_dataset(tmp_path / "a.nc") as one, xr.open_dataset(tmp_path / "b.nc") as other:
-        xr.testing.assert_equal(one, other)
-    (tmp_path / "b.toml").write_text(SWEEP.replace("uncertainty.mu_s", "uncertainty.frequency"))
-    wrong = command(tmp_path, "run", "b.toml")
-    assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1)
-    assert "uncertainty.frequency: not allowed with excitation.record" in wrong.stderr

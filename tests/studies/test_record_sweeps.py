@@ -10,11 +10,10 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, read_record, sweep
-from slipsweep.files import export, spec
 from slipsweep.files import running as store
+from slipsweep.files import spec
 from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
-from tests.support.commands import command
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 
@@ -107,13 +106,10 @@ def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
     ("old", "new", "message"),
     [
         ('"motion.csv"', '"no.csv"', "no.csv: cannot be read"),
-        ('units = "g"', 'units = "feet"', "excitation.units = 'feet': must be one of 'm/s2'"),
         ('"both"', "0", "polarity = 0: must be 1, -1, a list of these, or 'both'"),
         ('record = "motion.csv"\n', "", "excitation.units: only beside excitation.record"),
         ("[axes.time_scale]", "[axes.amplitude]", "amplitude, scale: must not both be given"),
         ("axes.time_scale", "axes.frequency", "frequency: not allowed with a Record"),
-        ("[axes.mu_s]\nvalues = [0.3, 0.4]", "", "mu_s: must be given"),
-        ("[axes.theta]", "[model]\nstructure_frequency = 2\n[axes.theta]", "structure_frequency: not allowed"),
         ("[axes.theta]", '[output]\nvariables = ["sliding_mode"]\n[axes.theta]', "variables = 'sliding_mode': must be"),
     ],
 )
@@ -124,56 +120,3 @@ def test_sweep_files_that_are_refused(folder: Path, old: str, new: str, message:
         spec.load(folder / "a.toml").plan()
     assert message in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_a_sweep_file_may_scale_the_record_to_its_peak(folder: Path) -> None:
-    given = SWEEP.replace("[axes.scale]", "[axes.amplitude]").replace("num = 4\n", 'num = 4\nunits = "g"\n')
-    (folder / "a.toml").write_text(given)
-    run(folder / "a.toml", folder / "a.nc")
-    found = xr.load_dataset(folder / "a.nc", mask_and_scale=False)
-    record = read_record(folder / "motion.csv", units="g")
-    peak = np.abs(record.acceleration).max()
-    amplitude = np.linspace(0.5, 3, 4) * 9.81
-    np.testing.assert_allclose(found.amplitude, amplitude, rtol=1e-15)
-    scaled = sweep(
-        [0, 5, 25], [0.3, 0.4], excitation=record, scale=amplitude / peak, time_scale=[1, 2], polarity="both"
-    )
-    assert (scaled.permanent_displacement > 0).any()
-    for name in DEFAULT_RECORD_RESULTS:
-        assert found[name].dims == tuple(
-            dim.replace("scale", "amplitude") if dim == "scale" else dim for dim in scaled[name].dims
-        )
-        np.testing.assert_array_equal(found[name].values, scaled[name].values)
-    again = folder / "again.nc"
-    store.run(sweep_job(spec.load(folder / "a.nc")), again, command="x")
-    xr.testing.assert_equal(found, xr.load_dataset(again, mask_and_scale=False))
-
-
-# ------------------------------------------------------------------------------ other commands
-
-
-def test_other_commands_on_the_result(folder: Path) -> None:
-    """`info`, `export` and `limit` know it; charts and pages say that they are of harmonic motions."""
-    done = command(folder, "run", folder / "a.toml", "-o", folder / "a.nc")
-    assert done.returncode == 0, done.stderr
-    assert "96 cells (3 theta x 2 mu_s x 4 scale x 2 time_scale x 2 polarity)" in done.stdout
-    told = command(folder, "info", folder / "a.nc").stdout
-    assert "number of slips that begin at rest (int32)" in told
-    assert "recorded acceleration of the base" in told
-    assert "statically_unstable" in told
-    assert export.export(folder / "a.nc", folder / "a.csv") == 96
-    header, first = (folder / "a.csv").read_text().splitlines()[:2]
-    assert header.startswith("theta (degree),mu_s (1),scale (1),time_scale (1),polarity (1),permanent_displacement (m)")
-    assert first.startswith("0.0,0.3,0.5,1.0,1,")
-    assert export.export(folder / "a.nc", folder / "samples.csv", variables=["record_acceleration"]) == 500
-    for arguments, message in (
-        (("run", folder / "a.toml", "-o", folder / "b.nc", "--solver", "step"), "--solver step: not allowed"),
-    ):
-        done = command(folder, *arguments)
-        assert (done.returncode, done.stdout) == (2, "")
-        assert message in done.stderr
-        assert done.stderr.count("\n") == 1
-    assert not (folder / "b.nc").exists()
-
-
-# ---------------------------------------------------------------------------------- the sample

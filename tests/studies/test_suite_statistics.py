@@ -1,16 +1,13 @@
 """Statistics over a suite of motions, beside numpy and by hand; what is refused."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import InputError, Newmark, Record, Suite, Validity, suite_statistics, sweep
-from slipsweep.model.options import MODELS
+from slipsweep import InputError, Record, Suite, Validity, suite_statistics, sweep
 from slipsweep.studies.suite_statistics import REASONS
-from tests.support.commands import command
 
 UNSTABLE, UPLIFT, CAUTION = Validity.STATICALLY_UNSTABLE, Validity.UPLIFT, Validity.NOT_RECOUPLED
 
@@ -127,21 +124,3 @@ def test_what_is_refused(given: dict[str, Any], message: str) -> None:
     result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
     with pytest.raises(InputError, match=message):
         suite_statistics(result, **given)
-
-
-def test_info_prints_the_numbers_of_a_suite(tmp_path: Path) -> None:
-    u = np.array([[[0.0, 0.0, 0.1], [0.02, 0.06, 0.3]]])
-    result = suite_result(u, np.zeros_like(u), ("yield_coefficient", "amplitude", "motion"))
-    result = result.assign_coords(amplitude=[1.962, 3.924], yield_coefficient=[0.1])
-    result.attrs |= {"source": "slipsweep test", **MODELS.attributes(Newmark())}
-    result.to_netcdf(tmp_path / "a.nc")
-    done = command(tmp_path, "info", "a.nc", "-d", "50mm")
-    lines = done.stdout.splitlines()
-    at = lines.index("permanent displacement (mm) over 3 motion:")
-    assert [line.split() for line in lines[at + 1 : at + 4]] == [
-        ["PGA", "(g)", "16", "%", "median", "84", "%", "zero", "P(u", ">", "50", "mm)"],
-        ["0.2", "0", "0", "68", "66.7%", "33.3%"],
-        ["0.4", "32.8", "60", "223", "0.0%", "66.7%"],
-    ]
-    cut = command(tmp_path, "info", "a.nc", "--at", "amplitude=3.924").stdout
-    assert ("32.8" in cut, "66.7%" in cut) == (True, False)

@@ -157,7 +157,6 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
     ("before", "after", "message"),
     [
         ('["motions/*.csv"]', '["motions/*.AT2"]', r"excitation\.records: motions/\*\.AT2: no file fits"),
-        ('["motions/*.csv"]', "[]", r"excitation\.records = \[\]: must name one motion"),
         ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS"]', "excitation.pairs = "),
         ('records = ["motions/*.csv"]', 'record = "motions/m0.csv"\npairs = ["a", "b"]', "excitation.pairs: only"),
         ("[axes.time_scale]", "[axes.frequency]", "frequency: not allowed with a Suite"),

@@ -28,7 +28,7 @@ def drawn(uncertain: dict[str, Any], **options: Any) -> dict[str, np.ndarray]:
     settings: dict[str, Any] = {
         "samples": 4096, "method": "sobol", "seed": 0, "quantiles": 0.5, "thresholds": 0.1, "correlation": (), "g": G
     }  # fmt: skip
-    return check_sampling(uncertain, **{**settings, **options}).draws()
+    return check_sampling(uncertain, **{**settings, **options}).draws()[0]
 
 
 # ----------------------------------------------------------------------------- closed forms
@@ -163,20 +163,6 @@ def test_of_a_displacement_amplitude() -> None:
     assert found.mode_share.dims == ("displacement_amplitude", "frequency", "mode")
 
 
-def test_of_a_frequency_without_an_axis() -> None:
-    """A drawn frequency enters u = W/ω², and with a displacement amplitude A = ω²d as well."""
-    uncertain = {"frequency": {"distribution": "uniform", "loc": 1.0, "scale": 2.0}}
-    frequency = drawn(uncertain, samples=64)["frequency"]
-    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
-    drives: list[dict[str, Any]] = [{"amplitude": 4.0}, {"displacement_amplitude": 0.03}]
-    for drive in drives:
-        found = slipsweep.sample(**block, **drive, uncertain=uncertain, samples=64)
-        swept = slipsweep.sweep(**block, **drive, frequency=np.sort(frequency)).permanent_displacement
-        np.testing.assert_allclose(found.displacement_quantile.sel(quantile=0.5), swept.median(), rtol=1e-12)
-        assert found.mean_displacement.dims == ()
-        assert ("amplitude" in found.coords) == ("amplitude" in drive)
-
-
 def test_the_scaling_law() -> None:
     """u = W/ω²: twice the frequency, a quarter of every quantile, and P(u > d/4) what P(u > d) was."""
     options: dict[str, Any] = {"uncertain": {"amplitude": FACTOR}, "samples": 512}
@@ -271,11 +257,9 @@ def test_a_seed_gives_the_same_bits(method: str) -> None:
         ({"amplitude": {"distribution": "norm", "scale": 1.0, "kind": "offset"}}, "as offset on amplitude = 2: 2.2"),
         ({"amplitude": {**FACTOR, "distribution": "lognormal"}}, 'no such distribution; did you mean "lognorm"?'),
         ({"amplitude": {**FACTOR, "unit": "g"}}, 'uncertain.amplitude.unit: unknown key; did you mean "units"?'),
-        ({"amplitude": {**FACTOR, "s": "wide"}}, "uncertain.amplitude.s = 'wide': must be a finite number"),
         ({"amplitude": {**FACTOR, "units": "g"}}, "units = 'g': not allowed with kind = 'factor'"),
         ({"amplitude": {**LOGNORMAL, "kind": "relative"}}, "kind = 'relative': must be one of 'absolute', 'factor'"),
         ({"amplitude": {"distribution": "lognorm"}}, "uncertain.amplitude.s: missing: lognorm needs s"),
-        ({"amplitude": {**FACTOR, "s": 10**400}}, "must be a finite number"),
         ({"amplitude": 3.0}, "uncertain.amplitude.distribution = 3.0: must be the name of a distribution"),
         ({"mu": LOGNORMAL}, 'uncertain.mu: cannot be drawn; did you mean "mu_s"?'),
         ({"decay_rate": {**LOGNORMAL, "kind": "offset"}}, 'kind = "offset" needs decay_rate given'),
@@ -292,12 +276,10 @@ def test_bad_distributions(change: dict[str, Any], message: str) -> None:
     ("options", "message"),
     [
         ({"samples": 1000}, 'samples = 1000: must be a power of 2 with method = "sobol", such as 512 or 1024'),
-        ({"method": "mc"}, "method = 'mc': must be one of"),
         ({"quantiles": [0.5, 1.0]}, "quantiles = 1: must be a number between 0 and 1"),
-        ({"quantiles": []}, "must be a list of one number or more"),
         ({"thresholds": -0.1}, "thresholds = -0.1: must be a finite number >= 0"),
         ({"correlation": [("theta", "amplitude", 1.5)]}, "must be between -1 and 1"),
-        ({"frequency": None}, "frequency: must be given, or drawn"),
+        ({"frequency": None}, "frequency: must be given"),
     ],
 )
 def test_bad_options(options: dict[str, Any], message: str) -> None:
@@ -389,7 +371,6 @@ def test_a_result_is_repeated_from_itself(folder: Path) -> None:
     ("old", "new", "message"),
     [
         ("seed = 7", "sed = 7", 'uncertainty.sed: unknown key; did you mean "seed"?'),
-        ("samples = 256", "samples = 100", "uncertainty.samples = 100: must be a power of 2"),
         ("s = 0.15", "q = 0.15", "uncertainty.yield_acceleration.q: unknown key; known here: distribution, kind"),
         (
             "[axes.theta]\nvalues = [0, 5]",

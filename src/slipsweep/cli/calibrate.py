@@ -86,11 +86,10 @@ def friction(
     angle = quantity("--theta", theta, "degree", g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = check_outputs(output, (".nc", *FIGURES), overwrite, [test])
-    from slipsweep.motion.shaking import read_test
-    from slipsweep.studies.friction import friction_dataset
+    from slipsweep.studies.friction import measured_friction
 
-    table = friction_dataset(
-        read_test(test),
+    table = measured_friction(
+        test,
         angle,
         mu_s,
         g=g,
@@ -151,18 +150,16 @@ def calibrate(
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     angle = quantity("--theta", theta, "degree", model.g)
     paths = check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
-    from slipsweep.motion.shaking import read_test
-    from slipsweep.studies.calibration import calibration_dataset
+    from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
-    table = calibration_dataset(
-        [read_test(test) for test in tests],
+    table = calibrated(
+        tests,
         angle,
         mu_s,
         model=model,
         offset=_channels(offset),
         drift=_channels(drift),
-        noise=None,
         cycles=cycles,
     )
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
@@ -189,10 +186,10 @@ def _channels(given: list[str] | None) -> str | list[str]:
     return "all" if given == ["all"] else given or []
 
 
-def _times(text: str) -> list[float]:
+def _times(text: str) -> tuple[float, float]:
     try:
         first, last = text.split(":")
-        return [float(first), float(last)]
+        return float(first), float(last)
     except ValueError:
         raise InputError(f"--rest {text}: must be two times, s, as FROM:TO") from None
 

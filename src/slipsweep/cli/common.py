@@ -161,7 +161,7 @@ def netcdf_writer(table: "xr.Dataset", title: str, recorded: "Record | None" = N
 
 def write_fragility(table: "xr.Dataset", path: Path, lengths: Sequence[float] | None = None) -> None:
     """Write P(u > d) along the axis amplitude as an .xml file of OpenQuake, for displacements in m."""
-    from slipsweep.studies.fragility import fragility, openquake_fragility
+    from slipsweep.studies.hazard import fragility, openquake_fragility
 
     path.write_text(openquake_fragility(fragility(table, lengths)), encoding="utf-8")
 

@@ -98,7 +98,7 @@ def run(
             typer.echo(f"{cells} cells ({grid}) in {took}")
         else:
             runs = checked.sampling.sensitivity_runs
-            more = f", and {runs} runs each for Sobol indices" if runs else ""
+            more = f", among {runs} runs each for Sobol indices" if runs else ""
             pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
             points = math.prod(job.plan.sizes.values())
             typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{more}")

@@ -104,17 +104,16 @@ def simulate(
         "yield_acceleration": yield_acceleration,
         "structure_frequency": structure_frequency,
     }
-    given = {
+    given: dict[str, Any] = {
         name: quantity(option_name(name), text, PARAMETERS[name]["units"], model.g)
         for name, text in typed.items()
         if text is not None
     }
     motion = _motion(record, reading, excitation)
 
-    from slipsweep.grid.inputs import Inputs
-    from slipsweep.studies.history import time_history
+    from slipsweep.studies.history import simulate as simulated
 
-    inputs = Inputs(
+    table = simulated(
         **given,
         mu_s=mu_s,
         scale=scale,
@@ -124,8 +123,10 @@ def simulate(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        excitation=motion,
+        model=model,
+        points_per_cycle=points,
     )
-    table = time_history(inputs, excitation=motion, model=model, points_per_cycle=points)
     flags = Validity(table["validity"].item())
     if flags & VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags & VALUELESS)

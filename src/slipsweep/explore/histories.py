@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from slipsweep.explore.excerpt import Excerpt, Indices, evenly, thinned_lengths
 from slipsweep.model.options import MODELS
 from slipsweep.motion.waveforms import WAVEFORMS
-from slipsweep.studies.datasets import simulate
+from slipsweep.studies.history import simulate
 
 #: Points a cycle, and how many cycles at most.
 POINTS, CYCLES = 64, 3

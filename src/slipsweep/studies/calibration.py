@@ -1,6 +1,5 @@
 """Calibration: Üy, λ and Δμ from one or several tests on a shaking table, together and cycle by cycle."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,25 +8,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.options import MODELS, Mendez
-from slipsweep.model.parameters import check_finite, check_single, shown
-from slipsweep.model.variables import CALIBRATION, CALIBRATION_SERIES, HISTORY, MEASURED_FRICTION, PARAMETERS
+from slipsweep.model import options, parameters, variables
+from slipsweep.model.variables import HISTORY
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
+from slipsweep.studies import findings, friction
 from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
-from slipsweep.studies.findings import Reported, report
-from slipsweep.studies.forward import COLUMN
-from slipsweep.studies.friction import (
-    BOUND,
-    SOURCE,
-    Coefficients,
-    check_contact,
-    coefficients_of,
-    eq1_friction,
-    free_body_friction,
-    slides_of,
-    threshold_of,
-)
-from slipsweep.studies.likelihood import SOUGHT, Line, Linear, Observation
+from slipsweep.studies.likelihood import COLUMN, SOUGHT, Line, Linear, Observation
 from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
@@ -39,50 +25,115 @@ _UPSLOPE_SAMPLES, _UPSLOPE_NOISE = 4, 5.0
 _A_CYCLE, _FEWEST_IN_A_CYCLE = 0.1, 12
 
 
-def calibration_dataset(
-    tests: Sequence[ShakingTest],
-    theta: Any,
-    mu_s: Any,
+def calibrate(
+    test: friction.Test | Sequence[friction.Test],
+    theta: float,
+    mu_s: float,
     *,
-    model: Any,
-    offset: Any,
-    drift: Any,
-    noise: Mapping[str, float] | None,
-    cycles: bool,
+    model: options.Model | str = "mendez",
+    offset: str | Sequence[str] = (),
+    drift: str | Sequence[str] = (),
+    noise: Mapping[str, float] | None = None,
+    cycles: bool = True,
 ) -> xr.Dataset:
-    """Calibration of tests of one interface; arguments, results and errors of `slipsweep.calibrate`."""
-    theta, mu_s = check_single("theta", theta), check_single("mu_s", mu_s)
-    chosen = MODELS.of(model)
-    if not isinstance(chosen, Mendez):
-        raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
+    """Üy, λ and Δμ from tests on a shaking table, by profile likelihood with the exact solver.
+
+    The table's recorded motion shakes the model's block, and what it does is fitted to whatever was measured of the
+    real one, each channel weighted by its noise.  The noise of the table's own record enters the intervals.
+
+    Parameters
+    ----------
+    test : path, Dataset, mapping of str to DataArray, or ShakingTest, or a list of these
+        As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²), `relative_velocity`
+        (m/s) and `relative_displacement` (m), downslope positive; NaN or a blank cell where there is no sample.
+        Several tests of one interface are calibrated together.
+    theta, mu_s : float
+        Inclination of the plane, degrees, and static friction coefficient, measured by other means.
+    model : Mendez or str
+        The rules of motion.
+    offset, drift : str or list of str
+        Channels, `ground_acceleration` among them, whose sensor has an offset, or an offset and a drift in a straight
+        line; "all" for all.  These are fitted together with the parameters; what was found stands in the attribute
+        `removed`.
+    noise : mapping of str to float, optional
+        Standard deviation of the noise of channels; by default estimated from the residuals.
+    cycles : bool
+        Whether each cycle is fitted by itself, too.
+
+    Returns
+    -------
+    Dataset
+        `yield_acceleration` (m/s²), `decay_rate` and `delta_mu`, each with ``_error`` (standard error; NaN where it is
+        not determined) and ``_interval`` (95 %, along `bound`; 0 and inf where the data set no bound), and their
+        `correlation`.  `static_friction` and `kinetic_friction` by statics with intervals.  Along `cycle`:
+        ``cycle_`` and the same names, `cycle_start` (s), `cycle_peak_acceleration` (m/s²), `cycle_sliding_mode` and
+        `cycle_attenuation_coefficient` (Kd, stick-slip).  Along `time`: ``measured_`` (less `removed`) and
+        ``computed_`` accelerations, velocity and displacement, the computed friction, and the measured
+        `friction_coefficient` (Eq. 1) and `free_body_friction`.  ``misfit_`` and a channel is the root mean square of
+        their difference.  Several tests have a dimension `test` more.  Attributes: `findings`, sentences on what the
+        tests do not determine and what would; `constant_friction`, as of `measured_friction`; `model_table` and
+        `uncertainty_table`, to paste into a sweep file, commented out if they are not ready for use.
+
+    Raises
+    ------
+    InputError
+        A test that cannot be read or measured nothing of the block, or a value that no physics allows.
+
+    See Also
+    --------
+    measured_friction : the friction that the test shows, without a model
+    sample : displacements with the errors of the parameters
+
+    Examples
+    --------
+    A test of two cycles without noise, as `simulate` gives it:
+
+    >>> import numpy as np
+    >>> import slipsweep
+    >>> test = slipsweep.simulate(
+    ...     5, 0.38, 5.0, 2.0, yield_acceleration=1.8, decay_rate=2.0, delta_mu=0.1,
+    ...     excitation=slipsweep.Sine(cycles=2), times=np.arange(240) * 0.005,
+    ... )
+    >>> found = slipsweep.calibrate(test, theta=5, mu_s=0.38, cycles=False)
+    >>> print(f"{found.yield_acceleration.item():.2f} m/s2, {found.decay_rate.item():.2f}, {found.delta_mu.item():.2f}")
+    1.80 m/s2, 2.00, 0.10
+    """
+    tests = [friction.test_of(one) for one in test] if isinstance(test, list | tuple) else [friction.test_of(test)]
     if not tests:
         raise InputError("test = []: must be one test at least")
+    theta, mu_s = parameters.check_single("theta", theta), parameters.check_single("mu_s", mu_s)
+    chosen = options.MODELS.of(model)
+    if not isinstance(chosen, options.Mendez):
+        raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
+    drifts = [drift] if isinstance(drift, str) else list(drift)
 
-    def observed(**more: Any) -> list[Observation]:
-        return [_observation(test, theta, mu_s, chosen, offset, more.get("drift", drift), noise) for test in tests]
+    def observed(*more: str) -> list[Observation]:
+        return [_observation(one, theta, mu_s, chosen, offset, [*drifts, *more], noise) for one in tests]
 
     observations = observed()
     found = estimate(observations)
-    episodes = [[] if "continuous" in found.readings else _upslope(test) for test in tests]
+    episodes = [[] if "continuous" in found.readings else _upslope(one) for one in tests]
     if any(episodes):
         for one, times in zip(observations, episodes, strict=True):
             _leave_out(one, times)
         found = estimate(observations)
-    said = report(found, episodes, coefficients := [_coefficients(one) for one in observations])
-    if said.misfits and not said.constant:
-        said.findings[1:1] = _drifts(observed, tests, drift)
-    parts = [
-        _test_dataset(one, linear, found, cycles) for one, linear in zip(found.observations, found.linears, strict=True)
-    ]
+    coefficients = [_coefficients(one) for one in observations]
+    drifting: list[str] = []
+    if findings.misfits_of(found) and not any(one.attrs["constant_friction"] for one in coefficients):
+        # of which channels an offset and a drift, that were not given, would explain a misfit
+        measured = [name for name in RESPONSES if all(name in one.responses for one in tests) and name not in drifts]
+        drifting = [name for name in measured if not findings.misfits_of(estimate(observed(name)))]
+    said = findings.report(found, episodes, coefficients, drifting)
+    parts = [_test_dataset(one, linear, found, cycles) for one, linear in zip(observations, found.linears, strict=True)]
     whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
-    return _with_estimates(whole, found, said, coefficients, tests)
+    return _with_estimates(whole, found, said, coefficients[0], tests)
 
 
 def _observation(
     test: ShakingTest,
     theta: float,
     mu_s: float,
-    model: Mendez,
+    model: options.Mendez,
     offset: Any,
     drift: Any,
     noise: Mapping[str, float] | None,
@@ -93,31 +144,17 @@ def _observation(
             f"{test.name}: nothing of the block was measured: must have one at least of {', '.join(RESPONSES)}"
         )
     if noise is not None and not isinstance(noise, Mapping):
-        raise InputError(f"noise = {shown(noise)}: must be a mapping of channels to standard deviations")
-    check_channels("noise", list(noise or ()), test.responses)
-    known = {name: check_finite(f"noise.{name}", value) for name, value in (noise or {}).items()}
+        raise InputError(f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations")
+    known = dict(noise or {})
+    check_channels("noise", list(known), test.responses)
     for name, value in known.items():
-        if value <= 0.0:
-            raise InputError(f"noise.{name} = {shown(value)}: must be a finite number > 0")
-    check_contact(test, theta, model.g)
+        if not parameters.check_finite(f"noise.{name}", value) > 0.0:
+            raise InputError(f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0")
+    friction.check_contact(test, theta, model.g)
     if not float(test.channels[TABLE].max()) > 0.0:
         raise InputError(f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope")
     offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
     return Observation(test, theta, mu_s, model, offsets, drifts, known)
-
-
-def _drifts(observed: Any, tests: Sequence[ShakingTest], drift: Any) -> list[str]:
-    """Channels of which an offset and a drift, that were not given, would explain a misfit."""
-    said = []
-    for name in tests[0].responses:
-        if all(name in test.responses for test in tests) and name not in drift:
-            other = estimate(observed(drift=[*([drift] if isinstance(drift, str) else drift), name]))
-            if not report(other, [], []).misfits:
-                said.append(
-                    f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
-                    f"drift = {name!r}."
-                )
-    return said
 
 
 # ------------------------------------------------------------------------------ upslope slips
@@ -170,16 +207,14 @@ def _block_acceleration(test: ShakingTest) -> Floats | None:
     return None
 
 
-def _coefficients(one: Observation) -> Coefficients | None:
-    """Friction by statics; None where neither the block's acceleration nor its velocity is measured."""
+def _coefficients(one: Observation) -> xr.Dataset:
+    """Friction by statics; nothing where neither the block's acceleration nor its velocity is measured."""
     test, block = one.test, _block_acceleration(one.test)
     if block is None:
-        return None
+        return xr.Dataset(attrs={"constant_friction": ""})
     smooth = np.interp(test.times, one.motion.times, one.motion.acceleration)
-    known = ShakingTest(test.times, {TABLE: smooth, "block_acceleration": block}, test.name)
-    slides = slides_of(test.times, smooth, block, threshold_of(known)[0])
-    eq1 = eq1_friction(smooth, block, one.theta, one.mu_s, one.model.g)
-    return coefficients_of(smooth, block, eq1, slides, one.mu_s, one.theta, one.model.g)
+    slides = friction.slides_of(test.times, smooth, block, friction.threshold_of(smooth, block)[0])
+    return friction.coefficients_of(smooth, block, slides, one.mu_s, one.theta, one.model.g)
 
 
 def _test_dataset(one: Observation, linear: Linear, found: Estimate, cycles: bool) -> xr.Dataset:
@@ -188,24 +223,26 @@ def _test_dataset(one: Observation, linear: Linear, found: Estimate, cycles: boo
     history = linear.forward(found.parameters, test.times)
     added, removed = _removed(one, linear, found.parameters)
     data: dict[str, Any] = {}
+    about = variables.CALIBRATION_SERIES | variables.MEASURED_FRICTION
     for name, values in test.channels.items():
-        data[f"measured_{name}"] = (("time",), values - added[name], CALIBRATION_SERIES[f"measured_{name}"])
+        data[f"measured_{name}"] = (("time",), values - added[name], about[f"measured_{name}"])
     for name in HISTORY:
-        data[f"computed_{name}"] = (("time",), history[:, COLUMN[name]], CALIBRATION_SERIES[f"computed_{name}"])
+        data[f"computed_{name}"] = (
+            ("time",),
+            history[:, COLUMN[name]],
+            variables.CALIBRATION_SERIES[f"computed_{name}"],
+        )
     block = _block_acceleration(test)
     if block is not None:
-        free = free_body_friction(block - added.get("block_acceleration", 0.0), one.theta, one.model.g)
-        eq1 = eq1_friction(data[f"measured_{TABLE}"][1], block, one.theta, one.mu_s, one.model.g)
-        data["friction_coefficient"] = (("time",), eq1, MEASURED_FRICTION["friction_coefficient"])
-        data["free_body_friction"] = (("time",), free, MEASURED_FRICTION["free_body_friction"])
-    for name, use in one.use.items():
-        counted = use & ~one.jumps_left_out if name == "block_acceleration" else use
-        rest = (test.channels[name] - added[name] - history[:, COLUMN[name]])[counted]
+        free = friction.free_body_friction(block - added.get("block_acceleration", 0.0), one.theta, one.model.g)
+        eq1 = friction.eq1_friction(data[f"measured_{TABLE}"][1], block, one.theta, one.mu_s, one.model.g)
+        data["friction_coefficient"] = (("time",), eq1, about["friction_coefficient"])
+        data["free_body_friction"] = (("time",), free, about["free_body_friction"])
+    for name, rest in linear.unexplained(found.parameters).items():
         misfit = float(np.sqrt(np.mean(rest**2)))
         span = max(float(np.nanmax(np.abs(history[:, COLUMN[name]]))), 1e-300)
-        about = HISTORY[name]
-        long_name = f"root mean square of measured less computed {about['long_name']}"
-        data[f"misfit_{name}"] = ((), misfit, {**about, "long_name": long_name})
+        long_name = f"root mean square of measured less computed {HISTORY[name]['long_name']}"
+        data[f"misfit_{name}"] = ((), misfit, {**HISTORY[name], "long_name": long_name})
         data[f"relative_misfit_{name}"] = ((), misfit / span, {"units": "1", "long_name": f"{long_name}, over largest"})
     for name in ("permanent_displacement", "validity"):
         data[name] = found.summary(one)[name].variable
@@ -243,74 +280,70 @@ def _cycles(one: Observation, linear: Linear, found: Estimate) -> xr.Dataset:
     pulses = [(begin, top) for begin, top in pulses if top > max(onset, _A_CYCLE * peak)]
     ends = [begin for begin, _ in pulses[1:]] + [float(one.motion.times[-1])]
     continuous = "continuous" in found.readings
-    rows = []
-    for (begin, top), end in zip(pulses, ends, strict=True):
+    data: dict[str, Any] = {
+        name: np.full(len(pulses), np.nan) for name in variables.CALIBRATION if name.startswith("cycle_")
+    }
+    data["cycle_start"], data["cycle_peak_acceleration"] = np.array(pulses).reshape(-1, 2).T
+    data["cycle_sliding_mode"] = np.full(len(pulses), 2 if continuous else 1, np.int8)
+    for row, ((begin, _), end) in enumerate(zip(pulses, ends, strict=True)):
         inside = (one.test.times >= begin) & (one.test.times < end)
-        values, errors = np.full(3, np.nan), np.full(3, np.nan)
-        if inside.sum() >= _FEWEST_IN_A_CYCLE:
-            values, errors = cycle_estimate(linear, found, begin, end, free=(1, 2) if continuous else (0, 1, 2))
+        if inside.sum() < _FEWEST_IN_A_CYCLE:
+            continue
+        values, errors = cycle_estimate(linear, found, begin, end, free=(1, 2) if continuous else (0, 1, 2))
+        for name, value, error in zip(SOUGHT, values, errors, strict=True):
+            data[f"cycle_{name}"][row], data[f"cycle_{name}_error"][row] = value, error
         history = linear.forward(np.where(np.isfinite(values), values, found.parameters), one.test.times)
         slides = inside & (history[:, COLUMN[TABLE]] > 0.0)
-        held = float(history[slides, COLUMN["block_acceleration"]].max()) if slides.any() else math.nan
-        rows.append(
-            (begin, top, 2 if continuous else 1, math.nan if continuous else held / one.model.g, values, errors)
-        )
-    data: dict[str, Any] = {
-        "cycle_start": [row[0] for row in rows],
-        "cycle_peak_acceleration": [row[1] for row in rows],
-        "cycle_sliding_mode": np.array([row[2] for row in rows], np.int8),
-        "cycle_attenuation_coefficient": [row[3] for row in rows],
-    }
-    for at, name in enumerate(SOUGHT):
-        data[f"cycle_{name}"] = [row[4][at] for row in rows]
-        data[f"cycle_{name}_error"] = [row[5][at] for row in rows]
-    number = ("cycle", np.arange(1, len(rows) + 1), {"units": "1", "long_name": "number of the cycle"})
+        if slides.any() and not continuous:
+            held = float(history[slides, COLUMN["block_acceleration"]].max())
+            data["cycle_attenuation_coefficient"][row] = held / one.model.g
+    number = ("cycle", np.arange(1, len(pulses) + 1), {"units": "1", "long_name": "number of the cycle"})
     return xr.Dataset(
-        {name: (("cycle",), np.asarray(values), CALIBRATION[name]) for name, values in data.items()}, {"cycle": number}
+        {name: (("cycle",), values, variables.CALIBRATION[name]) for name, values in data.items()}, {"cycle": number}
     )
 
 
 def _with_estimates(
     dataset: xr.Dataset,
     found: Estimate,
-    said: Reported,
-    coefficients: Sequence[Coefficients | None],
+    said: Mapping[str, str],
+    coefficients: xr.Dataset,
     tests: Sequence[ShakingTest],
 ) -> xr.Dataset:
     """What belongs to all tests together: parameters, intervals, correlation, sentences and tables."""
     first = found.observations[0]
     data: dict[str, Any] = {}
     for at, name in enumerate(SOUGHT):
-        about = PARAMETERS[name]
+        about = variables.PARAMETERS[name]
         data[name] = ((), found.parameters[at], about)
-        error = said.errors[at]
-        data[f"{name}_error"] = ((), error, {**about, "long_name": f"standard error of the {about['long_name']}"})
+        data[f"{name}_error"] = (
+            (),
+            found.errors[at],
+            {**about, "long_name": f"standard error of the {about['long_name']}"},
+        )
         interval = {**about, "long_name": f"95 % interval of the {about['long_name']}"}
         data[f"{name}_interval"] = (("bound",), found.intervals[at], interval)
-    data["correlation"] = (("parameter", "other_parameter"), said.correlation, CALIBRATION["correlation"])
-    for one in coefficients[:1]:
-        data |= one.variables() if one is not None else {}
+    data["correlation"] = (("parameter", "other_parameter"), found.correlation, variables.CALIBRATION["correlation"])
     place = np.arange(3, dtype=np.int8)
     names = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
     coords = {
         "parameter": (("parameter",), place, {"long_name": "parameter", **names}),
         "other_parameter": (("other_parameter",), place, {"long_name": "other parameter", **names}),
-        "bound": BOUND,
-        "theta": ((), first.theta, PARAMETERS["theta"]),
-        "mu_s": ((), first.mu_s, PARAMETERS["mu_s"]),
+        "bound": friction.BOUND,
+        "theta": ((), first.theta, variables.PARAMETERS["theta"]),
+        "mu_s": ((), first.mu_s, variables.PARAMETERS["mu_s"]),
     }
-    dataset = dataset.assign(data).assign_coords(coords)
+    dataset = dataset.assign(data | {str(name): one.variable for name, one in coefficients.items()}).assign_coords(
+        coords
+    )
     removed = dict.fromkeys(np.atleast_1d(dataset["removed"].values).tolist())
     dataset = dataset.drop_vars("removed")
     dataset.attrs = {
         "title": "Calibration of a sliding block from tests on a shaking table",
-        **SOURCE,
+        **friction.SOURCE,
         **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(test.name for test in tests)}),
-        **MODELS.attributes(first.model),
+        **options.MODELS.attributes(first.model),
         "removed": "; ".join(removed),
-        "constant_friction": said.constant,
-        "findings": "\n".join(said.findings),
-        "model_table": said.model_table,
-        "uncertainty_table": said.uncertainty_table,
+        **said,
     }
     return dataset

@@ -39,9 +39,6 @@ _ALONG = np.linspace(0.1, 1.0, 10)
 #: Rise of the least sum of squares by which a branch is refuted.
 REFUTED = 9.0
 
-#: A fall of the sum of squares by which another minimum is better.
-_BETTER = 0.02
-
 
 class Search:
     """All parameters tried so far, with their sums of squares.
@@ -94,10 +91,6 @@ class Search:
         """The least sum of squares."""
         return min(self._least.values())
 
-    def best_of_branches(self) -> list[Floats]:
-        """The best point of each branch that is not refuted."""
-        return [self.points[i] for i in range(len(self.points)) if self.above(i) == 0.0]
-
     def polish(self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear") -> Floats:
         """Least squares over some parameters, from a start; the point found."""
         free = list(free)
@@ -121,9 +114,9 @@ class Search:
         )
         return whole(found.x)
 
-    def allowed(self, square: float = SQUARE) -> Floats:
+    def allowed(self) -> Floats:
         """The points that the data allow, one a row."""
-        return np.array([self.points[i] for i in range(len(self.points)) if self.above(i) <= square])
+        return np.array([point for i, point in enumerate(self.points) if self.above(i) <= SQUARE])
 
     def slopes(self, point: Floats) -> Floats:
         """Derivatives of the residuals by the parameters, a column each."""

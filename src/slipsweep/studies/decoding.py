@@ -8,7 +8,6 @@ from slipsweep.model.parameters import shown
 from slipsweep.model.variables import FlagKind, Validity
 
 _KNOWN = {(flag.name or "").lower(): flag for flag in Validity}
-_ORDER = list(FlagKind)
 
 
 def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
@@ -52,15 +51,13 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     """
     if isinstance(data, xr.Dataset):
         if "validity" not in data:
-            raise InputError(
-                f"validity: not in this dataset, which has {', '.join(map(str, data.data_vars)) or 'nothing'}"
-            )
+            there = ", ".join(map(str, data.data_vars)) or "nothing"
+            raise InputError(f"validity: not in this dataset, which has {there}")
         data = data["validity"]
     if not isinstance(data, xr.DataArray):
         raise InputError(f"data = {shown(data)}: must be a Dataset or a DataArray")
     mask = data.variable
-    names = str(mask.attrs.get("flag_meanings", "")).split()
-    bits = np.atleast_1d(mask.attrs.get("flag_masks", ()))
+    names, bits = str(mask.attrs.get("flag_meanings", "")).split(), np.atleast_1d(mask.attrs.get("flag_masks", ()))
     if not names or len(names) != len(bits):
         raise InputError(
             f"{data.name}: no bit mask, {len(bits)} flag_masks and {len(names)} flag_meanings in its attributes"
@@ -68,15 +65,12 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     if mask.dtype.kind not in "iu":
         raise InputError(f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)")
     # a flag of no kind, of another program's file, goes last
-    order = {name: _ORDER.index(_KNOWN[name].kind) if name in _KNOWN else len(_ORDER) for name in names}
-    ordered = sorted(zip(names, bits, strict=True), key=lambda one: order[one[0]])
-    return xr.Dataset({name: _flag(mask, bit, name) for name, bit in ordered}, coords=data.coords)
-
-
-def _flag(mask: xr.Variable, bit: int, name: str) -> xr.Variable:
-    # the bit in the type of the mask: a wider one would widen all cells with it
-    values = (mask & mask.dtype.type(bit)) != 0
-    values.attrs = {"long_name": name.replace("_", " ")}
-    if name in _KNOWN:
-        values.attrs = {"long_name": _KNOWN[name].text, "kind": str(_KNOWN[name].kind)}
-    return values
+    order = {name: list(FlagKind).index(_KNOWN[name].kind) if name in _KNOWN else len(FlagKind) for name in names}
+    found = {}
+    for name, bit in sorted(zip(names, bits, strict=True), key=lambda one: order[one[0]]):
+        # the bit in the type of the mask: a wider one would widen all cells with it
+        found[name] = (mask & mask.dtype.type(bit)) != 0
+        found[name].attrs = {"long_name": name.replace("_", " ")}
+        if name in _KNOWN:
+            found[name].attrs = {"long_name": _KNOWN[name].text, "kind": str(_KNOWN[name].kind)}
+    return xr.Dataset(found, coords=data.coords)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from slipsweep.studies.confidence import LEAST, MOST, SQUARE, Search
 from slipsweep.studies.datasets import sweep
-from slipsweep.studies.forward import COLUMN
-from slipsweep.studies.likelihood import SOUGHT, Linear, Observation
+from slipsweep.studies.likelihood import COLUMN, SOUGHT, Linear, Observation
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +23,9 @@ _EXCESS = (0.02, 0.1, 0.25)
 
 #: Starts that are followed roughly, and those of them that are followed to the end.
 _ROUGH, _FINE = 10, 4
+
+#: A parameter is not determined if half its interval is more than this part of it; of Δμ, of μs + Δμ.
+_UNDETERMINED = (0.5, 0.5, 0.3)
 
 #: Most rounds in which the table's motion, the noise and the samples beside jumps settle.
 _ROUNDS = 5
@@ -114,6 +117,25 @@ class Estimate:
     readings: set[str]
     linears: list[Linear]
     observations: Sequence[Observation]
+
+    @property
+    def determined(self) -> NDArray[np.bool_]:
+        """Which parameters the tests determine: half an interval is no more than a part of the value (of μs + Δμ)."""
+        low, high = self.intervals.T
+        sizes = np.abs(self.parameters + np.array([0.0, 0.0, self.observations[0].mu_s]))
+        known = np.isfinite(high) & (high - low <= 2.0 * np.array(_UNDETERMINED) * sizes)
+        known[0] &= low[0] > 0.0
+        return np.asarray(known)
+
+    @property
+    def errors(self) -> Floats:
+        """Standard errors; NaN of what is not determined."""
+        return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.nan)
+
+    @property
+    def correlation(self) -> Floats:
+        """Correlations of the parameters; NaN of what is not determined."""
+        return np.asarray(self.covariance / np.outer(self.errors, self.errors))
 
     def summary(self, one: Observation, **more: Any) -> xr.Dataset:
         """The results of a sweep for the parameters found, and the table's motion of a test; `more` replaces them."""
@@ -233,36 +255,34 @@ def cycle_estimate(
 
     The block's displacement and velocity at the beginning are unknown.
     """
-    times = np.concatenate([linear.times[use] for _, use, _ in linear.columns])
+    times = np.concatenate([linear.times[use] for use, _ in linear.weights.values()])
     rows = (times >= begin) & (times < end)
+    # what a displacement, and a velocity, at the beginning add to each channel
     starts = np.zeros((times.size, 2))
-    at = 0
-    for column, use, weight in linear.columns:
-        part = slice(at, at + int(use.sum()))
-        at = part.stop
-        if column == COLUMN["relative_displacement"]:
-            starts[part] = np.column_stack([weight, weight * (linear.times[use] - begin)])
-        elif column == COLUMN["relative_velocity"]:
+    for name, part in linear.by_channel(np.arange(times.size)).items():
+        weight = linear.weights[name][1]
+        if name == "relative_displacement":
+            starts[part] = np.column_stack([weight, weight * (times[part] - begin)])
+        elif name == "relative_velocity":
             starts[part, 1] = weight
     size = float(np.abs(linear.forward(found.parameters, linear.times)[:, COLUMN["relative_velocity"]]).max())
     effects = np.column_stack([(linear.left * linear.sizes) @ linear.right, starts * max(size, 1e-6)])[rows]
     left, sizes, _ = np.linalg.svd(effects, full_matrices=False)
+    free = list(free)
 
-    def white(rest: Floats) -> Floats:
-        return np.asarray(rest[rows] - left @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (left.T @ rest[rows]).T).T)
+    def residuals(part: Floats) -> Floats:
+        values = found.parameters.copy()
+        values[free] = part
+        rest = linear.raw(values)[rows]
+        return np.asarray(rest - left @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (left.T @ rest)))
 
+    start = found.parameters[free]
+    fit = least_squares(residuals, start, bounds=(-1e-9, 10.0 * start + 1.0), x_scale="jac", diff_step=1e-4, max_nfev=6)
     values, errors = found.parameters.copy(), np.full(3, np.nan)
-    for _ in range(3):
-        steps = np.diag(1e-4 * np.maximum(np.abs(values), 1e-2))
-        slopes = np.column_stack(
-            [(linear.raw(values + step) - linear.raw(values - step)) / (2.0 * step.sum()) for step in steps]
-        )
-        covariance = _covariance(white(-slopes)[:, list(free)])
-        if not np.isfinite(covariance).all():
-            return np.full(3, np.nan), errors
-        values[list(free)] += covariance @ white(-slopes)[:, list(free)].T @ white(linear.raw(values))
-        values = np.clip(values, 0.0, 10.0 * found.parameters + 1.0)
-        errors[list(free)] = np.sqrt(np.diag(covariance))
+    covariance = _covariance(fit.jac)
+    if not np.isfinite(covariance).all():
+        return np.full(3, np.nan), errors
+    values[free], errors[free] = fit.x, np.sqrt(np.diag(covariance))
     return np.where(np.isfinite(errors), values, np.nan), errors
 
 

@@ -2,27 +2,21 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.model.variables import PARAMETERS, Validity
+from slipsweep.motion.shaking import TABLE
 from slipsweep.studies.estimate import Estimate
-from slipsweep.studies.friction import Coefficients, onset_acceleration, slides_of, threshold_of
+from slipsweep.studies.friction import onset_acceleration, slides_of, threshold_of
 from slipsweep.studies.likelihood import SOUGHT, Observation
 from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
 
 SYMBOL = ("Üy", "λ", "Δμ")
-
-#: A parameter is not determined if half its interval is more than this part of it; of Δμ, of μs + Δμ.
-_UNDETERMINED = (0.5, 0.5, 0.3)
-
-#: Correlation from which two parameters are said to be inseparable if one has a larger relative error.
-_CORRELATED, _LOOSE = 0.95, 0.2
 
 #: Largest correlation that is written.
 _MOST_CORRELATION = 0.9998
@@ -37,71 +31,61 @@ _WORSE, _MISSES = 1.5, 0.01
 _FACTORS, _COMPARED = (0.6, 0.8, 1.25, 1.5, 2.0), 24
 
 
-@dataclass
-class Reported:
-    """What is said of a calibration.
-
-    Attributes
-    ----------
-    constant : str
-        The sentence on a block of constant friction; "" of others.
-    findings : list of str
-    misfits : dict of str to float
-        Channels whose misfit is larger than their noise, and how many times.
-    errors, correlation : ndarray
-        Standard errors and correlations; NaN of what is not determined.
-    model_table, uncertainty_table : str
-        Tables of a sweep file; commented out where the calibration has failed or determines too little.
-    """
-
-    constant: str
-    findings: list[str]
-    misfits: dict[str, float]
-    errors: Floats
-    correlation: Floats
-    model_table: str
-    uncertainty_table: str
-
-
 def report(
-    found: Estimate, episodes: Sequence[Sequence[tuple[float, float]]], coefficients: Sequence[Coefficients | None]
-) -> Reported:
-    """All that must be said of a calibration."""
-    known = np.array([_determined(found, at) for at in range(3)])
-    errors = np.where(known, np.sqrt(np.diag(found.covariance)), np.nan)
-    correlation = found.covariance / np.outer(errors, errors)
-    misfits = _misfits(found)
-    constant = next((one.sentence for one in coefficients if one is not None and one.constant), "")
+    found: Estimate,
+    episodes: Sequence[Sequence[tuple[float, float]]],
+    coefficients: Sequence[xr.Dataset],
+    drifting: Sequence[str],
+) -> dict[str, str]:
+    """All that must be said of a calibration, as attributes of its Dataset.
+
+    Parameters
+    ----------
+    found : Estimate
+    episodes : sequence of (float, float), of each test
+        Times of slips upslope.
+    coefficients : sequence of Dataset, of each test
+        As `friction.coefficients_of`.
+    drifting : sequence of str
+        Channels with whose drift the misfit is explained.
+
+    Returns
+    -------
+    dict of str to str
+        `constant_friction`: the sentence on a block of constant friction, "" of others.  `findings`: sentences, a line
+        each.  `model_table` and `uncertainty_table`: tables of a sweep file, commented out where the calibration has
+        failed or determines too little.
+    """
+    known, misfits, contradiction = found.determined, misfits_of(found), _contradiction(found)
+    constant = next((one for one in coefficients if one.attrs["constant_friction"]), None)
     slides = any(float(found.summary(one)["permanent_displacement"].item()) != 0.0 for one in found.observations)
-    contradiction = _contradiction(found)
-    said = [] if constant else _misfit_sentences(found, misfits)
+    said = [] if constant is not None else _misfit_sentences(found, misfits)
     said += _upslope_sentences(episodes)
     if not slides:
         said.append("The computed block does not slide: no parameter is determined. Test with a larger amplitude.")
     elif not known.all():
-        said += _undetermined(found, known)
-    if slides and not constant and not {"held", "crossed"} & found.readings:
-        said += _inseparable(found)
+        said += _undetermined(found)
     said += contradiction
     if any(int(found.summary(one)["validity"].item()) & Validity.NOT_RECOUPLED for one in found.observations):
         said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
-    if constant:
-        kinetic = next(one for one in coefficients if one is not None and one.constant)
-        tables = _newmark_tables(found, kinetic)
+    if constant is not None:
+        tables = _newmark_tables(found, constant)
+        said.insert(0, constant.attrs["constant_friction"])
+    elif known.all() and slides and not misfits and not contradiction:
+        tables = _model_table(found), _uncertainty_table(found)
     else:
-        ready = bool(known.all()) and slides and not misfits and not contradiction
-        tables = _model_table(found, known), _uncertainty_table(found, errors, correlation)
-        if not ready:
-            tables = _as_comments(said, tables[0]), ""
-    return Reported(constant, [constant, *said] if constant else said, misfits, errors, correlation, *tables)
-
-
-def _determined(found: Estimate, at: int) -> bool:
-    low, high = found.intervals[at]
-    size = found.parameters[at] + (found.observations[0].mu_s if at == 2 else 0.0)
-    if at == 0 and low <= 0.0:
-        return False
-    return bool(math.isfinite(high) and high - low <= 2.0 * _UNDETERMINED[at] * abs(size))
+        tables = _as_comments(said, _model_table(found)), ""
+    said[1:1] = [
+        f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
+        f"drift = {name!r}."
+        for name in drifting
+    ]
+    return {
+        "constant_friction": "" if constant is None else constant.attrs["constant_friction"],
+        "findings": "\n".join(said),
+        "model_table": tables[0],
+        "uncertainty_table": tables[1],
+    }
 
 
 # ---------------------------------------------------------------------------------- reliability
@@ -129,18 +113,12 @@ def _misfit_sentences(found: Estimate, misfits: dict[str, float]) -> list[str]:
     ]
 
 
-def _misfits(found: Estimate) -> dict[str, float]:
+def misfits_of(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is larger than their noise, as neighbouring samples scatter, and how many times."""
     worse: dict[str, float] = {}
     for one, linear in zip(found.observations, found.linears, strict=True):
-        values, _ = linear.nuisances(found.parameters)
-        rest = linear.raw(found.parameters) - (linear.left * linear.sizes) @ (linear.right @ values)
-        at = 0
-        for name, (_, use, weight) in zip(one.use, linear.columns, strict=True):
-            part = rest[at : at + int(use.sum())] / weight
-            at += part.size
-            misfit = float(np.sqrt(np.mean(part**2)))
-            measured = one.test.channels[name]
+        for name, rest in linear.unexplained(found.parameters).items():
+            misfit, measured = float(np.sqrt(np.mean(rest**2))), one.test.channels[name]
             noise = one.given_noise.get(name, max(noise_of(measured), one.least_noise[name]))
             if misfit > _WORSE * noise and misfit > _MISSES * float(np.nanmax(np.abs(measured))):
                 worse[name] = max(misfit / noise, worse.get(name, 0.0))
@@ -155,7 +133,7 @@ def _contradiction(found: Estimate) -> list[str]:
             continue
         times, block = one.test.times, one.test.channels["block_acceleration"]
         table = np.interp(times, one.motion.times, one.motion.acceleration)
-        threshold = threshold_of(one.test)[0]
+        threshold = threshold_of(one.test.channels[TABLE], block)[0]
         slides = slides_of(times, table, block, threshold)
         if "continuous" in found.readings or not slides:
             continue
@@ -182,8 +160,9 @@ def _upslope_sentences(episodes: Sequence[Sequence[tuple[float, float]]]) -> lis
 # ------------------------------------------------------------------------------- determination
 
 
-def _undetermined(found: Estimate, known: NDArray[np.bool_]) -> list[str]:
+def _undetermined(found: Estimate) -> list[str]:
     """Which parameters the tests do not determine, why, and which measurement would."""
+    known = found.determined
     tests = "these tests" if len(found.observations) > 1 else "this test"
     names = [SYMBOL[at] for at in range(3) if not known[at]]
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
@@ -246,39 +225,28 @@ def _remedy(found: Estimate) -> str:
     )
 
 
-def _inseparable(found: Estimate) -> list[str]:
-    """Pairs that the tests cannot tell apart."""
-    sizes = np.sqrt(np.diag(found.covariance))
-    correlation = found.covariance / np.outer(sizes, sizes)
-    loose = sizes > _LOOSE * np.maximum(np.abs(found.parameters), 1e-12)
-    return [
-        f"{SYMBOL[i]} and {SYMBOL[j]} cannot be separated: their correlation is {correlation[i, j]:.3f}."
-        for i, j in ((1, 2), (0, 1), (0, 2))
-        if abs(correlation[i, j]) >= _CORRELATED and (loose[i] or loose[j])
-    ]
-
-
 # ------------------------------------------------------------------------------------- tables
 
 
-def _model_table(found: Estimate, known: NDArray[np.bool_]) -> str:
+def _model_table(found: Estimate) -> str:
     """The [model] table of a sweep file, with intervals in comments."""
     model = found.observations[0].model
     lines = ["[model]", 'friction = "mendez"', f'rise = "{model.rise}"', f'recoupling = "{model.recoupling}"']
     for at, name in enumerate(SOUGHT):
         low, high = found.intervals[at]
-        about = f"95 %: {low:.4g} to {high:.4g}{_unit(at)}" if known[at] else "not determined"
+        about = f"95 %: {low:.4g} to {high:.4g}{_unit(at)}" if found.determined[at] else "not determined"
         lines.append(f"{name} = {_number(found.parameters[at])}  # {about}")
     return "\n".join([*lines, f"g = {model.g:g}"]) + "\n"
 
 
-def _uncertainty_table(found: Estimate, errors: Floats, correlation: Floats) -> str:
+def _uncertainty_table(found: Estimate) -> str:
     """[uncertainty] tables of a sweep file from the covariance: normal, cut where nothing physical lies; "" if none."""
+    errors = found.errors
     if not np.isfinite(errors).all():
         return ""
     lines = ["[uncertainty]"]
     # a hair less than 1, so that with rounding a matrix of correlations stays positive
-    rounded = np.round(np.clip(correlation, -_MOST_CORRELATION, _MOST_CORRELATION), 4)
+    rounded = np.round(np.clip(found.correlation, -_MOST_CORRELATION, _MOST_CORRELATION), 4)
     whole = rounded + np.diag([1.0 - _MOST_CORRELATION] * 3)
     if np.linalg.eigvalsh(whole).min() > 1e-6:
         pairs = [f'["{SOUGHT[i]}", "{SOUGHT[j]}", {rounded[i, j]:.4f}]' for i, j in ((0, 1), (0, 2), (1, 2))]
@@ -294,19 +262,15 @@ def _normal(value: float, error: float) -> list[str]:
     return [*(cut if low > -6.0 else ['distribution = "norm"']), f"loc = {_number(value)}", f"scale = {error:.4g}"]
 
 
-def _newmark_tables(found: Estimate, coefficients: Coefficients) -> tuple[str, str]:
+def _newmark_tables(found: Estimate, coefficients: xr.Dataset) -> tuple[str, str]:
     """Newmark's block with the kinetic coefficient, for a block of constant friction."""
     one = found.observations[0]
-
-    def onset(friction: float) -> float:
-        return one.model.g * math.tan(math.atan(friction) - math.radians(one.theta))
-
-    low, value, high = map(
-        onset, (coefficients.kinetic_interval[0], coefficients.kinetic, coefficients.kinetic_interval[1])
-    )
+    kinetic = coefficients["kinetic_friction"].item()
+    low, high = coefficients["kinetic_friction_interval"].values
+    low, value, high = one.model.g * np.tan(np.arctan([low, kinetic, high]) - math.radians(one.theta))
     model = (
         "# A block of constant friction: Newmark's model, with the kinetic coefficient "
-        f"{coefficients.kinetic:.4g} at {one.theta:g} deg.\n"
+        f"{kinetic:.4g} at {one.theta:g} deg.\n"
         f'[model]\nfriction = "newmark"\nyield_acceleration = {_number(value)}  # 95 %: {low:.4g} to {high:.4g} m/s2\n'
         f"g = {one.model.g:g}\n"
     )

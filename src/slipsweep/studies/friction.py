@@ -9,8 +9,9 @@ Eq. 1 is the paper's μ(t).  It calls friction whatever the table's acceleration
 that acts on a block of horizontal acceleration Ü is, by statics, tan(θ + arctan(Ü/g)).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,15 @@ from scipy.stats import t as student
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_finite, check_single, shown
+from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
-from slipsweep.motion.shaking import TABLE, ShakingTest, removed_text
+from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, removed_text, unit_factor
 from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
+
+#: What a caller may give as a test.
+Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
 #: Standard deviations of the noise that the threshold is: one sample in 16 000 exceeds it by chance.
 NOISE_IN_THRESHOLD = 4.0
@@ -67,15 +71,14 @@ class Slide:
         return slice(self.onset, None if self.stop is None else self.stop + 1)
 
 
-def threshold_of(test: ShakingTest, threshold: Any = None) -> tuple[float, str]:
+def threshold_of(table: Floats, block: Floats, threshold: Any = None) -> tuple[float, str]:
     """The relative acceleration beyond which the block slides, m/s², and why that much."""
     if threshold is not None:
         value = check_finite("threshold", threshold)
         if value <= 0.0:
             raise InputError(f"threshold = {shown(threshold)}: must be a finite number > 0, m/s²")
         return value, "given"
-    table = test.channels[TABLE]
-    noise = noise_of(table - test.channels["block_acceleration"])
+    noise = noise_of(table - block)
     least = LEAST_THRESHOLD * float(np.abs(table).max())
     if NOISE_IN_THRESHOLD * noise >= least:
         return NOISE_IN_THRESHOLD * noise, (
@@ -109,11 +112,8 @@ def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> 
 
 def _turns(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
     """Where something holds at a sample and at those after it, `count` in all."""
-    found = holds.copy()
-    for shift in range(1, count):
-        found[:-shift] &= holds[shift:]
-        found[-shift:] = False
-    return found
+    padded = np.concatenate([holds, np.zeros(count - 1, bool)])
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, count).all(axis=1))
 
 
 def _stop(
@@ -139,54 +139,15 @@ def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
     return np.asarray(np.tan(np.radians(theta) + np.arctan(block / g)))
 
 
-@dataclass(frozen=True)
-class Coefficients:
-    """Static and kinetic friction of downslope slides by statics, with 95 % intervals.
-
-    `constant`: level while the block slides, where Eq. 1 falls.
-    """
-
-    static: float
-    static_interval: tuple[float, float]
-    kinetic: float
-    kinetic_interval: tuple[float, float]
-    constant: bool
-
-    @property
-    def sentence(self) -> str:
-        """What must be said of a block of constant friction; "" of others."""
-        if not self.constant:
-            return ""
-        return (
-            f"This is a block of constant friction: by statics {self.kinetic:.3g} while it slides, though Eq. 1 falls. "
-            "Newmark's model is the right one for it."
-        )
-
-    def variables(self) -> dict[str, xr.Variable]:
-        """The coefficients and their intervals, along `bound`."""
-        found = {}
-        for kind, value, ends in (
-            ("static", self.static, self.static_interval),
-            ("kinetic", self.kinetic, self.kinetic_interval),
-        ):
-            about = {"units": "1", "long_name": f"{kind} friction coefficient by statics"}
-            found[f"{kind}_friction"] = xr.Variable((), value, about)
-            interval = {"units": "1", "long_name": f"95 % interval of the {about['long_name']}"}
-            found[f"{kind}_friction_interval"] = xr.Variable(("bound",), np.array(ends), interval)
-        return found
-
-
 def coefficients_of(
-    table: Floats,
-    block: Floats,
-    eq1: Floats,
-    slides: Sequence[Slide],
-    mu_s: float,
-    theta: float,
-    g: float,
-) -> Coefficients:
-    """Friction coefficients from the slides that begin downslope."""
-    threshold = max(NOISE_IN_THRESHOLD * noise_of(table - block), LEAST_THRESHOLD * float(np.abs(table).max()))
+    table: Floats, block: Floats, slides: Sequence[Slide], mu_s: float, theta: float, g: float
+) -> xr.Dataset:
+    """Static and kinetic friction by statics, with 95 % intervals, from the slides that begin downslope.
+
+    The attribute `constant_friction` is a sentence if friction is level while the block slides, where Eq. 1 falls.
+    """
+    threshold = threshold_of(table, block)[0]
+    eq1 = eq1_friction(table, block, theta, mu_s, g)
     free = free_body_friction(block, theta, g)
     levels, inside, starts, between = [], [], [], []
     for one in slides:
@@ -202,58 +163,127 @@ def coefficients_of(
         starts.append(0.5 * (before + float(table[first])) if jumps else begin)
         between.append(0.5 * (float(table[first]) - before) if jumps else 0.0)
     if not levels:
-        return Coefficients(np.nan, (np.nan, np.nan), np.nan, (np.nan, np.nan), False)
+        return _coefficients((np.nan, [np.nan, np.nan]), (np.nan, [np.nan, np.nan]), False)
     slope = 1.0 / g / np.cos(np.radians(theta)) ** 2  # of friction by the block's acceleration, near enough
     noise = noise_of(block) * slope
     every = np.concatenate(inside)
-    kinetic, kinetic_ends = _mean(np.array(levels), noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
-    static, static_ends = _mean(free_body_friction(np.array(starts), theta, g), noise, float(np.mean(between)) * slope)
-    scatter = float(np.nanmean((every[:, 0] - kinetic) ** 2)) - noise**2
-    level = kinetic > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic
+    kinetic = _mean(np.array(levels), noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
+    static = _mean(free_body_friction(np.array(starts), theta, g), noise, float(np.mean(between)) * slope)
+    scatter = float(np.nanmean((every[:, 0] - kinetic[0]) ** 2)) - noise**2
+    level = kinetic[0] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[0]
     falls = float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
-    return Coefficients(static, static_ends, kinetic, kinetic_ends, level and falls)
+    return _coefficients(static, kinetic, level and falls)
 
 
-def _mean(values: Floats, noise: float, systematic: float) -> tuple[float, tuple[float, float]]:
+def _coefficients(static: tuple[float, list[float]], kinetic: tuple[float, list[float]], constant: bool) -> xr.Dataset:
+    """Coefficients and their intervals as a Dataset."""
+    found = {}
+    for kind, (value, ends) in (("static", static), ("kinetic", kinetic)):
+        about = {"units": "1", "long_name": f"{kind} friction coefficient by statics"}
+        found[f"{kind}_friction"] = xr.Variable((), value, about)
+        interval = {"units": "1", "long_name": f"95 % interval of the {about['long_name']}"}
+        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), np.array(ends), interval)
+    sentence = (
+        f"This is a block of constant friction: by statics {kinetic[0]:.3g} while it slides, though Eq. 1 falls. "
+        "Newmark's model is the right one for it."
+    )
+    return xr.Dataset(found, attrs={"constant_friction": sentence if constant else ""})
+
+
+def _mean(values: Floats, noise: float, systematic: float) -> tuple[float, list[float]]:
     """Mean of a value a slide and its 95 % interval: their scatter, or the noise, and what does not average out."""
     number = values.size
     scatter = float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
     half = max(scatter, 1.96 * noise) / number**0.5 + systematic
     mean = float(np.mean(values))
-    return mean, (mean - half, mean + half)
+    return mean, [mean - half, mean + half]
 
 
-def friction_dataset(
-    test: ShakingTest,
-    theta: Any,
-    mu_s: Any,
+def measured_friction(
+    test: Test,
+    theta: float,
+    mu_s: float,
     *,
-    g: Any,
-    offset: Any,
-    drift: Any,
-    rest: Sequence[float] | None,
-    threshold: Any,
+    g: float = 9.81,
+    offset: str | Sequence[str] = (),
+    drift: str | Sequence[str] = (),
+    rest: tuple[float, float] | None = None,
+    threshold: float | None = None,
 ) -> xr.Dataset:
-    """Measured friction; arguments, results and errors of `slipsweep.measured_friction`."""
-    if "block_acceleration" not in test.channels:
+    """Friction that a test on a shaking table measured, by Eq. 1 and by statics, and the slides in it.
+
+    Eq. 1 of the paper (reference [1] of `sweep`) gives μ(t) from the accelerations of table and block.  It falls also
+    for a block of constant friction.  Statics gives the friction that acts on the block, tan(θ + arctan(Ü/g)).
+
+    Parameters
+    ----------
+    test : path, Dataset, mapping of str to DataArray, or ShakingTest
+        A CSV file whose header names columns and units: ``time (s), table acceleration (g), block acceleration
+        (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the table's) and `block_acceleration`,
+        in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
+    theta, mu_s : float
+        Inclination of the plane, degrees, and static friction coefficient.
+    g : float
+        Gravity, m/s².
+    offset, drift : str or list of str
+        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off stands in the
+        attribute `removed`.  Nothing else is subtracted.
+    rest : (float, float), optional
+        From when to when table and block were at rest, s: what is taken off is then fitted to these samples, else
+        to all.
+    threshold : float, optional
+        Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations of its noise, and
+        0.5 % of the table's largest acceleration at least.
+
+    Returns
+    -------
+    Dataset
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` μ(t) by Eq. 1,
+        `friction_ratio` μ(t)/μs, and `free_body_friction`, at rest the mobilised friction.
+        Along `slide`: `slide_onset`, `slide_peak` (of the table's acceleration) and `slide_stop` (s; NaN where the
+        record ends before), `onset_acceleration`, `peak_acceleration` and `peak_block_acceleration` (m/s²),
+        `least_friction` (Eq. 1) and `slide_free_body_friction`.  `static_friction` and `kinetic_friction` by statics,
+        each with ``_interval`` (95 %, along `bound`).  The attributes `threshold` (m/s²) and `threshold_from` say how
+        slides were found; `constant_friction` is a sentence if friction is constant by statics where Eq. 1 falls.
+
+    Raises
+    ------
+    InputError
+        A test that cannot be read, without a block acceleration, or a value that no physics allows.
+
+    See Also
+    --------
+    calibrate : the parameters of the model, from the same test
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> test = slipsweep.measured_friction("sweeps/data/shaking_test.csv", theta=5, mu_s=0.38)
+    >>> test.sizes["slide"]
+    8
+    >>> test.least_friction.round(2).values
+    array([0.07, 0.07, 0.06, 0.08, 0.06, 0.04, 0.06, 0.05])
+    """
+    given = test_of(test)
+    if "block_acceleration" not in given.channels:
         raise InputError(
-            f"{test.name}: block_acceleration: missing: Eq. 1 needs the accelerations of table and block; calibrate "
+            f"{given.name}: block_acceleration: missing: Eq. 1 needs the accelerations of table and block; calibrate "
             "takes a test without"
         )
     theta, mu_s, g = (check_single(name, value) for name, value in (("theta", theta), ("mu_s", mu_s), ("g", g)))
-    test, removed = test.corrected(offset, drift, rest)
-    check_contact(test, theta, g)
-    table, block = test.channels[TABLE], test.channels["block_acceleration"]
+    corrected, removed = given.corrected(offset, drift, rest)
+    check_contact(corrected, theta, g)
+    times, table, block = corrected.times, corrected.channels[TABLE], corrected.channels["block_acceleration"]
     friction = eq1_friction(table, block, theta, mu_s, g)
-    limit, why = threshold_of(test, threshold)
-    slides = slides_of(test.times, table, block, limit)
+    limit, why = threshold_of(table, block, threshold)
+    slides = slides_of(times, table, block, limit)
     free = free_body_friction(block, theta, g)
-    coefficients = coefficients_of(table, block, friction, slides, mu_s, theta, g)
+    coefficients = coefficients_of(table, block, slides, mu_s, theta, g)
     found = {
-        "slide_onset": [test.times[one.onset] for one in slides],
-        "slide_peak": [test.times[one.peak] for one in slides],
-        "slide_stop": [np.nan if one.stop is None else test.times[one.stop] for one in slides],
-        "onset_acceleration": [onset_acceleration(test.times, table, block, one, limit) for one in slides],
+        "slide_onset": [times[one.onset] for one in slides],
+        "slide_peak": [times[one.peak] for one in slides],
+        "slide_stop": [np.nan if one.stop is None else times[one.stop] for one in slides],
+        "onset_acceleration": [onset_acceleration(times, table, block, one, limit) for one in slides],
         "peak_acceleration": [table[one.peak] for one in slides],
         "peak_block_acceleration": [np.nanmax(block[one.part]) for one in slides],
         "least_friction": [np.nanmin(friction[one.part]) for one in slides],
@@ -270,9 +300,9 @@ def friction_dataset(
     return xr.Dataset(
         {name: (("time",), values, about[name]) for name, values in series.items()}
         | {name: (("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()}
-        | coefficients.variables(),
+        | {str(name): one.variable for name, one in coefficients.items()},
         {
-            "time": ("time", test.times, {"units": "s", "long_name": "time"}),
+            "time": ("time", times, {"units": "s", "long_name": "time"}),
             "theta": ((), np.array(theta), PARAMETERS["theta"]),
             "mu_s": ((), np.array(mu_s), PARAMETERS["mu_s"]),
             "bound": BOUND,
@@ -280,14 +310,43 @@ def friction_dataset(
         {
             "title": "Friction measured on a shaking table (Eq. 1, and by statics)",
             **SOURCE,
-            **test.attrs,
+            **corrected.attrs,
             "g": g,
-            "constant_friction": coefficients.sentence,
+            **coefficients.attrs,
             "threshold": limit,
             "threshold_from": why,
             "removed": "; ".join(removed_text(removed)) or "nothing",
         },
     )
+
+
+def test_of(given: Any) -> ShakingTest:
+    """The test that a caller gives."""
+    if isinstance(given, ShakingTest):
+        return given
+    if not isinstance(given, (xr.Dataset, Mapping)):
+        return read_test(given)
+    known = [name for name in CHANNELS if name in given]
+    if TABLE not in known:
+        raise InputError(f"test: {TABLE}: missing: must be given, along time; there are {shown(list(given))}")
+    for name in known:
+        if not isinstance(given[name], (xr.DataArray, xr.Variable)):
+            raise InputError(f"test: {name} = {shown(given[name])}: must be a DataArray along time")
+    arrays = {name: xr.as_variable(given[name]) for name in known}
+    times: Any = given["time"] if "time" in given else getattr(given[TABLE], "coords", {}).get("time")
+    if times is None:
+        raise InputError("test: time: missing: must be a coordinate, s")
+    for name, array in arrays.items():
+        if array.dims != ("time",):
+            raise InputError(f"test: {name}: dimensions {array.dims}: must be ('time',)")
+    values = {name: check_numbers(f"test: {name}", array) for name, array in arrays.items()}
+    factors = {
+        name: unit_factor(f"test: {name}: units", name, str(array.attrs["units"]))
+        for name, array in {**arrays, "time": xr.as_variable(times)}.items()
+        if "units" in array.attrs
+    }
+    scaled = {name: factors.get(name, 1.0) * one for name, one in values.items()}
+    return ShakingTest(factors.get("time", 1.0) * check_numbers("test: time", times), scaled)
 
 
 def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: float) -> Floats:

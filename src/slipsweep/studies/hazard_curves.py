@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,14 +73,12 @@ class HazardCurve:
             raise InputError(
                 f"{self.name}: {amplitude.size} amplitudes and {rate.size} rates: must be as many of each, 2 at least"
             )
-        for name, values in kept.items():
-            for at in np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))[:1]:
-                raise InputError(f"{self.name}: {name} of point {at + 1} = {_text(values[at])}: must be a number > 0")
-        for name, values, word, sign in (("amplitude", amplitude, "greater", 1), ("rate", rate, "less", -1)):
-            for at in np.flatnonzero(sign * np.diff(values) <= 0.0)[:1]:
+        for name, values, word, sign in (("amplitude", amplitude, "greater", 1.0), ("rate", rate, "less", -1.0)):
+            changes = np.diff(sign * values, prepend=-np.inf) > 0.0
+            for at in np.flatnonzero(~(np.isfinite(values) & (values > 0.0) & changes))[:1]:
+                text = number_text(float(values[at]))
                 raise InputError(
-                    f"{self.name}: {name} of point {at + 2} = {_text(values[at + 1])}: must be {word} than "
-                    f"{_text(values[at])}, the one before it"
+                    f"{self.name}: {name} of point {at + 1} = {text}: must be > 0, and {word} than the one before"
                 )
         for name, values in kept.items():
             object.__setattr__(self, name, values)
@@ -89,10 +86,6 @@ class HazardCurve:
     def rate_at(self, amplitude: Floats) -> Floats:
         """The rate within the curve, linear between its points in logarithms of both."""
         return np.asarray(np.exp(np.interp(np.log(amplitude), np.log(self.amplitude), np.log(self.rate))))
-
-
-def _text(value: Any) -> str:
-    return number_text(float(value))
 
 
 def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> HazardCurve:

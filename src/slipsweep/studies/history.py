@@ -2,35 +2,28 @@
 
 import math
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid import engine
-from slipsweep.grid.engine import Request
+from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid.inputs import Inputs
-from slipsweep.grid.plans import Plan, check_problem, plan_sweep
 from slipsweep.grid.problem import Problem
-from slipsweep.grid.resources import check_memory
-from slipsweep.grid.solvers import options_of
+from slipsweep.kernels import exact
+from slipsweep.kernels import history as kernels
 from slipsweep.kernels.block import Cell
-from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.history import History, record_history, wave_history
-from slipsweep.model.options import Newmark
-from slipsweep.model.parameters import MOST_POINTS, check_numbers, check_whole, number_text
-from slipsweep.model.variables import HALF_WAVES, HISTORY, VALUELESS, SlidingMode
-from slipsweep.motion.cutting import wave_of, wave_of_record
-from slipsweep.motion.intensity import strength_factor
-from slipsweep.motion.pieces import END, START
+from slipsweep.model import options, parameters, variables
+from slipsweep.model.variables import HISTORY
+from slipsweep.motion import cutting, pieces
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
+from slipsweep.studies import datasets
 
 Floats = NDArray[np.float64]
 
@@ -47,50 +40,112 @@ _POINTS_BEYOND = 20_000
 _MANY_CYCLES = 100_000
 
 
-def time_history(
-    inputs: Inputs,
+@datasets.naming_choices
+def simulate(
+    theta: float | None = None,
+    mu_s: float | None = None,
+    amplitude: float | None = None,
+    frequency: float | None = None,
     *,
-    excitation: Any = "sine",
-    model: Any = "mendez",
-    times: Any = None,
+    phi: float | None = None,
+    excitation: datasets.Excitation = "sine",
+    model: options.Model | str = "mendez",
+    times: Sequence[float] | np.ndarray | None = None,
     points_per_cycle: int | None = None,
+    displacement_amplitude: float | None = None,
+    scale: float | None = None,
+    pgv: float | None = None,
+    arias_intensity: float | None = None,
+    time_scale: float | None = None,
+    polarity: int | None = None,
+    yield_acceleration: float | None = None,
+    yield_coefficient: float | None = None,
+    decay_rate: float | None = None,
+    delta_mu: float | None = None,
+    minimum_friction: float | None = None,
+    structure_frequency: float | None = None,
 ) -> xr.Dataset:
-    """Time history of one block; parameters, results and errors of `slipsweep.simulate`."""
-    problem = check_problem(excitation, model, "cycle")
+    """Time history of one block, event by event: the samples carry rounding errors only.
+
+    Parameters
+    ----------
+    theta, mu_s, amplitude, frequency : float
+        One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite one motion is taken:
+        ``excitation=suite["label"]``, of a pair ``suite["label"].rotated(azimuth)``.
+    times : array, optional
+        Times to sample, s, increasing, and not negative under a waveform; by default `points_per_cycle` a
+        cycle, from 0 to the end of the shaking, or the times of a record's samples; and on until the block has
+        come to rest, if that is later.  A slide that lasts long after the shaking has as many points as 100 cycles
+        have (after a record 20 000, or as many as it has samples), evenly spaced.
+    points_per_cycle : int, optional
+        Samples a cycle where `times` is not given, 512 by default; not with a record.
+
+    Returns
+    -------
+    Dataset
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²),
+        `friction_coefficient` (what Eq. 1 gives for the two; not with `yield_coefficient`), `relative_velocity` (m/s)
+        and `relative_displacement` (m); and the results of `sweep` for the case.  Where the base's acceleration
+        jumps, as at the end of a record, the values are those after the jump.  NaN where
+        the case has no value (`validity`).
+
+    Raises
+    ------
+    InputError
+        As `sweep`; or times that are not increasing.
+
+    See Also
+    --------
+    sweep : many blocks, without their histories
+
+    Examples
+    --------
+    The stick-slip test of the paper, with its printed λ:
+
+    >>> import slipsweep
+    >>> history = slipsweep.simulate(
+    ...     5, 0.38, 3.55, 1.8, yield_acceleration=0.59, decay_rate=2.7, excitation=slipsweep.Sine(cycles=5)
+    ... )
+    >>> print(f"{history.permanent_displacement.item() * 1000:.0f} mm after {history.time.values[-1]:.2f} s")
+    331 mm after 2.78 s
+    """
+    inputs = Inputs(
+        theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, frequency=frequency,
+        displacement_amplitude=displacement_amplitude, scale=scale, pgv=pgv, arias_intensity=arias_intensity,
+        time_scale=time_scale, polarity=polarity, yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
+        minimum_friction=minimum_friction, structure_frequency=structure_frequency,
+    )  # fmt: skip
+    problem = plans.check_problem(excitation, model, "cycle")
     if isinstance(problem.excitation, Suite):
         label = problem.excitation.labels[0]
         of = ".rotated(azimuth)" if problem.excitation.has_pairs else ""
         raise InputError(f"excitation: simulate takes one motion of a Suite, such as suite[{label!r}]{of}")
     if points_per_cycle is not None and isinstance(problem.excitation, Record):
         raise InputError("points_per_cycle: not allowed with a Record, whose samples are the points; give times")
-    plan = plan_sweep(inputs, excitation=problem.excitation, model=problem.model)
+    plan = plans.plan_sweep(inputs, excitation=problem.excitation, model=problem.model)
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    one = _History(problem, plan)
+    one = _History(problem, {name: variable.values for name, variable in plan.coords.items()}, plan.solve())
     if times is None:
         points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
-        phases = one.points(check_whole("points_per_cycle", points, 4, MOST_POINTS))
+        phases = one.points(parameters.check_whole("points_per_cycle", points, 4, parameters.MOST_POINTS))
         grid = phases * one.unit
     else:
-        grid = _checked(times, least=-math.inf if isinstance(problem.excitation, Record) else 0.0)
+        grid = np.atleast_1d(parameters.check_numbers("times", times))
+        least = 0.0 if isinstance(problem.excitation, Waveform) else -math.inf
+        increasing = grid.ndim == 1 and grid.size and np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()
+        if not increasing or grid[0] < least:
+            raise InputError(f"times: must be one row of finite, increasing numbers{' >= 0' if least == 0.0 else ''}")
         with np.errstate(over="ignore"):
             phases = grid / one.unit
         if not np.isfinite(phases[[0, -1]]).all():
-            raise InputError(f"times = ..., {number_text(float(grid[-1]))}: too many cycles for double precision")
-    attrs = one.summary.attrs | {"title": "Time history of a rigid block"}
+            last = parameters.number_text(float(grid[-1]))
+            raise InputError(f"times = ..., {last}: too many cycles for double precision")
     time = xr.Variable(("time",), grid, {"units": "s", "long_name": "time"})
-    return one.summary.assign(one.columns(phases) | one.half_waves()).assign_coords(time=time).assign_attrs(attrs)
-
-
-def _checked(times: Any, least: float) -> Floats:
-    """Times that a caller gives."""
-    grid = np.atleast_1d(check_numbers("times", times))
-    increasing = grid.ndim == 1 and grid.size and np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()
-    if not increasing or (grid < least).any():
-        bound = " >= 0" if least == 0.0 else ""
-        raise InputError(f"times: must be one row of finite, increasing numbers{bound}")
-    return grid
+    found = one.summary.assign(one.columns(phases) | one.half_waves()).assign_coords(time=time)
+    return found.assign_attrs(title="Time history of a rigid block")
 
 
 @dataclass(frozen=True)
@@ -101,36 +156,40 @@ class _History:
     """
 
     problem: Problem
-    plan: Plan
+    inputs: Mapping[str, Floats]
+    summary: xr.Dataset
 
     @cached_property
-    def inputs(self) -> Mapping[str, Floats]:
-        """The case."""
-        return {name: variable.values for name, variable in self.plan.coords.items()}
+    def cell(self) -> Cell:
+        """The case as kernels take it."""
+        given = engine.cell_inputs(self.problem, self.inputs)
+        return Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
 
     @cached_property
-    def summary(self) -> xr.Dataset:
-        """Its results as a sweep gives them."""
-        return self.plan.solve()
+    def wave(self) -> pieces.Wave:
+        """The motion of the base as a table of pieces."""
+        motion = self.problem.excitation
+        if isinstance(motion, Record):
+            return cutting.wave_of_record(motion, float(self.inputs["polarity"]))
+        assert isinstance(motion, Waveform)
+        return cutting.wave_of(motion)
 
-    @cached_property
+    @property
     def unit(self) -> float:
         """Seconds that a phase takes: 1/ω, or the factor on the time of a record."""
         return float(engine.phase_seconds(self.problem, self.inputs))
 
     @property
     def _valueless(self) -> bool:
-        return bool(int(self.summary["validity"]) & VALUELESS)
+        return bool(int(self.summary["validity"]) & variables.VALUELESS)
 
     def sampled(self, phases: Floats) -> Floats:
         """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
         motion, table = self.problem.excitation, np.empty((len(HISTORY), phases.size))
-        wave = wave_of_record(motion, float(self.inputs["polarity"])) if isinstance(motion, Record) else wave_of(motion)
-        given = engine.cell_inputs(self.problem, self.inputs)
-        cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
-        kernel = record_history if isinstance(motion, Record) else wave_history
-        options = options_of(self.problem, wants_peak=True)
-        arguments = cell, options, wave, workspace_of(wave, keeps_log=True), phases, History(*table)
+        kernel = kernels.record_history if isinstance(motion, Record) else kernels.wave_history
+        workspace = exact.workspace_of(self.wave, keeps_log=True)
+        chosen = solvers.options_of(self.problem, wants_peak=True)
+        arguments = self.cell, chosen, self.wave, workspace, phases, kernels.History(*table)
         if isinstance(motion, Waveform) and motion.cycles > _MANY_CYCLES:
             # the main thread hears Ctrl-C while it waits; a thread that is a daemon does not hold up the exit
             thread = threading.Thread(target=kernel, args=arguments, daemon=True)
@@ -151,7 +210,7 @@ class _History:
             table[:, 3] *= self.unit
             table[:, 4] *= self.unit * self.unit
         if not self._valueless and not np.isfinite(table[:, list(known.values())]).all():
-            given = ", ".join(f"{name} = {number_text(float(values))}" for name, values in self.inputs.items())
+            given = ", ".join(f"{name} = {parameters.number_text(float(one))}" for name, one in self.inputs.items())
             raise InputError(f"{given}: the history is then no finite number in double precision; must be nearer to 1")
         return {name: xr.Variable(("time",), table[:, at].copy(), HISTORY[name]) for name, at in known.items()}
 
@@ -160,25 +219,21 @@ class _History:
         record = self.problem.excitation
         if not isinstance(record, Record):
             return {}
-        wave = wave_of_record(record, float(self.inputs["polarity"]))
         with np.errstate(over="ignore"):
-            peak = wave.height * float(strength_factor(record, self.inputs))
-        limited = () if isinstance(self.problem.model, Newmark) else ("limiting_acceleration",)
-        block = {**{name: np.atleast_1d(values) for name, values in self.inputs.items()}, "amplitude": np.zeros(1)}
-        known = engine.friction_parameters(Request(self.problem, (1,), block, ("yield_acceleration", *limited)))
-        mode = np.where(peak > known["yield_acceleration"], SlidingMode.STICK_SLIP, SlidingMode.STUCK)
-        for limit in (known[name] for name in limited):
-            mode = np.where((mode != SlidingMode.STUCK) & (peak > limit), SlidingMode.CONTINUOUS, mode)
+            peak = self.wave.height * self.cell.amplitude
+        given = {**{name: np.atleast_1d(values) for name, values in self.inputs.items()}, "amplitude": peak}
+        request = engine.Request(self.problem, peak.shape, given, ("sliding_mode",))
+        mode = engine.friction_parameters(request)["sliding_mode"]
         if self._valueless:
-            mode = np.full(peak.shape, SlidingMode.MISSING)
-        first, after = wave.interval.T
+            mode[:] = variables.SlidingMode.MISSING
+        first, after = self.wave.interval.T
         found = {
-            "half_wave_start": self.unit * wave.pieces[first, START],
-            "half_wave_end": self.unit * wave.pieces[after - 1, END],
+            "half_wave_start": self.unit * self.wave.pieces[first, pieces.START],
+            "half_wave_end": self.unit * self.wave.pieces[after - 1, pieces.END],
             "half_wave_peak": peak,
-            "half_wave_mode": mode.astype(np.int8),
+            "half_wave_mode": mode,
         }
-        return {name: xr.Variable(("half_wave",), values, HALF_WAVES[name]) for name, values in found.items()}
+        return {name: xr.Variable(("half_wave",), values, variables.HALF_WAVES[name]) for name, values in found.items()}
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
@@ -197,7 +252,7 @@ class _History:
     def _runs_on(self) -> float:
         """How long the block slides on after the shaking."""
         motion = self.problem.excitation
-        slides = isinstance(motion, Record) or self.summary["sliding_mode"] == SlidingMode.STICK_SLIP
+        slides = isinstance(motion, Record) or self.summary["sliding_mode"] == variables.SlidingMode.STICK_SLIP
         if not slides or self._valueless:
             return 0.0
         assert not isinstance(motion, Suite)
@@ -220,15 +275,13 @@ def _to_the_end(shaken: Floats, step: float, most: int, after: float) -> Floats:
             "larger yield_acceleration"
         )
     beyond = math.ceil(min(after, most * step) / step)
-    if after <= most * step:
-        rest = np.arange(1, beyond + 1) * step
-    else:
-        # a hair further than the end, which is rounded
-        rest = np.linspace(0.0, after * (1.0 + 1e-12), beyond + 1)[1:]
+    # a hair further than the end, which is rounded
+    rest = np.linspace(0.0, max(after * (1.0 + 1e-12), beyond * step), beyond + 1)[1:]
     return np.concatenate([shaken, shaken[-1] + rest])
 
 
 def _check_memory(samples: int) -> None:
     """Refuse what memory cannot hold: the table, its columns apart, phases and times."""
     needed = samples * 8 * (2 * len(HISTORY) + 2)
-    check_memory(f"a history of {samples:.4g} points", needed, "take fewer cycles or points_per_cycle, or give times")
+    advice = "take fewer cycles or points_per_cycle, or give times"
+    resources.check_memory(f"a history of {samples:.4g} points", needed, advice)

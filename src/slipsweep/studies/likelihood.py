@@ -10,16 +10,24 @@ tells only on which side of it the jump lies: it is left out.  Readings of a con
 reading: n of them have the weight of one.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.model.options import Mendez
+from slipsweep.grid.problem import Problem
+from slipsweep.grid.solvers import options_of
+from slipsweep.kernels.block import Cell
+from slipsweep.kernels.exact import workspace_of
+from slipsweep.kernels.history import History, record_history
+from slipsweep.model.options import Cycle, Mendez
+from slipsweep.model.variables import HISTORY
+from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import TABLE, ShakingTest
-from slipsweep.studies.forward import COLUMN, Forward
 from slipsweep.studies.table_motion import TableMotion, converter_noise, noise_of, table_motion
 
 Floats = NDArray[np.float64]
@@ -41,6 +49,28 @@ _LARGE = 3.0
 _SHAPE_STEP, _LINE_STEP = 0.3, 1e-3
 
 
+#: Columns of a history.
+COLUMN = {name: at for at, name in enumerate(HISTORY)}
+
+
+class Forward:
+    """A block of known inclination and static friction on one motion, for parameters that are tried."""
+
+    def __init__(self, theta: float, mu_s: float, model: Mendez, record: Record) -> None:
+        self.theta, self.mu_s, self.model = theta, mu_s, model
+        self._options = options_of(Problem(model, record, Cycle()), wants_peak=True)
+        self._wave = wave_of_record(record, 1.0)
+        self._workspace = workspace_of(self._wave, keeps_log=True)
+
+    def __call__(self, parameters: Floats, times: Floats) -> Floats:
+        """Columns of `HISTORY` at the times, for Üy, λ and Δμ."""
+        onset, decay, drop = (float(one) for one in parameters)
+        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan)
+        table = np.empty((len(COLUMN), times.size))
+        record_history(cell, self._options, self._wave, self._workspace, times, History(*table))
+        return table.T
+
+
 @dataclass(frozen=True)
 class Line:
     """An offset, a drift or a step of a sensor: what one standard deviation of it adds to channels."""
@@ -52,16 +82,27 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A test near one solution: independent residuals for any parameters, and the nuisance parameters."""
+    """A test near one solution: independent residuals for any parameters, and the nuisance parameters.
+
+    Attributes
+    ----------
+    forward : Forward
+    times : ndarray
+    weights : dict of str to (ndarray, ndarray)
+        Of each channel the samples that count, and what they are multiplied by to have unit variance.
+    measured : ndarray
+        The samples of all channels, so multiplied.
+    left, sizes, right : ndarray
+        Singular values of the effects of one standard deviation of each nuisance parameter on them.
+    """
 
     forward: Forward
     times: Floats
-    columns: list[tuple[int, Mask, Floats]]
+    weights: dict[str, tuple[Mask, Floats]]
     measured: Floats
     left: Floats
     sizes: Floats
     right: Floats
-    leverage: Floats
 
     def __call__(self, parameters: Floats) -> Floats:
         """Independent residuals of unit variance, if the model and the noise are right."""
@@ -72,7 +113,7 @@ class Linear:
     def raw(self, parameters: Floats) -> Floats:
         """Measured less computed, in standard deviations, if the table's motion had no error."""
         history = self.forward(parameters, self.times)
-        computed = np.concatenate([history[use, at] * weight for at, use, weight in self.columns])
+        computed = np.concatenate([history[use, COLUMN[name]] * weight for name, (use, weight) in self.weights.items()])
         return np.where(np.isfinite(computed), self.measured - computed, 1e3)
 
     def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
@@ -81,6 +122,16 @@ class Linear:
         values = self.right.T @ (self.sizes / (1.0 + self.sizes**2) * along)
         spread = 1.0 - np.sum(self.right**2 * (self.sizes**2 / (1.0 + self.sizes**2))[:, None], axis=0)
         return np.asarray(values), np.sqrt(np.maximum(spread, 0.0))
+
+    def by_channel(self, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        """What belongs to each channel."""
+        ends = np.cumsum([weight.size for _, weight in self.weights.values()])[:-1]
+        return dict(zip(self.weights, np.split(values, ends), strict=True))
+
+    def unexplained(self, parameters: Floats) -> dict[str, Floats]:
+        """What the most likely nuisance parameters leave of each channel, in its own unit."""
+        rest = self.raw(parameters) - (self.left * self.sizes) @ (self.right @ self.nuisances(parameters)[0])
+        return {name: part / self.weights[name][1] for name, part in self.by_channel(rest).items()}
 
 
 @dataclass(eq=False)
@@ -177,51 +228,44 @@ class Observation:
     def linear(self, parameters: Floats, noisy: bool = True) -> Linear:
         """The likelihood near a solution; without `noisy`, as if the record of the table had no noise."""
         test, forward = self.test, self.forward()
-        counted = self._counted()
-        columns = [(COLUMN[name], use, self.weights[name][use] / self.noise[name]) for name, use in counted.items()]
-        measured = np.concatenate(
-            [test.channels[name][use] * weight for name, (_, use, weight) in zip(counted, columns, strict=True)]
-        )
-        effects = np.zeros((measured.size, self.wrong.size + len(self.lines)))
-        if noisy or self.table_lines:
-            base = forward(parameters, test.times)
-            kinds = self.wrong.size - len(self.table_lines)
-            for at in range(0 if noisy else kinds, self.wrong.size):
-                moved = self.wrong.copy()
-                moved[at] += _SHAPE_STEP if at < kinds else _LINE_STEP
-                change = self.forward(moved)(parameters, test.times) - base
-                scaled = [change[use, column] * weight for column, use, weight in columns]
-                effects[:, at] = np.nan_to_num(np.concatenate(scaled)) / (moved[at] - self.wrong[at])
-        none = np.zeros(test.times.size)
-        for at, line in enumerate(self.lines, self.wrong.size):
-            scaled = [
-                line.parts.get(name, none)[use] * weight
-                for name, (_, use, weight) in zip(counted, columns, strict=True)
-            ]
-            effects[:, at] = np.concatenate(scaled)
-        measured = measured + effects[:, : self.wrong.size] @ self.wrong
-        left, sizes, right = np.linalg.svd(effects, full_matrices=False)
-        leverage = left**2 @ (sizes**2 / (1.0 + sizes**2))
-        return Linear(forward, test.times, columns, measured, left, sizes, right, leverage)
+        counted = {name: self._counted(name) for name in self.use}
+        weights = {name: (use, self.weights[name][use] / self.noise[name]) for name, use in counted.items()}
 
-    def _counted(self) -> dict[str, Mask]:
-        """The samples that count: `use`, but for those beside jumps of the block's acceleration."""
-        return {
-            name: use & ~self.jumps_left_out if name == "block_acceleration" else use for name, use in self.use.items()
-        }
+        def weighted(parts: Mapping[str, Floats]) -> Floats:
+            none = np.zeros(test.times.size)
+            return np.concatenate([parts.get(name, none)[use] * weight for name, (use, weight) in weights.items()])
+
+        def computed(by: Forward) -> Floats:
+            history = by(parameters, test.times)
+            return weighted({name: history[:, COLUMN[name]] for name in weights})
+
+        measured = weighted(test.channels)
+        effects = np.zeros((measured.size, self.wrong.size + len(self.lines)))
+        kinds = self.wrong.size - len(self.table_lines)
+        base = computed(forward)
+        for at in range(0 if noisy else kinds, self.wrong.size):
+            moved = self.wrong.copy()
+            moved[at] += _SHAPE_STEP if at < kinds else _LINE_STEP
+            change = computed(self.forward(moved)) - base
+            effects[:, at] = np.nan_to_num(change) / (moved[at] - self.wrong[at])
+        for at, line in enumerate(self.lines, self.wrong.size):
+            effects[:, at] = weighted(line.parts)
+        measured = measured + effects[:, : self.wrong.size] @ self.wrong
+        return Linear(forward, test.times, weights, measured, *np.linalg.svd(effects, full_matrices=False))
+
+    def _counted(self, name: str) -> Mask:
+        """The samples of a channel that count: `use`, but for those beside jumps of the block's acceleration."""
+        return self.use[name] & ~self.jumps_left_out if name == "block_acceleration" else self.use[name]
 
     def take_noise(self, linear: Linear, parameters: Floats) -> None:
         """Estimate the noise of each channel from the residuals, where it is not given."""
-        values, _ = linear.nuisances(parameters)
-        rest = linear.raw(parameters) - (linear.left * linear.sizes) @ (linear.right @ values)
-        at = 0
-        for name, (_, use, weight) in zip(self.use, linear.columns, strict=True):
-            part = slice(at, at + int(use.sum()))
-            at = part.stop
-            freedom = float(np.sum((weight * self.noise[name]) ** 2)) - float(np.sum(linear.leverage[part])) - 1.0
+        leverage = linear.by_channel(linear.left**2 @ (linear.sizes**2 / (1.0 + linear.sizes**2)))
+        for name, rest in linear.unexplained(parameters).items():
+            weight = linear.weights[name][1] * self.noise[name]
+            freedom = float(np.sum(weight**2)) - float(np.sum(leverage[name])) - 1.0
             if name not in self.given_noise and freedom > 0.0:
-                factor = float(np.sqrt(np.sum(rest[part] ** 2) / freedom))
-                self.noise[name] = max(factor * self.noise[name], self.least_noise[name])
+                noise = float(np.sqrt(np.sum((rest * weight) ** 2) / freedom))
+                self.noise[name] = max(noise, self.least_noise[name])
 
     def move(self, linear: Linear, parameters: Floats) -> None:
         """Take the table's motion as it most likely was, and leave out the samples beside jumps."""

@@ -5,9 +5,8 @@ where a result changes with which u jumps or grows beyond all bounds, the place 
 says what is missed all the same.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.problem import Problem
 from slipsweep.model.variables import Validity
+from slipsweep.motion.records import Record
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -50,31 +50,12 @@ class Change(NamedTuple):
     part: float
 
 
-class Hides(NamedTuple):
-    """Where a scan may hide a peak.
-
-    Attributes
-    ----------
-    saw : float
-        Steps of blocks that do not recouple are cut into parts where u is at least this part of the target: there u
-        jumps up each time that the block comes to rest one pulse earlier, and then falls.
-    parts : int
-        Parts of such a step.
-    changes : tuple of Change
-    """
-
-    saw: float
-    parts: int
-    changes: tuple[Change, ...]
-
-
 #: The gap of the literal rise, in which Kd would be negative: at its edges Kd vanishes, and u grows beyond all bounds.
 _GAP = Change("validity", int(Validity.KD_NOT_POSITIVE), 0.0, 0.0)
 
-#: Under a record u jumps where the number of slips changes; under a waveform, whose slips are not counted, jumps are
-#: found by finer parts.
-UNDER_WAVEFORM = Hides(0.5, 512, (_GAP,))
-UNDER_RECORD = Hides(0.7, 128, (_GAP, Change("number_of_slips", -1, 0.25, 1e-5)))
+#: Under a record u jumps where the number of slips changes; under a waveform, whose slips are not counted, such jumps
+#: are found by finer parts of steps.
+_SLIPS = Change("number_of_slips", -1, 0.25, 1e-5)
 
 
 class Steps(NamedTuple):
@@ -86,21 +67,26 @@ class Steps(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Cells:
-    """Cells that can be solved at any amplitude.
+class Scan:
+    """Cells at increasing amplitudes.
 
     Attributes
     ----------
     problem : Problem
     arrays : mapping of str to array
         Inputs but for the amplitude: one value for each cell, or one for all.
-    targets : array
-        Displacement to be reached by each cell, m.
+    targets : array, (cell,)
+        Displacement to be reached, m.
+    amplitudes : array, (cell, amplitude)
+    found : mapping of str to array, (cell, amplitude)
+        `permanent_displacement`, `validity` and the results of `changes_of` the problem.
     """
 
     problem: Problem
     arrays: Mapping[str, Floats]
     targets: Floats
+    amplitudes: Floats
+    found: Mapping[str, NDArray[Any]]
 
     def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> Arrays:
         """Results of some cells, each at its own amplitudes (rows of the array)."""
@@ -111,142 +97,80 @@ class Cells:
         }
         return engine.solve(Request(self.problem, amplitude.shape, {**arrays, "amplitude": amplitude}, wanted))
 
-    def excess(self, amplitude: Floats, cell: Indices) -> Floats:
-        """Displacements less the targets."""
-        found = self.solve(amplitude, cell, ("permanent_displacement",))["permanent_displacement"]
-        return np.asarray(found - self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
-
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
-        """Whether cells reach their targets."""
-        return np.asarray(self.excess(amplitude, cell) >= 0.0)
-
-
-@dataclass(frozen=True)
-class Scan:
-    """Cells at increasing amplitudes.
-
-    Attributes
-    ----------
-    cells : Cells
-    hides : Hides
-    amplitudes : array, (cell, amplitude)
-    found : mapping of str to array, (cell, amplitude)
-        Displacement, validity and the results of the changes.
-    """
-
-    cells: Cells
-    hides: Hides
-    amplitudes: Floats
-    found: Mapping[str, NDArray[Any]]
+        """Whether some cells reach their targets at amplitudes of their own."""
+        moved = self.solve(amplitude, cell, ("permanent_displacement",))["permanent_displacement"]
+        return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
     @property
-    def displacement(self) -> Floats:
-        """Displacements of the scan, (cell, amplitude)."""
-        return self.found["permanent_displacement"]
-
-    @cached_property
     def first(self) -> Indices:
         """Index of the first amplitude at which each cell reaches its target; their number where it does not."""
-        reaches = self.displacement >= self.cells.targets[:, np.newaxis]
+        reaches = self.found["permanent_displacement"] >= self.targets[:, np.newaxis]
         return np.where(reaches.any(axis=1), reaches.argmax(axis=1), reaches.shape[1])
 
-    @cached_property
-    def before(self) -> NDArray[np.bool_]:
-        """Whether a target is not reached in the scan up to the start of a step, (cell, step)."""
-        steps = np.arange(self.amplitudes.shape[1] - 1)
-        return np.asarray(steps < self.first[:, np.newaxis])
+
+def changes_of(problem: Problem) -> tuple[Change, ...]:
+    """The changes with which the displacement of a problem jumps."""
+    return (_GAP, _SLIPS) if isinstance(problem.excitation, Record) else (_GAP,)
 
 
-def first_step(scan: Scan) -> Steps:
-    """The first step of the scan that reaches each target, of those that are reached."""
-    (cell,) = np.nonzero(scan.first < scan.amplitudes.shape[1])
+def limits_of(scan: Scan) -> Steps:
+    """The lowest neighbouring amplitudes between which cells reach their targets, of those cells that do."""
+    first = scan.first
+    before = np.arange(scan.amplitudes.shape[1] - 1) < first[:, np.newaxis]
+    (cell,) = np.nonzero(first < scan.amplitudes.shape[1])
     # the scan begins at yield, where no block has moved: there is always a step before
-    at = scan.first[cell]
-    return Steps(cell, scan.amplitudes[cell, at - 1], scan.amplitudes[cell, at])
+    at = first[cell]
+    found = [Steps(cell, scan.amplitudes[cell, at - 1], scan.amplitudes[cell, at]), *_hidden_peaks(scan, before)]
+    found += [_at_change(scan, before, change) for change in changes_of(scan.problem)]
+    steps = Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+    order = np.argsort(steps.high, kind="stable")
+    cell, first = np.unique(steps.cell[order], return_index=True)
+    lowest = order[first]
+    return Steps(cell, *bisected(steps.low[lowest], steps.high[lowest], lambda at, which: scan.reach(at, cell[which])))
 
 
-def hidden_peaks(scan: Scan) -> Steps:
-    """Parts of steps in which a target is reached, up to the step in which the scan itself reaches it."""
-    moved, parts = scan.displacement, scan.hides.parts
+def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> list[Steps]:
+    """Parts of steps in which a target is reached, `before` (cell, step) the scan itself reaches it."""
+    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier, and then falls
+    saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
+    moved = scan.found["permanent_displacement"]
     slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
     # the part of a target from which on a point may lie next to a peak
-    least = np.where(slides_on, scan.hides.saw, np.inf)
+    least = np.where(slides_on, saw, np.inf)
     peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
     least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = _MAXIMUM
-    near = moved >= least * scan.cells.targets[:, np.newaxis]
-    cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & scan.before)
-    found = [Steps(cell[:0], np.empty(0), np.empty(0))]
+    near = moved >= least * scan.targets[:, np.newaxis]
+    cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
+    found = []
     for (some,) in slabs(cell.shape, SCANNED // parts):
         own, begin = cell[some], step[some]
         amplitudes = np.linspace(scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1)
-        reaches = scan.cells.reach(amplitudes, own)
+        reaches = scan.reach(amplitudes, own)
         (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
         first = reaches[which].argmax(axis=1)
         found.append(Steps(own[which], amplitudes[which, first - 1], amplitudes[which, first]))
-    return _together(found)
+    return found
 
 
-def steps_at_changes(scan: Scan, change: Change) -> Steps:
+def _at_change(scan: Scan, before: NDArray[np.bool_], change: Change) -> Steps:
     """Steps up to the last amplitude before a change, or to the first after it, at which a target is reached."""
-    cells, states = scan.cells, scan.found[change.result] & change.bits
+    moved, states = scan.found["permanent_displacement"], scan.found[change.result] & change.bits
     cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
-    higher = np.maximum(scan.displacement[cell, step + 1], scan.displacement[cell, step])
+    higher = np.maximum(moved[cell, step + 1], moved[cell, step])
     # no comparison holds for the NaN of a gap: its edges are located
-    may = scan.before[cell, step] & ~(higher < change.least * cells.targets[cell])
+    may = before[cell, step] & ~(higher < change.least * scan.targets[cell])
     cell, step = cell[may], step[may]
     start, end, known = scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1], states[cell, step]
 
     def changed(amplitude: Floats, which: Indices) -> NDArray[np.bool_]:
-        there = cells.solve(amplitude, cell[which], (change.result,))[change.result] & change.bits
+        there = scan.solve(amplitude, cell[which], (change.result,))[change.result] & change.bits
         return np.asarray(there != known[which])
 
     low, high = bisected(start, end, changed, change.part * (end - start))
-    at_low = cells.reach(low, cell)
-    found = at_low | cells.reach(high, cell)
+    at_low = scan.reach(low, cell)
+    found = at_low | scan.reach(high, cell)
     return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
-
-
-def lowest_of(*found: Steps) -> Steps:
-    """The lowest of the steps found for each cell."""
-    steps = _together(found)
-    order = np.argsort(steps.high, kind="stable")
-    _, first = np.unique(steps.cell[order], return_index=True)
-    chosen = order[first]
-    return Steps(steps.cell[chosen], steps.low[chosen], steps.high[chosen])
-
-
-def _together(found: Sequence[Steps]) -> Steps:
-    return Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
-
-
-def crossings(low: Floats, high: Floats, excess: Callable[[Floats, Indices], Floats]) -> tuple[Floats, Floats]:
-    """Narrow intervals to neighbouring numbers of double precision about the change of sign of `excess`.
-
-    Parameters
-    ----------
-    low, high : array
-        Ends of intervals.
-    excess : callable
-        ``excess(amplitudes, which)`` for intervals by their indices: negative or NaN at `low`, not negative at `high`.
-
-    Returns
-    -------
-    low, high : array
-        Neighbours: excess is negative or NaN at `low`, not negative at `high`.
-    """
-    from scipy.optimize import elementwise
-
-    if not low.size:
-        return low, high
-
-    def finite(at: Floats, which: Indices) -> Floats:
-        found = np.nan_to_num(excess(at, which), nan=-1.0, posinf=1e300)
-        return np.where(found == 0.0, 1e-300, found)  # a root that is met exactly is not the end of the search
-
-    tolerances = {"xatol": 0.0, "xrtol": 4.0 * np.finfo(np.float64).eps, "fatol": 0.0, "frtol": 0.0}
-    found = elementwise.find_root(finite, (low, high), args=(np.arange(low.size),), tolerances=tolerances)
-    below, above = found.bracket
-    return bisected(below, above, lambda at, which: np.asarray(excess(at, which) >= 0.0))
 
 
 def bisected(

@@ -3,12 +3,12 @@
 The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall after a jump, and has
 gaps where the model gives no value.  So every block is first scanned from its yield acceleration upwards, including
 both sides of the amplitudes at which its mode changes, and what the steps of the scan may hide is looked for
-(`limit_scans`).  The first step that reaches the target is narrowed until two neighbouring double-precision numbers
+(`limit_scans`).  The first step that reaches the target is halved until two neighbouring double-precision numbers
 are left.  All cells are solved together, by the cycle solver.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -23,24 +23,14 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_sweep
-from slipsweep.grid.problem import Problem
-from slipsweep.model.options import Newmark
-from slipsweep.model.parameters import check_single, check_values, check_whole
-from slipsweep.model.variables import (
-    LIMIT_RESULTS,
-    MAXIMUM_AMPLITUDE_IN_G,
-    RECORD_COUNTS,
-    RESULT_DTYPES,
-    RESULTS,
-    TOLERABLE_DISPLACEMENT,
-    LimitStatus,
-    SlidingMode,
-)
+from slipsweep.model import parameters, variables
+from slipsweep.model.options import Model, Newmark
+from slipsweep.model.variables import LimitStatus, SlidingMode
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.motion.suites import Suite
-from slipsweep.studies import limit_scans
-from slipsweep.studies.limit_scans import SCANNED, Cells, Scan
+from slipsweep.motion.waveforms import Waveform
+from slipsweep.studies import datasets, limit_scans
+from slipsweep.studies.datasets import Values
 
 Floats = NDArray[np.float64]
 
@@ -61,11 +51,107 @@ _ROUNDING = 1e-15
 #: Pulses of a record whose changes of mode a scan includes: noise has thousands.
 _MOST_PULSES = 128
 
-#: Results that say in which mode a block slides.
-_MODES = ("sliding_mode", "stick_slip_pulses", "continuous_pulses")
-
 #: Inputs that only scale the result, or only flag it.
 _SCALES = ("frequency", "time_scale", "structure_frequency")
+
+
+@datasets.naming_choices
+def limit_amplitude(
+    displacement: Values,
+    theta: Values | None = None,
+    mu_s: Values | None = None,
+    frequency: Values | None = None,
+    *,
+    phi: Values | None = None,
+    excitation: datasets.Excitation = "sine",
+    model: Model | str = "mendez",
+    time_scale: Values | None = None,
+    polarity: datasets.Signs | None = None,
+    azimuth: Values | None = None,
+    yield_acceleration: Values | None = None,
+    yield_coefficient: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    structure_frequency: Values | None = None,
+    maximum_amplitude: float | None = None,
+    amplitude_steps: int = AMPLITUDE_STEPS,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Smallest amplitude at which the permanent displacement reaches a tolerable one.
+
+    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at
+    least `displacement` at the amplitude returned, and less (or no value) at the
+    double-precision number before it.
+
+    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has
+    gaps where the model gives no value (`validity`), so that a displacement may be reached at
+    several amplitudes, or passed in a jump.  The smallest is returned: the first step of a scan
+    with ``u >= displacement`` holds it.  The scan runs from the yield acceleration to
+    `maximum_amplitude` in `amplitude_steps` equal ratios, finer where it may hide a peak, and has
+    both sides of the change of mode.  A peak narrower than a part of a step can be missed.  Under a
+    record the amplitude is that peak ground acceleration to which it is scaled, and the scan has both
+    sides of every amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
+
+    Parameters
+    ----------
+    displacement : float, array or DataArray
+        Tolerable permanent displacement, m, > 0.
+    theta, mu_s, frequency : float, array or DataArray
+        These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".  A record has no frequency,
+        but a `time_scale`.
+    maximum_amplitude : float, optional
+        Where the search ends, m/s²; by default 5 g.
+    amplitude_steps : int
+        Steps of the scan, 2 or more.
+    progress : callable, optional
+        Called with the number of cells just finished.
+
+    Returns
+    -------
+    Dataset
+        Dimensions theta, mu_s, frequency, then others, displacement last:
+
+        - `limit_amplitude`, m/s²; NaN where there is none.
+        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of
+          itself between neighbouring numbers, with and without a change of sliding mode),
+          3 after_gap (no value just below), 4 not_reached, 5 invalid (no value anywhere).
+        - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
+          limit; more than `displacement` where a discontinuity of the model sets the limit.
+        - `validity` at the limit or, where there is none, at `maximum_amplitude`.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; or a displacement or a maximum amplitude that is not positive.
+
+    See Also
+    --------
+    sweep : the displacement at an amplitude
+    displacement_hazard : the annual rate at which a displacement is exceeded
+
+    Examples
+    --------
+    >>> import slipsweep
+    >>> limits = slipsweep.limit_amplitude(0.05, theta=5, mu_s=0.4, frequency=[1, 2])
+    >>> limits.limit_amplitude.round(3).values
+    array([3.34 , 3.756])
+    """
+    inputs = Inputs(
+        theta=theta, mu_s=mu_s, phi=phi, frequency=frequency, time_scale=time_scale, polarity=polarity,
+        azimuth=azimuth, yield_acceleration=yield_acceleration, yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate, delta_mu=delta_mu, minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )  # fmt: skip
+    plan = plan_limits(
+        displacement,
+        inputs,
+        excitation=excitation,
+        model=model,
+        maximum_amplitude=maximum_amplitude,
+        amplitude_steps=amplitude_steps,
+    )
+    return plan.solve(progress).assign_coords(datasets.brought_coordinates(inputs, plan.coords, plan.names))
 
 
 def plan_limits(
@@ -77,48 +163,34 @@ def plan_limits(
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
 ) -> Plan:
-    """Plan of limit amplitudes.
-
-    Parameters
-    ----------
-    displacement, excitation, model, maximum_amplitude, amplitude_steps
-        As `slipsweep.limit_amplitude`.
-    inputs : Inputs
-        All but the strength of the shaking.
-
-    Raises
-    ------
-    InputError
-        As `slipsweep.limit_amplitude`.
-    """
-    checked = check_values("displacement", displacement)
-    if isinstance(displacement, (xr.DataArray, xr.Variable)):
-        target = xr.Variable(displacement.dims, checked)
-    elif checked.ndim <= 1:
-        target = xr.Variable(("displacement",) * checked.ndim, checked)
-    else:
-        raise InputError(f"displacement: an array of {checked.ndim} dimensions; must be a scalar or a 1-D array")
-    if checked.size == 0:
-        raise InputError("displacement = []: must hold at least one value")
-    steps = check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
+    """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
+    values = parameters.check_values("displacement", displacement)
+    dims = getattr(displacement, "dims", ("displacement",) * values.ndim)
+    if not values.size or len({*dims}) < values.ndim:
+        raise InputError(
+            f"displacement = {parameters.shown(displacement)}: must be a number, a list, or a DataArray, not empty"
+        )
+    target = xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
+    steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
 
     # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
-    plan = plan_sweep(
-        inputs.but({"amplitude": target}), excitation=excitation, model=model, variables=["permanent_displacement"]
-    )
+    swapped = inputs.but({"amplitude": xr.Variable(dims, values)})
+    plan = plan_sweep(swapped, excitation=excitation, model=model, variables=["permanent_displacement"])
     task = plan.tasks[0]
     if maximum_amplitude is None:
-        maximum_amplitude = MAXIMUM_AMPLITUDE_IN_G * task.problem.model.g
-    highest = check_single("maximum_amplitude", maximum_amplitude)
+        maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * task.problem.model.g
+    highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
     arrays = dict(task.inputs)
     arrays["displacement"] = arrays.pop("amplitude")
     blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in (*_SCALES, "displacement")))
     scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
-    coords = {name: variable for name, variable in plan.coords.items() if name != "amplitude"}
-    names = (*LIMIT_RESULTS, *_codes(task.problem), "validity")
+    # in which mode a block slides, or in how many pulses of a record
+    is_wave = isinstance(task.problem.excitation, Waveform)
+    codes = ("sliding_mode",) if is_wave else tuple(variables.RECORD_COUNTS)
+    names = (*variables.LIMIT_RESULTS, *codes, "validity")
     return Plan(
         plan.sizes,
-        coords | {"displacement": xr.Variable(target.dims, target.values, TOLERABLE_DISPLACEMENT)},
+        {name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
         (replace(task, solver=partial(solve, highest, steps), names=names, inputs=arrays),),
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
@@ -128,13 +200,8 @@ def plan_limits(
         memory=plan.memory,
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
-        described=RESULTS | RECORD_COUNTS | LIMIT_RESULTS,
+        described=variables.RESULTS | variables.RECORD_COUNTS | variables.LIMIT_RESULTS,
     )
-
-
-def _codes(problem: Problem) -> tuple[str, ...]:
-    """Results that say in which mode a block slides, or in how many pulses of a record."""
-    return tuple(RECORD_COUNTS) if isinstance(problem.excitation, (Record, Suite)) else ("sliding_mode",)
 
 
 def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
@@ -152,7 +219,9 @@ def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
     """
     results = request.results()
     for where, motion in engine.motions(request):
-        for slab in slabs(motion.shape, max(1, SCANNED // (steps + _most_changes(motion)))):
+        # two thresholds of a pulse, and two sides of each, in addition to the steps
+        changes = 4 * _heights(motion).size
+        for slab in slabs(motion.shape, max(1, limit_scans.SCANNED // (steps + changes))):
             part = motion.part(slab)
             solved = _solve_part(part, maximum_amplitude, steps)
             for name, values in results.items():
@@ -166,37 +235,39 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     """Find the limit amplitudes of a part of a grid that one motion shakes."""
     problem, shape, arrays = request.problem, request.shape, dict(request.arrays)
     displacement = arrays.pop("displacement")
-    amplitudes = _scanned_amplitudes(problem, arrays, maximum_amplitude, steps)
-    hides = limit_scans.UNDER_RECORD if isinstance(problem.excitation, Record) else limit_scans.UNDER_WAVEFORM
+    amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
     # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
     every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
     lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
-    names = tuple({"permanent_displacement", "validity", *(change.result for change in hides.changes)})
-    found = engine.solve(Request(problem, lengths, every, names))
+    seen = {"permanent_displacement", "validity", *(change.result for change in limit_scans.changes_of(problem))}
+    found = engine.solve(Request(problem, lengths, every, tuple(seen)))
 
     def in_rows(values: NDArray[Any]) -> NDArray[Any]:
         return np.broadcast_to(values, (*shape, amplitudes.shape[-1])).reshape(-1, amplitudes.shape[-1])
 
-    own = {name: values.ravel() if values.size == 1 else _cells(values, shape) for name, values in arrays.items()}
-    cells = Cells(problem, own, _cells(displacement, shape))
-    scan = Scan(cells, hides, in_rows(amplitudes), {name: in_rows(values) for name, values in found.items()})
-    at_changes = [limit_scans.steps_at_changes(scan, change) for change in hides.changes]
-    steps_found = limit_scans.first_step(scan), limit_scans.hidden_peaks(scan), *at_changes
-    cell, low, high = limit_scans.lowest_of(*steps_found)
-    low, high = limit_scans.crossings(low, high, lambda at, which: cells.excess(at, cell[which]))
-    wanted = ("permanent_displacement", *_codes(problem), "validity")
-    before, after = cells.solve(low, cell, wanted), cells.solve(high, cell, wanted)
+    def in_cells(values: NDArray[Any]) -> NDArray[Any]:
+        return values.ravel() if values.size == 1 else np.broadcast_to(values, shape).ravel()
+
+    scan = limit_scans.Scan(
+        problem,
+        {name: in_cells(values) for name, values in arrays.items()},
+        np.broadcast_to(displacement, shape).ravel(),
+        in_rows(amplitudes),
+        {name: in_rows(values) for name, values in found.items()},
+    )
+    cell, low, high = limit_scans.limits_of(scan)
+    codes = tuple(name for name in request.wanted if name in variables.RESULT_DTYPES and name != "limit_status")
+    wanted = ("permanent_displacement", *codes)
+    before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
 
     # without a limit the validity at the maximum amplitude says why
-    every_cell = np.arange(cells.targets.size)
-    results = cells.solve(np.full(every_cell.shape, maximum_amplitude), every_cell, ("validity",))
-    results |= {
-        "limit_amplitude": np.full(every_cell.shape, math.nan),
-        "limit_status": np.full(every_cell.shape, LimitStatus.NOT_REACHED, np.int8),
-        "permanent_displacement": np.full(every_cell.shape, math.nan),
-        **{name: np.full(every_cell.shape, SlidingMode.MISSING, RESULT_DTYPES[name]) for name in _codes(problem)},
-    }
-    results["limit_status"][np.isnan(scan.displacement).all(axis=1)] = LimitStatus.INVALID
+    every_cell = np.arange(scan.targets.size)
+    results = Request(problem, every_cell.shape, {}, request.wanted).results()
+    for values in results.values():
+        values[...] = math.nan if values.dtype.kind == "f" else SlidingMode.MISSING
+    results |= scan.solve(np.full(every_cell.shape, maximum_amplitude), every_cell, ("validity",))
+    results["limit_status"][:] = LimitStatus.NOT_REACHED
+    results["limit_status"][np.isnan(scan.found["permanent_displacement"]).all(axis=1)] = LimitStatus.INVALID
     for name in wanted:
         results[name][cell] = after[name]
     results["limit_amplitude"][cell] = high
@@ -204,24 +275,20 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     return {name: values.reshape(shape) for name, values in results.items()}
 
 
-def _cells(values: Floats, shape: tuple[int, ...]) -> Floats:
-    """The value of each cell of a grid, in order."""
-    return np.broadcast_to(values, shape).ravel()
-
-
-def _scanned_amplitudes(problem: Problem, arrays: Mapping[str, Floats], maximum_amplitude: float, steps: int) -> Floats:
+def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> Floats:
     """Amplitudes to try, increasing along the last dimension, with both sides of every change of mode.
 
     The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
     """
-    blocks = {name: values for name, values in arrays.items() if name not in _SCALES}
+    problem = request.problem
+    blocks = {name: one for name, one in request.arrays.items() if name not in (*_SCALES, "displacement")}
     shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, Newmark) else ()
-    wanted = ("yield_acceleration", *limited)
     rest = np.zeros((1,) * len(shape))
-    parameters = engine.friction_parameters(Request(problem, shape, {**blocks, "amplitude": rest}, wanted))
-    known = {name: values.reshape(-1, 1) for name, values in parameters.items()}
+    wanted = ("yield_acceleration", *limited)
+    found = engine.friction_parameters(Request(problem, shape, {**blocks, "amplitude": rest}, wanted))
+    known = {name: values.reshape(-1, 1) for name, values in found.items()}
     yields = known["yield_acceleration"]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
@@ -230,47 +297,31 @@ def _scanned_amplitudes(problem: Problem, arrays: Mapping[str, Floats], maximum_
     amplitudes = start * ratio ** np.linspace(0.0, 1.0, steps + 1)
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
-    if isinstance(problem.excitation, Record):
-        heights = _highest(problem.excitation, float(blocks["polarity"].item())) / problem.excitation.peak
-        thresholds = np.hstack([known[name] for name in wanted])
-    else:
-        heights, thresholds = np.ones(1), np.hstack([known[name] for name in limited] or [start])
-    changes = _mode_changes(thresholds, heights)
+    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
+    thresholds = np.hstack([known[name] for name in wanted])
+    with np.errstate(over="ignore", invalid="ignore"):
+        places = (thresholds[:, :, None] / _heights(request)).reshape(len(thresholds), -1)
+        changes = np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
     scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
     return scanned.reshape(*shape, -1)
 
 
-def _most_changes(request: Request) -> int:
-    """How many amplitudes a scan may have in addition to its steps."""
+def _heights(request: Request) -> Floats:
+    """Heights of the highest pulses of the motion of a request, in parts of its amplitude, increasing."""
     motion = request.problem.excitation
     if not isinstance(motion, Record):
-        return 4
-    # two thresholds of a pulse, and two sides of each
-    return 4 * int(_highest(motion, float(request.arrays["polarity"].item())).size)
-
-
-def _highest(record: Record, polarity: float) -> Floats:
-    """Heights of the highest pulses of a record, increasing."""
-    return np.unique(wave_of_record(record, polarity).height)[-_MOST_PULSES:]
-
-
-def _mode_changes(thresholds: Floats, heights: Floats) -> Floats:
-    """Amplitudes just below and just above those at which a pulse begins to count, or changes its mode.
-
-    A pulse does where its own peak, of these `heights` in parts of the amplitude, passes one of the `thresholds`
-    (columns) of a block (rows): Üy, or Üg,lim of Eq. 7, neither of which depends on the amplitude.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        places = (thresholds[:, :, None] / heights).reshape(len(thresholds), -1)
-        return np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])
+        return np.ones(1)
+    heights = wave_of_record(motion, float(request.arrays["polarity"].item())).height / motion.peak
+    return np.unique(heights)[-_MOST_PULSES:]
 
 
 def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
     """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
     below, above = before["permanent_displacement"], after["permanent_displacement"]
     jumps = above - below > JUMP * above
-    other_mode = np.any([before[name] != after[name] for name in _MODES if name in after], axis=0)
+    modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
+    other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
     status = np.full(above.shape, LimitStatus.REACHED, np.int8)
     status[jumps] = LimitStatus.AT_JUMP
     status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP

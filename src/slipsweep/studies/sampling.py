@@ -1,4 +1,4 @@
-"""How uncertain inputs are sampled: draws by quasi-random numbers of scipy.stats.qmc, and what is allowed of them."""
+"""How uncertain inputs are drawn: distributions of scipy.stats by quasi-random numbers of scipy.stats.qmc, checked."""
 
 import itertools
 import json
@@ -16,17 +16,22 @@ from slipsweep.model.parameters import (
     check_choice,
     check_finite,
     check_list,
+    check_numbers,
     check_values,
     check_whole,
     computed,
     number_text,
     shown,
 )
-from slipsweep.model.units import quantity
-from slipsweep.model.variables import DRAWN
-from slipsweep.studies.distributions import Distribution, distribution_of
+from slipsweep.model.units import conversion, quantity
+from slipsweep.model.variables import DRAWN, PARAMETERS
 
 Floats = NDArray[np.float64]
+
+#: What a caller may give as displacements: m, or with a unit.
+Thresholds = float | str | Sequence[float | str] | np.ndarray
+
+KINDS = ("absolute", "factor", "offset")
 
 METHODS = ("sobol", "latin_hypercube", "random")
 
@@ -39,8 +44,51 @@ MOST_SAMPLES = 2**24
 #: Attributes hold 32 bits.
 _MOST_SEED = 2**31 - 1
 
+#: Distributions that errors name.
+_USUAL = ("norm", "lognorm", "uniform", "triang", "truncnorm", "beta", "gamma", "weibull_min")
+
 #: Half of the last digit of scipy's Sobol numbers, some of which are 0: the quantile there may be infinite.
 _LEAST = 2.0**-31
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """What an uncertain parameter is drawn from.
+
+    Attributes
+    ----------
+    parameter : str
+    kind : {"absolute", "factor", "offset"}
+        Whether a draw is the value, multiplies the grid point's, or is added to it.
+    frozen : object
+        A frozen distribution of scipy.stats, or anything else with a ``ppf``.
+    unit : float
+        What to multiply draws by, to have them in the parameter's own unit.
+    about : dict
+        The distribution in words and numbers, as it was given.
+    """
+
+    parameter: str
+    kind: str
+    frozen: Any
+    unit: float
+    about: dict[str, Any]
+
+    def __str__(self) -> str:
+        numbers = [f"{name}={value}" for name, value in self.about.items() if name not in ("distribution", "kind")]
+        return f"{self.about['distribution']}({', '.join(numbers)})"
+
+    def draws(self, uniform: Floats) -> Floats:
+        """Turn numbers from 0 to 1 into draws, in the parameter's own unit."""
+        with np.errstate(all="ignore"):  # what is not finite is refused by `_check_draws`
+            return np.asarray(self.frozen.ppf(uniform), np.float64) * self.unit
+
+    def applied(self, base: Any, draws: Any) -> Any:
+        """The parameter's values: draws, or draws with the values they are relative to."""
+        if self.kind == "absolute":
+            return draws
+        with np.errstate(over="ignore"):
+            return base * draws if self.kind == "factor" else base + draws
 
 
 @dataclass(frozen=True)
@@ -98,15 +146,11 @@ class Sampling:
         """Runs that the Sobol indices of a grid point take; 0 where none are wanted."""
         return self.samples * (len(self.independent) + 2) if self.sensitivity else 0
 
-    def draws(self) -> dict[str, Floats]:
-        """Draw all parameters: arrays of `samples`, the same ones each time."""
-        return self._draws(self._uniform(len(self.distributions)))
-
-    def two_draws(self) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        """Draw all parameters twice: two sets as `draws` that are independent of each other."""
+    def draws(self, sets: int = 1) -> list[dict[str, Floats]]:
+        """Draw all parameters, in sets that are independent of each other: arrays of `samples`, the same each time."""
         number = len(self.distributions)
-        uniform = self._uniform(2 * number)
-        return self._draws(uniform[:number]), self._draws(uniform[number:])
+        uniform = self._uniform(sets * number)
+        return [self._draws(uniform[at * number : (at + 1) * number]) for at in range(sets)]
 
     def _uniform(self, dimensions: int) -> Floats:
         """Numbers from 0 to 1 that fill a cube of so many dimensions: (dimension, sample)."""
@@ -131,6 +175,7 @@ class Sampling:
         return {name: one.draws(row) for (name, one), row in zip(self.distributions.items(), uniform, strict=True)}
 
     def _matrix(self) -> Floats:
+        """Correlations of all parameters."""
         names = list(self.distributions)
         matrix = np.eye(len(names))
         for first, second, value in self.correlation:
@@ -207,19 +252,12 @@ def check_sampling(
         raise InputError(
             f"{keys or 'uncertain'}: must give the distribution of one parameter at least: {', '.join(DRAWN)}"
         )
-    for name in uncertain:
+    named = {name: f"{keys or 'uncertain.'}{name}" for name in uncertain}
+    for name, key in named.items():
         if name not in DRAWN:
-            raise InputError(f"{keys or 'uncertain.'}{name}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
+            raise InputError(f"{key}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
     # in one order, whatever that of the caller: the draws are then the same
-    distributions = {
-        name: distribution_of(f"{keys or 'uncertain.'}{name}", name, uncertain[name], g)
-        for name in DRAWN
-        if name in uncertain
-    }
-    for other in ("displacement_amplitude", "scale"):
-        if {"amplitude", other} <= distributions.keys():
-            raise InputError(f"{keys or 'uncertain.'}{other}: not allowed with amplitude")
-
+    drawn = {name: distribution_of(named[name], name, uncertain[name], g) for name in DRAWN if name in uncertain}
     method = check_choice(f"{keys}method", method, METHODS)
     samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
     if method == "sobol" and samples & (samples - 1):
@@ -228,27 +266,100 @@ def check_sampling(
             f'{keys}samples = {samples}: must be a power of 2 with method = "sobol", such as {below} or {2 * below}; '
             "latin_hypercube takes any number"
         )
-    wanted = check_quantiles(f"{keys}quantiles", quantiles)
-    limits = check_thresholds(f"{keys}thresholds", thresholds, g)
-    pairs = _pairs(f"{keys}correlation", correlation, distributions)
     if not isinstance(sensitivity, (bool, np.bool_)):
         raise InputError(f"{keys}sensitivity = {shown(sensitivity)}: must be true or false")
-    seed = check_whole(f"{keys}seed", seed, 0, _MOST_SEED)
-    dims = [over] if isinstance(over, str) else check_list(f"{keys}over", over, "dimensions")
-    if not all(isinstance(dim, str) for dim in dims):
-        raise InputError(f"{keys}over = {shown(over)}: must be names of dimensions")
-    pooled = tuple(dict.fromkeys(dims))
+    pooled = [over] if isinstance(over, str) else check_list(f"{keys}over", over, "dimensions")
     if pooled and sensitivity:
         raise InputError(f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only")
-    sampling = Sampling(distributions, samples, method, seed, wanted, limits, pairs, bool(sensitivity), pooled, keys)
-    if pairs and np.linalg.eigvalsh(sampling._matrix()).min() < 1e-12:
-        raise InputError(f"{keys}correlation = {list(pairs)}: no such correlations exist together (not positive)")
+    sampling = Sampling(
+        distributions=drawn,
+        samples=samples,
+        method=method,
+        seed=check_whole(f"{keys}seed", seed, 0, _MOST_SEED),
+        quantiles=check_quantiles(f"{keys}quantiles", quantiles),
+        thresholds=check_thresholds(f"{keys}thresholds", thresholds, g),
+        correlation=_pairs(f"{keys}correlation", correlation, drawn),
+        sensitivity=bool(sensitivity),
+        over=tuple(map(str, pooled)),
+        keys=keys,
+    )
+    if sampling.correlation and np.linalg.eigvalsh(sampling._matrix()).min() < 1e-12:
+        raise InputError(f"{keys}correlation: no such correlations exist together (their matrix is not positive)")
     if sampling.sensitivity_runs > MOST_SAMPLES:
         raise InputError(
             f"{keys}samples = {samples}: Sobol indices take {sampling.sensitivity_runs} runs a grid point with these; "
             f"must be {MOST_SAMPLES} at most"
         )
     return sampling
+
+
+def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribution:
+    """One entry of `uncertain`, called `key` in errors."""
+    entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
+    if "distribution" not in entries:
+        raise InputError(f"{key}.distribution: missing: the name of a continuous distribution of scipy.stats")
+    chosen = entries.pop("distribution")
+    kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
+    units = entries.pop("units", None)
+    if units is not None and (kind == "factor" or not isinstance(units, str)):
+        raise InputError(
+            f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to "
+            f"{PARAMETERS[parameter]['units']}"
+        )
+    if isinstance(chosen, str):
+        frozen = _frozen(key, chosen, entries)
+    elif callable(getattr(chosen, "ppf", None)) and not entries:
+        frozen = chosen
+    else:
+        raise InputError(
+            f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, with its "
+            "parameters, or a frozen one without"
+        )
+    about = _described(frozen)
+    with np.errstate(all="ignore"):
+        median = check_numbers(f"{key}: its median", frozen.ppf(0.5))
+    if median.ndim or not np.isfinite(median):
+        raise InputError(f"{key}: parameters that scipy.stats does not allow for one distribution: {about}")
+    factor = conversion(f"{key}.units", PARAMETERS[parameter]["units"], units, g)
+    return Distribution(
+        parameter, kind, frozen, factor, {**about, **({"units": units} if units is not None else {}), "kind": kind}
+    )
+
+
+def _frozen(key: str, name: str, given: Mapping[str, Any]) -> Any:
+    """A distribution of scipy.stats with its parameters."""
+    from scipy import stats
+
+    family = getattr(stats, name, None)
+    if not isinstance(family, stats.rv_continuous):
+        known = [one for one in dir(stats) if isinstance(getattr(stats, one), stats.rv_continuous)]
+        hint = did_you_mean(name, known)
+        if hint.startswith("known here"):
+            hint = f"it must be a continuous one of scipy.stats, such as {', '.join(_USUAL)}"
+        raise InputError(f'{key}.distribution = "{name}": no such distribution; {hint}')
+    shapes = _shapes(family)
+    for parameter in given:
+        if parameter not in (*shapes, "loc", "scale"):
+            allowed = ("distribution", "kind", "units", *shapes, "loc", "scale")
+            raise InputError(f"{key}.{parameter}: unknown key; {did_you_mean(str(parameter), allowed)}")
+    for shape in shapes:
+        if shape not in given:
+            raise InputError(f"{key}.{shape}: missing: {name} needs {', '.join(shapes)}")
+    return family(**{parameter: check_finite(f"{key}.{parameter}", value) for parameter, value in given.items()})
+
+
+def _shapes(family: Any) -> list[str]:
+    """Names of a distribution's shape parameters."""
+    return [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
+
+
+def _described(frozen: Any) -> dict[str, Any]:
+    """A frozen distribution in words and numbers."""
+    family = getattr(frozen, "dist", None)
+    if family is None:
+        return {"distribution": repr(frozen)}
+    numbers = dict(zip((*_shapes(family), "loc", "scale"), frozen.args, strict=False)) | frozen.kwds
+    return {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}
 
 
 def check_quantiles(key: str, given: Any) -> Floats:
@@ -268,32 +379,28 @@ def _increasing(key: str, given: Any, bound: str) -> Floats:
     values = np.atleast_1d(check_values(bound, given, key))
     if values.ndim > 1 or not values.size:
         raise InputError(f"{key} = {shown(given)}: must be a list of one number or more")
-    for before, after in itertools.pairwise(values):
+    for before, after in itertools.pairwise(map(float, values)):
         if after <= before:
-            raise InputError(
-                f"{key}: {number_text(float(after))} after {number_text(float(before))}: they must increase"
-            )
+            raise InputError(f"{key}: {number_text(after)} after {number_text(before)}: they must increase")
     return values
 
 
 def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tuple[str, str, float], ...]:
     """Correlations: pairs of drawn parameters with a number between -1 and 1."""
     pairs: dict[frozenset[str], tuple[str, str, float]] = {}
-    for entry in () if given is None else check_list(key, given, '["NAME", "OTHER", NUMBER]'):
-        try:
-            first, second, value = check_list(key, entry, "names and a number")
-            value = check_finite(key, value)
-        except ValueError:  # as InputError is
-            raise InputError(f'{key} = {shown(entry)}: must be ["NAME", "OTHER", NUMBER]') from None
-        for name in (first, second):
+    for entry in check_list(key, given, '["NAME", "OTHER", NUMBER]'):
+        one = check_list(key, entry, "two names and a number")
+        if len(one) != 3:
+            raise InputError(f'{key} = {shown(entry)}: must be ["NAME", "OTHER", NUMBER]')
+        for name in one[:2]:
             if not isinstance(name, str) or name not in known:
                 raise InputError(f"{key}: {shown(name)} is not drawn; {did_you_mean(str(name), tuple(known))}")
-        pair = frozenset((first, second))
-        if first == second or pair in pairs:
+        first, second, value = *map(str, one[:2]), check_finite(key, one[2])
+        if first == second or frozenset((first, second)) in pairs:
             raise InputError(f"{key}: {first}, {second}: must be two different parameters, and each pair once")
         if not -1.0 < value < 1.0:
             raise InputError(f"{key}: {first}, {second} = {number_text(value)}: must be between -1 and 1")
-        pairs[pair] = (str(first), str(second), value)
+        pairs[frozenset((first, second))] = first, second, value
     return tuple(pairs.values())
 
 
@@ -302,24 +409,16 @@ def check_draws(
 ) -> None:
     """Refuse draws of some parameters that no physics allows, anywhere on the grid."""
     for name in names:
-        one = sampling.distributions[name]
-        if one.kind == "absolute":
-            bases: list[float | None] = [None]
-        elif name in coords:
+        one, bound = sampling.distributions[name], BOUNDS[name]
+        # each draw's value is monotone in what it is applied to: the ends of the axis are its extremes.  A factor on an
+        # estimate is checked by itself: the failure of the estimate is a flag of the result
+        bases = [1.0 if one.kind == "factor" else 0.0]
+        if name in coords:
             bases = [float(coords[name].values.min()), float(coords[name].values.max())]
-        elif one.kind == "factor":
-            bases = [1.0]  # on an estimate, whose own failure is a flag of the result
-        else:
-            bases = [0.0]
-        bound = BOUNDS[name]
-        # each draw's value is monotone in what it is applied to: the ends of the axis are its extremes
-        outside = [float(np.mean(~bound.holds(one.applied(base, draws[name])))) for base in bases]
-        if not any(outside):
-            continue
-        worst = int(np.argmax(outside))
-        base = bases[worst]
-        about = f" as {one.kind} on {name} = {base:.6g}" if base is not None and name in coords else ""
-        raise InputError(
-            f"{sampling.key(name)} = {one}{about}: {outside[worst]:.2%} of the draws are not {bound.text}: "
-            "take a distribution that has none there, such as lognorm, or truncate it (truncnorm)"
-        )
+        outside, base = max((float(np.mean(~bound.holds(one.applied(at, draws[name])))), at) for at in bases)
+        if outside:
+            about = f" as {one.kind} on {name} = {base:.6g}" if name in coords else ""
+            raise InputError(
+                f"{sampling.key(name)} = {one}{about}: {outside:.2%} of the draws are not {bound.text}: "
+                "take a distribution that has none there, such as lognorm, or truncate it (truncnorm)"
+            )

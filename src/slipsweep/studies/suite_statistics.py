@@ -1,7 +1,8 @@
 """Statistics of the displacement over the motions of a suite, at every other grid point."""
 
 import itertools
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
 from slipsweep.model.parameters import check_list, shown
 from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
-from slipsweep.studies.sampling import check_quantiles, check_thresholds
+from slipsweep.studies.sampling import Thresholds, check_quantiles, check_thresholds
 
 TITLE = "Statistics of the permanent displacement over a suite of motions"
 
@@ -28,7 +29,7 @@ QUANTILES = (0.16, 0.5, 0.84)
 def suite_statistics(
     result: xr.Dataset,
     *,
-    thresholds: float | str | Sequence[float | str] | np.ndarray = (0.01, 0.1, 1.0),
+    thresholds: Thresholds = (0.01, 0.1, 1.0),
     quantiles: float | Sequence[float] | np.ndarray = QUANTILES,
     zero: float | str = 0.0,
     over: str | Sequence[str] | None = None,
@@ -208,8 +209,8 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
     )
 
 
-def suite_summary(result: xr.Dataset, displacement: Any = None) -> xr.Dataset:
-    """Statistics of a suite that a designer asks first: median, 16 and 84 %, share of zeros, P(u > d).
+def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
+    """What a designer asks first of a suite, a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
 
     Parameters
     ----------
@@ -217,12 +218,8 @@ def suite_summary(result: xr.Dataset, displacement: Any = None) -> xr.Dataset:
         A result of `sweep` with the dimension `motion`.
     displacement : float, str or list of these, optional
         Displacements d, m or with a unit.
-
-    Returns
-    -------
-    Dataset
-        `displacement_quantile`, `zero_probability`, `valueless_share` and, with `displacement`,
-        `exceedance_probability`, as `slipsweep.suite_statistics`.
+    most : int
+        Of more grid points there is one line, that says how to have those of some.
 
     Examples
     --------
@@ -235,61 +232,48 @@ def suite_summary(result: xr.Dataset, displacement: Any = None) -> xr.Dataset:
      0.4077  8.7   18.8     71.5 0.0%        25.0%
      0.6116 89.3    188 1.34e+03 0.0%        75.0%
     """
-    found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
-    names = ["displacement_quantile", "zero_probability", "valueless_share"]
-    return found[[*names, *([] if displacement is None else ["exceedance_probability"])]]
-
-
-def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
-    """Lines of text of `suite_summary`, a line for each grid point; parameters as `suite_summary`.
-
-    Of more than `most` points one line that says how to have those of some.
-    """
     import pandas as pd
 
     moved = result["permanent_displacement"]
     dims = suite_dims(moved)
-    grid = {str(dim): size for dim, size in moved.sizes.items() if dim not in dims}
-    points = int(np.prod([*grid.values()]))
+    grid = {dim: size for dim, size in moved.sizes.items() if dim not in dims}
+    points = math.prod(grid.values())
     suite = grid_text({dim: moved.sizes[dim] for dim in dims})
     if points > most:
         how = "slipsweep info OUT.nc --at NAME=VALUE -d 50mm"
         return [f"statistics over {suite} at {points} grid points: {how} prints those of some"]
-    found = suite_summary(result, displacement)
-    g = float(result.attrs.get("g", np.nan))
-    columns: dict[str, Any] = {}
-    for dim, labels in zip(grid, zip(*_labels_of_points(found, grid, g), strict=True), strict=False):
-        if grid[dim] > 1:
-            columns[_column_title(found, dim)] = labels
-    rows = {name: values.values.reshape(points, -1) for name, values in found.data_vars.items()}
-    for title, column in zip(("16 %", "median", "84 %"), rows["displacement_quantile"].T, strict=True):
+    found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    columns: dict[str, Sequence[str]] = {}
+    labels = pd.MultiIndex.from_product([_labels_of(found, dim) for dim in grid]) if grid else None
+    for at, (dim, size) in enumerate(grid.items()):
+        if size > 1 and labels is not None:
+            columns[_title_of(found, dim)] = labels.get_level_values(at).tolist()
+    rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
+    for title, column in zip(("16 %", "median", "84 %"), rows["displacement_quantile"], strict=True):
         columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
-    columns["zero"] = [_share(one) for one in rows["zero_probability"][:, 0]]
-    if "exceedance_probability" in rows:
-        for d, column in zip(found["threshold"].values, rows["exceedance_probability"].T, strict=True):
-            columns[f"P(u > {d * 1000.0:.6g} mm)"] = [_share(one) for one in column]
+    shares = {"zero": rows["zero_probability"][0]}
+    if displacement is not None:
+        titles = [f"P(u > {d * 1000.0:.6g} mm)" for d in found["threshold"].values]
+        shares |= dict(zip(titles, rows["exceedance_probability"], strict=True))
     if (rows["valueless_share"] > 0.0).any():
-        columns["no value"] = [_share(one) for one in rows["valueless_share"][:, 0]]
+        shares["no value"] = rows["valueless_share"][0]
+    columns |= {
+        title: ["none" if np.isnan(one) else f"{one:.1%}" for one in column] for title, column in shares.items()
+    }
     table = pd.DataFrame(columns).to_string(index=False).splitlines()
     return [f"permanent displacement (mm) over {suite}:", *table]
 
 
-def _share(value: float) -> str:
-    return "none" if np.isnan(value) else f"{value:.1%}"
-
-
-def _column_title(data: xr.Dataset, dim: str) -> str:
+def _title_of(data: xr.Dataset, dim: Hashable) -> str:
     """A dimension as the title of a column."""
-    if dim in ("amplitude", "yield_coefficient"):
-        return {"amplitude": "PGA (g)", "yield_coefficient": "ky"}[dim]
-    units = str(data[dim].attrs.get("units", "1")) if dim in data.variables else "1"
-    return dim if units == "1" else f"{dim} ({units})"
+    units = data[dim].attrs.get("units", "1") if dim in data.variables else "1"
+    titles = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
+    return titles.get(str(dim), str(dim) if units == "1" else f"{dim} ({units})")
 
 
-def _labels_of_points(data: xr.Dataset, sizes: Mapping[str, int], g: float) -> Iterator[tuple[str, ...]]:
-    """Labels of each point of a grid along all its dimensions; peak ground accelerations in g."""
-    factors = {"amplitude": 1.0 / g}
-    yield from itertools.product(*(labels_along(data, dim, factors.get(dim, 1.0)) for dim in sizes))
+def _labels_of(data: xr.Dataset, dim: Hashable) -> list[str]:
+    """The places along a dimension; peak ground accelerations in g."""
+    return labels_along(data, dim, 1.0 / float(data.attrs.get("g", np.nan)) if dim == "amplitude" else 1.0)
 
 
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:
