@@ -116,7 +116,7 @@ def record(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     own = {name: value for name, value in cell.items() if name not in ("amplitude", "frequency")}
     values = np.array([0.0, 1.0, -0.7, 0.4, 0.9, -1.0, 0.0])
     peak = max(cell["amplitude"], 1e-30)
-    times = np.arange(values.size) / cell["frequency"]
+    times = np.arange(values.size) / max(cell["frequency"], 1e-29)
     options: dict[str, Any] = {"rise": rng.choice(["monotone", "literal"]), "scale": rng.choice([1.0, wide(rng)])}
     motion = slipsweep.Record(times, peak * values)
     return slipsweep.sweep(**choices(**own, **options, excitation=motion, time_scale=rng.choice([1.0, wide(rng)])))

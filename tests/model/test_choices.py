@@ -124,7 +124,7 @@ def test_wrong_options_in_sweep_files_are_named(table: str, message: str) -> Non
     [
         ("--model newmark --rise literal", "--rise: not allowed with --model = 'newmark', only with 'mendez'"),
         ("--ramp-in 101", "--ramp-in = 101: must be 0 to 100"),
-        ("--waveform harmonics --amplitudes 1,x --multiples 1,3", "--amplitudes x: must be numbers"),
+        ("--waveform harmonics --amplitudes 1,x --multiples 1,3", "--amplitudes 1,x: must be numbers"),
     ],
 )
 def test_wrong_options_of_commands_are_named(options: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
