@@ -6,7 +6,7 @@ one line, never a traceback.  What a command needs is imported inside it, so tha
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from slipsweep._version import __version__
 from slipsweep.cli import calibrate, chart, example, explore, export, hazard, info, limit, run, simulate
-from slipsweep.cli.common import printable
+from slipsweep.cli.common import app, printable
 from slipsweep.errors import InputError, RunError
 
 
@@ -40,20 +40,13 @@ class _Commands(TyperGroup):
             raise _failed(error, 1) from None
 
 
-app = typer.Typer(
-    cls=_Commands,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    pretty_exceptions_enable=False,
-)
-
-
 def _show_version(requested: bool) -> None:
     if requested:
         typer.echo(f"slipsweep {__version__}")
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(cls=_Commands)
 def _options(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
@@ -62,28 +55,9 @@ def _options(
     """Permanent displacement of a rigid block on a shaken inclined base, over grids of parameters."""
 
 
-#: Commands by task: what they are called with, and their examples.
-_COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
-    "Start": [(example.example, example.EXAMPLE)],
-    "Compute": [
-        (run.run, run.EXAMPLE),
-        (simulate.simulate, simulate.EXAMPLE),
-        (limit.limit, limit.EXAMPLE),
-        (hazard.hazard, hazard.EXAMPLE),
-    ],
-    "Draw": [(chart.chart, chart.EXAMPLE), (chart.report, chart.REPORT_EXAMPLE), (explore.explore, explore.EXAMPLE)],
-    "Read results": [
-        (info.info, info.EXAMPLE),
-        (export.export, export.EXAMPLE),
-    ],
-    "Tests on a shaking table": [
-        (calibrate.friction, calibrate.FRICTION_EXAMPLE),
-        (calibrate.calibrate, calibrate.EXAMPLE),
-    ],
-}
-for _task, _commands in _COMMANDS.items():
-    for _command, _example in _commands:
-        app.command(rich_help_panel=_task, epilog=_example)(_command)
+#: Modules of the commands, in the order of the help.
+_MODULES = [one.__name__ for one in (example, run, simulate, limit, hazard, chart, explore, info, export, calibrate)]
+app.registered_commands.sort(key=lambda one: _MODULES.index(one.callback.__module__ if one.callback else ""))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,24 +1,14 @@
 """`slipsweep friction` and `slipsweep calibrate`: what a test on a shaking table measured."""
 
+import itertools
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import (
-    BLOCK,
-    FIGURES,
-    OUTPUT,
-    MuS,
-    Overwrite,
-    Panel,
-    Quiet,
-    Theta,
-    check_outputs,
-    examples,
-    netcdf_writer,
-    write_outputs,
-)
+from slipsweep.cli import common
+from slipsweep.cli.common import BLOCK, FIGURES, Overwrite, Panel, Quiet, command, echo, written
 from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
@@ -26,17 +16,6 @@ from slipsweep.model.units import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
-
-FRICTION_EXAMPLE = examples(
-    "slipsweep friction test.csv --theta 5 --mu-s 0.38",
-    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --rest 0:0.5 --drift all -o friction.png",
-)
-
-EXAMPLE = examples(
-    "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
-    "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
-)
 
 #: The group of options that say what of the measurement is used, and how.
 TEST = Panel("Measurement")
@@ -63,12 +42,32 @@ Drift = Annotated[
     list[str] | None, TEST("Channel whose sensor drifts linearly, or all; may be repeated.", metavar="CHANNEL")
 ]
 
+#: Slides as a table: results, what stands above, and its width.
+_SLIDES = {
+    "slide_onset": ("onset", 9),
+    "slide_peak": ("peak", 9),
+    "slide_stop": ("stop", 9),
+    "onset_acceleration": ("table at onset", 16),
+    "peak_block_acceleration": ("block at most", 15),
+    "least_friction": ("least of Eq. 1", 16),
+    "slide_free_body_friction": ("by statics", 12),
+}
 
+#: Parameters that a calibration finds, and those of a cycle.
+_FOUND = ("yield_acceleration", "decay_rate", "delta_mu")
+_OF_CYCLES = (*_FOUND, "attenuation_coefficient")
+
+
+@command(
+    "Tests on a shaking table",
+    "slipsweep friction test.csv --theta 5 --mu-s 0.38",
+    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --rest 0:0.5 --drift all -o friction.png",
+)
 def friction(
     *,
     test: Test,
-    theta: Theta,
-    mu_s: MuS,
+    theta: common.Theta,
+    mu_s: common.MuS,
     g: Annotated[float, BLOCK("Gravity, m/s².")] = 9.81,
     offset: Offset = None,
     drift: Drift = None,
@@ -76,110 +75,72 @@ def friction(
     threshold: Annotated[
         str | None, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", metavar="VALUE")
     ] = None,
-    output: Annotated[
-        list[Path] | None, OUTPUT("Write .nc, .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE")
-    ] = None,
+    output: Annotated[list[Path] | None, written("Write .nc, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
     angle = quantity("--theta", theta, "degree", g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
-    paths = check_outputs(output, (".nc", *FIGURES), overwrite, [test])
+    paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
 
-    table = measured_friction(
-        test,
-        angle,
-        mu_s,
-        g=g,
-        offset=_channels(offset),
-        drift=_channels(drift),
-        rest=None if rest is None else _times(rest),
-        threshold=least,
-    )
-
-    def figure() -> "Figure":
-        from slipsweep.charts.kinds import figure_of
-
-        return figure_of(table)
-
-    write_outputs(paths, overwrite, figure, {".nc": netcdf_writer(table, table.attrs["title"])})
+    span, offsets, drifts = None if rest is None else _times(rest), _channels(offset), _channels(drift)
+    table = measured_friction(test, angle, mu_s, g=g, offset=offsets, drift=drifts, rest=span, threshold=least)
+    attrs = table.attrs
+    writers = {".nc": lambda path: common.write_netcdf(table, path, attrs["title"])}
+    common.write_outputs(paths, overwrite, lambda: common.figure_of(table), writers)
     if quiet:
         return
-    if table.attrs["constant_friction"]:
-        typer.echo(table.attrs["constant_friction"])
-    typer.echo(f"threshold  {table.attrs['threshold']:.4g} m/s2: {table.attrs['threshold_from']}")
-    typer.echo(f"removed    {table.attrs['removed']}")
+    if attrs["constant_friction"]:
+        echo(attrs["constant_friction"])
+    echo(f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}", f"removed    {attrs['removed']}")
     _echo_coefficients(table)
-    columns = {
-        "slide_onset": ("onset", 9),
-        "slide_peak": ("peak", 9),
-        "slide_stop": ("stop", 9),
-        "onset_acceleration": ("table at onset", 16),
-        "peak_block_acceleration": ("block at most", 15),
-        "least_friction": ("least of Eq. 1", 16),
-        "slide_free_body_friction": ("by statics", 12),
-    }
-    typer.echo(f"{table.sizes['slide']} slides" + (", s and m/s2:" if table.sizes["slide"] else ""))
     if table.sizes["slide"]:
-        typer.echo("".join(f"{text:>{width}}" for text, width in columns.values()))
-    for row in zip(*(table[name].values for name in columns), strict=True):
-        typer.echo("".join(f"{value:{width}.4g}" for value, (_, width) in zip(row, columns.values(), strict=True)))
-    for path in paths:
-        typer.echo(path)
+        echo(f"{table.sizes['slide']} slides, s and m/s2:", "".join(f"{text:>{n}}" for text, n in _SLIDES.values()))
+    else:
+        echo("0 slides")
+    for row in zip(*(table[name].values for name in _SLIDES), strict=True):
+        echo("".join(f"{value:{width}.4g}" for value, (_, width) in zip(row, _SLIDES.values(), strict=True)))
+    echo(*paths)
 
 
+@command(
+    "Tests on a shaking table",
+    "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
+    "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
+)
 @chooses(model=MODELS)
 def calibrate(
     *,
     tests: Tests,
-    theta: Theta,
-    mu_s: MuS,
+    theta: common.Theta,
+    mu_s: common.MuS,
     offset: Offset = None,
     drift: Drift = None,
     cycles: Annotated[bool, TEST("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
-    output: Annotated[
-        list[Path] | None,
-        OUTPUT("Write .nc, .toml, .png, .svg or .pdf; may be repeated.", "--output", "-o", metavar="FILE"),
-    ] = None,
+    output: Annotated[list[Path] | None, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: Overwrite = False,
     model: Model,
     quiet: Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     angle = quantity("--theta", theta, "degree", model.g)
-    paths = check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
+    paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
-    table = calibrated(
-        tests,
-        angle,
-        mu_s,
-        model=model,
-        offset=_channels(offset),
-        drift=_channels(drift),
-        cycles=cycles,
-    )
+    offsets, drifts = _channels(offset), _channels(drift)
+    table = calibrated(tests, angle, mu_s, model=model, offset=offsets, drift=drifts, cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
-
-    def figure() -> "Figure":
-        from slipsweep.charts.kinds import figure_of
-
-        return figure_of(table)
-
     writers = {
-        ".nc": netcdf_writer(table, table.attrs["title"]),
+        ".nc": lambda path: common.write_netcdf(table, path, table.attrs["title"]),
         ".toml": lambda path: path.write_text(text, encoding="utf-8"),
     }
-    write_outputs(paths, overwrite, figure, writers)
-    if quiet:
-        return
-    _summarize(table)
-    typer.echo(f"\n{text}")
-    for path in paths:
-        typer.echo(path)
+    common.write_outputs(paths, overwrite, lambda: common.figure_of(table), writers)
+    if not quiet:
+        _summarize(table)
+        echo("", text, *paths)
 
 
 def _channels(given: list[str] | None) -> str | list[str]:
@@ -200,54 +161,47 @@ def _echo_coefficients(table: "xr.Dataset") -> None:
         if f"{kind}_friction" in table and table[f"{kind}_friction"].notnull():
             low, high = table[f"{kind}_friction_interval"].values
             value = table[f"{kind}_friction"].item()
-            typer.echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
+            echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
 
 
 def _summarize(table: "xr.Dataset") -> None:
-    import numpy as np
-
     constant = table.attrs["constant_friction"]
     if constant:
-        typer.echo(constant)
+        echo(constant)
     _echo_coefficients(table)
-    typer.echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
-    for name in ("yield_acceleration", "decay_rate", "delta_mu"):
+    echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
+    for name in _FOUND:
         low, high = table[f"{name}_interval"].values
         unit = " m/s2" if name == "yield_acceleration" else ""
-        interval = f"{low:.4g} to {high:.4g}{unit}" if np.isfinite(high) else f"{low:.4g}{unit} or more"
+        interval = f"{low:.4g} to {high:.4g}{unit}" if math.isfinite(high) else f"{low:.4g}{unit} or more"
         error = table[f"{name}_error"].item()
-        value = f"{table[name].item():>10.4g}{error:>10.2g}" if np.isfinite(error) else f"{'not determined':>20}"
-        typer.echo(f"{name:<24}{value}   {interval}")
-    matrix = table["correlation"].values
-    typer.echo("correlation")
-    for text, i, j in (
-        ("yield_acceleration, decay_rate", 0, 1),
-        ("yield_acceleration, delta_mu", 0, 2),
-        ("decay_rate, delta_mu", 1, 2),
-    ):
-        typer.echo(f"  {text:<32}" + (f"{matrix[i, j]:7.3f}" if np.isfinite(matrix[i, j]) else "      -"))
-    typer.echo("misfit, root mean square, and in parts of the largest value")
+        value = f"{table[name].item():>10.4g}{error:>10.2g}" if math.isfinite(error) else f"{'not determined':>20}"
+        echo(f"{name:<24}{value}   {interval}")
+    echo("correlation")
+    for (i, one), (j, other) in itertools.combinations(enumerate(_FOUND), 2):
+        echo(f"  {f'{one}, {other}':<32}{_number(table['correlation'].values[i, j], '.3f'):>7}")
+    echo("misfit, root mean square, and in parts of the largest value")
     for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
         if f"misfit_{name}" in table:
-            unit = table[f"misfit_{name}"].attrs["units"]
-            misfits, shares = (np.atleast_1d(table[f"{kind}misfit_{name}"].values) for kind in ("", "relative_"))
-            text = ", ".join(f"{misfit:.2g} {unit}  {share:.1%}" for misfit, share in zip(misfits, shares, strict=True))
-            typer.echo(f"  {name:<32}{text}")
-    typer.echo(f"removed: {table.attrs['removed']}")
+            misfits, shares = (table[f"{kind}misfit_{name}"] for kind in ("", "relative_"))
+            pairs = zip(misfits.values.flat, shares.values.flat, strict=True)
+            parts = (f"{misfit:.2g} {misfits.attrs['units']}  {share:.1%}" for misfit, share in pairs)
+            echo(f"  {name:<32}{', '.join(parts)}")
+    echo(f"removed: {table.attrs['removed']}")
     if "cycle_start" in table:
-        for part in [table] if "test" not in table.dims else [table.isel(test=i) for i in range(table.sizes["test"])]:
-            _echo_cycles(part)
-    for finding in table.attrs["findings"].splitlines():
-        if finding != constant:
-            typer.echo(f"note: {finding}")
+        for number in range(table.sizes.get("test", 1)):
+            _echo_cycles(table.isel(test=number, missing_dims="ignore"))
+    echo(*(f"note: {finding}" for finding in table.attrs["findings"].splitlines() if finding != constant))
 
 
 def _echo_cycles(table: "xr.Dataset") -> None:
-    import numpy as np
+    echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
+    columns = [table[f"cycle_{name}"].values for name in _OF_CYCLES]
+    for number, start in enumerate(table["cycle_start"].values):
+        if math.isfinite(start):
+            cells = (_number(column[number], ".3g") for column in columns)
+            echo("{:5d} {:10.4g} {:>12} {:>7} {:>7} {:>7}".format(number + 1, start, *cells))
 
-    typer.echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
-    names = ("start", "yield_acceleration", "decay_rate", "delta_mu", "attenuation_coefficient")
-    for number, (start, *values) in enumerate(zip(*(table[f"cycle_{name}"].values for name in names), strict=True), 1):
-        if np.isfinite(start):
-            cells = [f"{value:.3g}" if np.isfinite(value) else "-" for value in values]
-            typer.echo(f"{number:5d} {start:10.4g} {cells[0]:>12} {cells[1]:>7} {cells[2]:>7} {cells[3]:>7}")
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "-"

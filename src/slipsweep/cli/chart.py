@@ -6,19 +6,15 @@ from typing import Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import FIGURES, OUTPUT, Overwrite, Panel, check_ending, cuts, examples, write_outputs
+from slipsweep.cli import common
+from slipsweep.cli.common import FIGURES, Overwrite, Panel, command, cuts, echo, written
 from slipsweep.errors import InputError
 
 #: Groups of options.
 CHART, AXES, LOOK = Panel("Chart"), Panel("Axes"), Panel("Look")
 
-EXAMPLE = examples("slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf")
 
-REPORT_EXAMPLE = examples(
-    "slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite"
-)
-
-
+@command("Draw", "slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf")
 def chart(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help='A result of "slipsweep run".')],
     kind: Annotated[
@@ -55,19 +51,14 @@ def chart(
     grey: Annotated[bool, LOOK("Draw without colour.", "--grey")] = False,
     output: Annotated[
         list[Path] | None,
-        OUTPUT(
-            "Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf.",
-            "--output",
-            "-o",
-            metavar="FILE",
-        ),
+        written("Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf."),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Draw design charts of a result."""
     given = output or []
     for path in given:
-        check_ending(path, FIGURES)
+        common.check_ending(path, FIGURES)
 
     from slipsweep.charts import book, kinds
     from slipsweep.charts.slices import Result
@@ -94,23 +85,20 @@ def chart(
         for path in given if together else ():
             with outputs.complete_or_absent(path, overwrite) as temporary:
                 book.write(temporary, result, figures.values())
-            typer.echo(path)
+            echo(path)
     for name in () if together else figures:
-        write_outputs(wanted[name], overwrite, functools.partial(figures.__getitem__, name))
-        for path in wanted[name]:
-            typer.echo(path)
-    for name, reason in left_out.items():
-        typer.echo(f"no {name}: {reason}")
+        common.write_outputs(wanted[name], overwrite, functools.partial(figures.__getitem__, name))
+        echo(*wanted[name])
+    echo(*(f"no {name}: {reason}" for name, reason in left_out.items()))
 
 
+@command("Draw", "slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite")
 def report(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help='A result of "slipsweep run".')],
-    output: Annotated[
-        Path | None, OUTPUT("PDF to write (default: OUT.pdf).", "--output", "-o", metavar="OUT.pdf")
-    ] = None,
+    output: Annotated[Path | None, written("PDF to write (default: OUT.pdf).", "OUT.pdf")] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write all charts that fit a result to one PDF, with a title page."""
     path = output or Path(f"{file.stem}.pdf")
-    check_ending(path, (".pdf",))
+    common.check_ending(path, (".pdf",))
     chart(file, output=[path], overwrite=overwrite)

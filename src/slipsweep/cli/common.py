@@ -1,4 +1,4 @@
-"""What several commands share: groups of options, outputs, progress, and what is printed of results."""
+"""What several commands share: the program, options, outputs, progress, and what is printed of results."""
 
 import functools
 import io
@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,6 +32,17 @@ _MOST_WITHOUT_UNIT = 2.0
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
 
+#: The program, to which each command adds itself.
+app = typer.Typer(context_settings={"help_option_names": ["-h", "--help"]}, pretty_exceptions_enable=False)
+
+
+def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add a command to the program, by what it is for; its examples stand below its help."""
+    heading = "Example:" if len(examples) == 1 else "Examples:"
+    return app.command(
+        rich_help_panel=task, epilog="\n\n".join((heading, *(line.replace("[", r"\[") for line in examples)))
+    )
+
 
 class Panel(str):
     """The name of a group of options in a command's help; called, it declares one of them."""
@@ -45,56 +57,68 @@ SHAKING, BLOCK, OUTPUT, LARGE = Panel("Shaking"), Panel("Block"), Panel("Output"
 #: The group of options that few cases need.
 RARE = Panel("Rare options")
 
+
+def written(about: str, metavar: str = "FILE") -> Any:
+    """The option that names what a command writes."""
+    return OUTPUT(about, "--output", "-o", metavar=metavar)
+
+
 Theta = Annotated[str, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")]
 MuS = Annotated[float, BLOCK("Static friction coefficient.")]
 Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrite")]
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
-Resume = Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", "--resume")]
-Memory = Annotated[str | None, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", metavar="SIZE")]
-Workers = Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", metavar="N")]
-Scheduler = Annotated[str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")]
+
+#: What ``-d`` declares.
+LENGTH = Panel("Displacement")(
+    "Tolerable, or to be exceeded: 50mm, 0.05 (m); may be repeated.", "--displacement", "-d", metavar="LENGTH"
+)
+Displacements = Annotated[list[str], LENGTH]
+At = Annotated[
+    list[str] | None,
+    Panel("Selection")(
+        "Values of an axis: theta=12, amplitude=0.1g,0.2g, case=LABEL (default: all); may be repeated.",
+        metavar="NAME=VALUE",
+    ),
+]
 
 
-def examples(*lines: str) -> str:
-    """Commands that stand below a command's help, one line each."""
-    heading = "Example:" if len(lines) == 1 else "Examples:"
-    return "\n\n".join((heading, *(line.replace("[", r"\[") for line in lines)))
+@dataclass(frozen=True)
+class Large:
+    """Options of commands that may run for hours."""
 
-
-# --------------------------------------------------------------------------- what is typed
+    resume: Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", "--resume")] = False
+    memory: Annotated[str | None, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", metavar="SIZE")] = None
+    workers: Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", metavar="N")] = None
+    scheduler: Annotated[
+        str | None, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", metavar="ADDRESS")
+    ] = None
 
 
 def cuts(given: Sequence[str] | None) -> dict[str, str]:
     """Take apart what was typed with ``--at``: names and values."""
     found: dict[str, str] = {}
     for text in given or ():
-        name, separator, value = text.partition("=")
-        if not (separator and name and value):
+        name, _, value = (part.strip() for part in text.partition("="))
+        if not (name and value):
             raise InputError(f"--at {text}: must be NAME=VALUE, as in --at theta=12")
-        if name.strip() in found:
-            raise InputError(f"--at {text}: {name.strip()} is given twice")
-        found[name.strip()] = value.strip()
+        if name in found:
+            raise InputError(f"--at {text}: {name} is given twice")
+        found[name] = value
     return found
 
 
 def displacements(texts: Sequence[str], g: float) -> list[float]:
-    """Return the displacements given with ``-d``, in m, in order and each once.
-
-    Raises
-    ------
-    InputError
-        One is no length, not > 0, or a number so large that its unit is in doubt.
-    """
+    """Return the displacements given with ``-d``, in m, in order and each once (InputError: its unit is in doubt)."""
     from slipsweep.model.parameters import check_values
     from slipsweep.model.units import quantity
 
     found = set()
-    for text in texts:
+    for text in map(str.strip, texts):
         length = quantity("--displacement", text, "m", g)
-        if length > _MOST_WITHOUT_UNIT and not text.strip()[-1].isalpha():
+        if length > _MOST_WITHOUT_UNIT and not text[-1].isalpha():
             raise InputError(
-                f"--displacement = {text}: without a unit that is {length:g} m; give the unit: -d {text.strip()}mm or "
-                f"-d {text.strip()}m"
+                f"--displacement = {text}: without a unit that is {length:g} m; give the unit: -d {text}mm or "
+                f"-d {text}m"
             )
         found.add(length)
     return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
@@ -103,9 +127,6 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
 def typed_command() -> str:
     """The command as typed, for the history of a file."""
     return shlex.join(["slipsweep", *sys.argv[1:]])
-
-
-# ------------------------------------------------------------------------------- outputs
 
 
 def check_outputs(
@@ -125,6 +146,13 @@ def check_ending(path: Path, endings: Sequence[str]) -> None:
     """Refuse an output whose name ends in what the command cannot write."""
     if path.suffix not in endings:
         raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
+
+
+def figure_of(table: "xr.Dataset") -> "Figure":
+    """The chart of a result that has one kind."""
+    from slipsweep.charts import kinds
+
+    return kinds.figure_of(table)
 
 
 def write_outputs(
@@ -147,16 +175,12 @@ def write_outputs(
             temporary.write_bytes(content.getvalue())
 
 
-def netcdf_writer(table: "xr.Dataset", title: str, recorded: "Record | None" = None) -> Callable[[Path], None]:
-    """What writes a time history, and the `recorded` motion that it is the response to."""
+def write_netcdf(table: "xr.Dataset", path: Path, title: str, recorded: "Record | None" = None) -> None:
+    """Write a time history, and the `recorded` motion that it is the response to."""
+    from slipsweep.files import netcdf
 
-    def write(path: Path) -> None:
-        from slipsweep.files import netcdf
-
-        plain = netcdf.without_time_axis(table)
-        netcdf.write_table(netcdf.described(plain, title=title, command=typed_command(), recorded=recorded), path)
-
-    return write
+    plain = netcdf.without_time_axis(table)
+    netcdf.write_table(netcdf.described(plain, title=title, command=typed_command(), recorded=recorded), path)
 
 
 def write_fragility(table: "xr.Dataset", path: Path, lengths: Sequence[float] | None = None) -> None:
@@ -166,45 +190,31 @@ def write_fragility(table: "xr.Dataset", path: Path, lengths: Sequence[float] | 
     path.write_text(openquake_fragility(fragility(table, lengths)), encoding="utf-8")
 
 
-def run_job(
-    job: "Job",
-    path: "Place",
-    quiet: bool,
-    *,
-    overwrite: bool,
-    resume: bool,
-    memory: str | None,
-    workers: int | None,
-    scheduler: str | None,
-    unit: str = "cells",
-) -> "Report":
+def run_job(job: "Job", path: "Place", large: Large, *, overwrite: bool, quiet: bool, unit: str = "cells") -> "Report":
     """Solve and write what a command computes, in chunks if need be."""
     from slipsweep.files import running
     from slipsweep.grid.resources import parse_size
 
-    if resume and overwrite:
+    if large.resume and overwrite:
         raise InputError(
             "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
         )
-    nbytes = None if memory is None else parse_size("--memory", memory)
+    nbytes = None if large.memory is None else parse_size("--memory", large.memory)
     with progress_bar(job.plan.cells, quiet, unit) as progress:
         report = running.run(
             job,
             path,
             command=typed_command(),
             overwrite=overwrite,
-            resume=resume,
+            resume=large.resume,
             memory=nbytes,
-            workers=workers,
-            scheduler=scheduler,
+            workers=large.workers,
+            scheduler=large.scheduler,
             progress=progress,
         )
     if report.found and not quiet:
-        typer.echo(f"{path}: complete already, by the same sweep; nothing was computed")
+        echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
-
-
-# ----------------------------------------------------------------------- what is printed
 
 
 def printable(text: str) -> str:
@@ -212,29 +222,42 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def echo(text: object = "") -> None:
-    """Print a line; text that comes from a file sends no control sequences to the terminal."""
-    typer.echo("\n".join(map(printable, str(text).split("\n"))))
+def echo(*texts: object) -> None:
+    """Print lines; text that comes from a file sends no control sequences to the terminal."""
+    for text in texts:
+        typer.echo("\n".join(map(printable, str(text).split("\n"))))
+
+
+def taken_as(values: Mapping[str, float], g: float) -> str:
+    """Inputs in the units that they were taken in: ``amplitude 3.55 m/s2 (0.3619 g), frequency 1.8 Hz``."""
+    texts = (f"{name.replace('_', ' ')} {range_text(name, (value,), g)}" for name, value in values.items())
+    return ", ".join(texts).replace("m s-2", "m/s2")
+
+
+def range_text(name: str, ends: Sequence[float], g: float) -> str:
+    """Values of a parameter with their unit, accelerations also in g: ``1 to 4 m s-2 (0.1019 to 0.4077 g)``."""
+    units = PARAMETERS[name]["units"]
+    in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m s-2" else ""
+    return f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}{in_g}"
 
 
 def echo_tally(tally: "Tally") -> None:
     """Print the shares of sliding modes and of flags, flags that no cell has left out."""
     if tally.modes is not None:
-        typer.echo("sliding modes:")
-        for mode, count in tally.modes.items():
-            typer.echo(f"  {mode.name.lower():<24}{tally.share(count):7.2%}")
+        echo("sliding modes:")
+        echo(*(f"  {mode.name.lower():<24}{tally.share(count):7.2%}" for mode, count in tally.modes.items()))
     if tally.flags is not None:
         seen = Validity(sum(flag for flag, count in tally.flags.items() if count))
-        typer.echo("flags (validity):" if seen else "flags (validity): none")
+        echo("flags (validity):" if seen else "flags (validity): none")
         for kind in FlagKind:
             if seen & flags_of(kind):
-                typer.echo(f"  {kind}: {FLAG_KIND_TEXT[kind]}")
+                echo(f"  {kind}: {FLAG_KIND_TEXT[kind]}")
             for flag in seen & flags_of(kind):
-                name = (flag.name or "").lower()
-                typer.echo(f"    {name:<22}{tally.share(tally.flags[flag]):7.2%}  {flag.text}")
+                share = tally.share(tally.flags[flag])
+                echo(f"    {(flag.name or '').lower():<22}{share:7.2%}  {flag.text}")
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
-        typer.echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
+        echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
     if tally.indices is not None:
         _echo_indices(tally.indices)
 
@@ -242,50 +265,26 @@ def echo_tally(tally: "Tally") -> None:
 def _echo_indices(indices: "Indices") -> None:
     """Print what moves the displacement, and why there are grid points that do not say."""
     points, there = sum(indices.status.values()), indices.status[SensitivityStatus.COMPUTED]
-    typer.echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points:")
+    echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points:")
     if there:
         width = max(24, *map(len, indices.total))
-        typer.echo(f"  {'input (means)':<{width}}  first order   total   largest total at")
+        echo(f"  {'input (means)':<{width}}  first order   total   largest total at")
         for name in sorted(indices.total, key=lambda name: -indices.total[name]):
             first, total = (indices.mean(sums, name) for sums in (indices.first, indices.total))
-            typer.echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
+            echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
     for status, count in indices.status.items():
         if count and status is not SensitivityStatus.COMPUTED:
-            typer.echo(f"  none at {count} ({status.name.lower()}): {status.text}")
+            echo(f"  none at {count} ({status.name.lower()}): {status.text}")
 
 
-def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] = ()) -> None:
-    """Print median, 16 and 84 %, share of zeros and P(u > d) at each grid point of a result under a suite.
-
-    Parameters
-    ----------
-    table : Dataset
-    most : int
-        Most grid points that are printed.
-    typed : sequence of str
-        Displacements d as typed.
-    """
+def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] | None = None) -> None:
+    """Print the statistics of a suite, at each of `most` grid points, with P(u > d) of displacements as typed."""
     stored = {"permanent_displacement", "validity"} <= {*table.data_vars} and "limit_amplitude" not in table
-    if not stored or table["permanent_displacement"].sizes.get("motion", 1) < 2:
-        return
-    from slipsweep.studies.suite_statistics import summary_lines
+    if stored and table["permanent_displacement"].sizes.get("motion", 1) > 1:
+        from slipsweep.studies.suite_statistics import summary_lines
 
-    lengths = displacements(typed, float(table.attrs["g"])) if typed else None
-    for line in summary_lines(table, lengths, most):
-        echo(line)
-
-
-def taken_as(values: Mapping[str, float], g: float) -> str:
-    """Inputs in the units that they were taken in: ``amplitude 3.55 m/s2 (0.3619 g), frequency 1.8 Hz``."""
-    texts = []
-    for name, value in values.items():
-        unit = PARAMETERS[name]["units"].replace("m s-2", "m/s2")
-        in_g = f" ({value / g:.4g} g)" if unit == "m/s2" else ""
-        texts.append(f"{name.replace('_', ' ')} {value:.6g} {unit}{in_g}")
-    return ", ".join(texts)
-
-
-# ------------------------------------------------------------------------------ progress
+        lengths = displacements(typed, float(table.attrs["g"])) if typed else None
+        echo(*summary_lines(table, lengths, most))
 
 
 @contextmanager
@@ -299,11 +298,10 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
 
     from slipsweep.jit import compiling
 
-    watch, done = Watch(), 0
+    watch = Watch()
 
     def advance(more: int) -> None:
-        nonlocal done
-        done += more
+        done = bar.tasks[task].completed + more
         bar.update(task, completed=done, description=f"{watch.speed(done):.3g} {unit}/s")
 
     def compiled(kernel: str | None) -> None:
@@ -324,7 +322,7 @@ class Watch:
         self._compiling = compiling.seconds
         self._started, self._before = time.perf_counter(), compiling.seconds()
 
-    def speed(self, count: int) -> float:
+    def speed(self, count: float) -> float:
         """What was solved in a second, compilation apart."""
         seconds = time.perf_counter() - self._started - (self._compiling() - self._before)
         return count / max(seconds, 1e-9)

@@ -6,14 +6,13 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import Overwrite, echo, examples
+from slipsweep.cli.common import Overwrite, command, echo
 from slipsweep.errors import InputError, did_you_mean
-
-EXAMPLE = examples("slipsweep example", "slipsweep example paper")
 
 _PACKAGE = Path(__file__).parents[1]
 
 
+@command("Start", "slipsweep example", "slipsweep example paper")
 def example(
     name: Annotated[
         str | None, typer.Argument(metavar="NAME", help="Sweep file to write (default: list their names).")
@@ -25,8 +24,8 @@ def example(
     folder = next(path for path in (_PACKAGE / "sweeps", _PACKAGE.parents[1] / "sweeps") if path.is_dir())
     sweeps = {path.stem: path for path in sorted(folder.glob("*.toml"))}
     if name is None:
-        for stem, path in sweeps.items():
-            echo(f"{stem:<14}{tomllib.loads(path.read_text(encoding='utf-8'))['output']['title']}")
+        titles = {stem: tomllib.loads(path.read_text("utf-8"))["output"]["title"] for stem, path in sweeps.items()}
+        echo(*(f"{stem:<14}{title}" for stem, title in titles.items()))
         return
     if name not in sweeps:
         raise InputError(f"NAME = {name}: no such sweep file; {did_you_mean(name, list(sweeps))}")

@@ -5,16 +5,13 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, check_ending, echo, examples
-
-EXAMPLE = examples("slipsweep explore design_chart.nc -o design_chart.html")
+from slipsweep.cli.common import OUTPUT, Overwrite, Quiet, check_ending, command, echo, written
 
 
+@command("Draw", "slipsweep explore design_chart.nc -o design_chart.html")
 def explore(
     file: Annotated[Path, typer.Argument(metavar="OUT.nc", help="A file that slipsweep run wrote.")],
-    output: Annotated[
-        Path | None, OUTPUT("Page to write (default: the file's name, .html).", "--output", "-o", metavar="PAGE.html")
-    ] = None,
+    output: Annotated[Path | None, written("Page to write (default: the file's name, .html).", "PAGE.html")] = None,
     overwrite: Overwrite = False,
     size: Annotated[
         str, OUTPUT("Largest size of the page; larger results are thinned to it.", metavar="SIZE")

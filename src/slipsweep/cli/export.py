@@ -6,42 +6,27 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import (
-    OUTPUT,
-    Overwrite,
-    Panel,
-    Quiet,
-    check_outputs,
-    cuts,
-    examples,
-    progress_bar,
-    write_fragility,
-)
+from slipsweep.cli import common
+from slipsweep.cli.common import At, Overwrite, Panel, Quiet, command, cuts, echo, written
 
 TABLE = Panel("Table")
 
-EXAMPLE = examples(
+
+@command(
+    "Read results",
     "slipsweep export paper.nc -o paper.csv --words",
     "slipsweep export design_chart.nc -o t.parquet --at theta=5 --at amplitude=0.1g,0.2g,0.3g",
     "slipsweep export design_chart.nc -o t.xlsx --at theta=5 --at mu_s=0.4 --columns frequency",
 )
-
-
 def export(
     file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
-    output: Annotated[Path, OUTPUT("Write .csv, .parquet, .xlsx or .xml.", "--output", "-o", metavar="FILE")],
+    output: Annotated[Path, written("Write .csv, .parquet, .xlsx or .xml.")],
     variables: Annotated[
         list[str] | None, TABLE("Result to export (default: all); may be repeated.", "--variable", metavar="NAME")
     ] = None,
     words: Annotated[bool, TABLE("Sliding modes and flags as words, not codes.", "--words")] = False,
     in_g: Annotated[bool, TABLE("Accelerations in g, not in m/s².", "--in-g")] = False,
-    at: Annotated[
-        list[str] | None,
-        TABLE(
-            "Values of an axis to take: theta=12, amplitude=0.1g,0.2g, case=LABEL; may be repeated.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
+    at: At = None,
     rows: Annotated[
         str | None, TABLE("With --columns: axes of the rows (default: all others).", metavar="NAME[,NAME]")
     ] = None,
@@ -58,12 +43,12 @@ def export(
     if output.suffix == ".xml":
         _export_fragility(file, output, at, overwrite)
         if not quiet:
-            typer.echo(output)
+            echo(output)
         return
     from slipsweep.files import export as tables
     from slipsweep.grid.resources import size_text
 
-    written = tables.export(
+    count = tables.export(
         file,
         output,
         variables=variables or None,
@@ -73,10 +58,10 @@ def export(
         rows=rows.split(",") if rows else (),
         columns=columns,
         overwrite=overwrite,
-        progress=functools.partial(progress_bar, quiet=quiet, unit="rows"),
+        progress=functools.partial(common.progress_bar, quiet=quiet, unit="rows"),
     )
     if not quiet:
-        typer.echo(f"{output}  {written} rows, {size_text(output.stat().st_size)}")
+        echo(f"{output}  {count} rows, {size_text(output.stat().st_size)}")
 
 
 def _export_fragility(file: str, output: Path, at: list[str] | None, overwrite: bool) -> None:
@@ -85,7 +70,7 @@ def _export_fragility(file: str, output: Path, at: list[str] | None, overwrite: 
     from slipsweep.files.outputs import complete_or_absent
     from slipsweep.files.selection import selected
 
-    check_outputs([output], (".xml",), overwrite, [Path(file)])
+    common.check_outputs([output], (".xml",), overwrite, [Path(file)])
     chosen = selected(read_result(file), file, cuts(at), ("motion", "quantile"))
     with complete_or_absent(output, overwrite) as temporary:
-        write_fragility(chosen, temporary)
+        common.write_fragility(chosen, temporary)

@@ -5,19 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slipsweep.cli.common import (
-    FIGURES,
-    OUTPUT,
-    Overwrite,
-    Panel,
-    Quiet,
-    check_outputs,
-    cuts,
-    displacements,
-    examples,
-    write_fragility,
-    write_outputs,
-)
+from slipsweep.cli import common
+from slipsweep.cli.common import FIGURES, At, Overwrite, Panel, Quiet, command, echo, written
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,11 +16,13 @@ if TYPE_CHECKING:
 #: The part of a rate that is worth a sentence.
 _MUCH = 0.05
 
+#: A row of the table of rates.
+_ROW = "  {:<10}{:>12}{:>16}{:>14}{:>14}{:>16}"
+
 HAZARD = Panel("Hazard")
 
-EXAMPLE = examples("slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml")
 
-
+@command("Compute", "slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml")
 def hazard(
     file: Annotated[
         Path, typer.Argument(metavar="OUT.nc", help="A result under a suite or [uncertainty], with an axis amplitude.")
@@ -39,21 +30,11 @@ def hazard(
     curve: Annotated[
         Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high; or OpenQuake\'s.', metavar="HAZARD.csv")
     ],
-    displacement: Annotated[
-        list[str], HAZARD("To exceed: 50mm, 0.05 (m); may be repeated.", "--displacement", "-d", metavar="LENGTH")
-    ],
+    displacement: common.Displacements,
     site: Annotated[int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", metavar="N")] = None,
-    at: Annotated[
-        list[str] | None, HAZARD("One value of another axis: mu_s=0.4 (default: all).", metavar="NAME=VALUE")
-    ] = None,
+    at: At = None,
     output: Annotated[
-        list[Path] | None,
-        OUTPUT(
-            "Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated.",
-            "--output",
-            "-o",
-            metavar="FILE",
-        ),
+        list[Path] | None, written("Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated.")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
@@ -65,26 +46,24 @@ def hazard(
     from slipsweep.studies.hazard import displacement_hazard
     from slipsweep.studies.hazard_curves import read_hazard_curve
 
-    paths = check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
+    paths = common.check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
     result = _read(file, at)
     g = float(result.attrs["g"])
-    lengths = displacements(displacement, g)
+    lengths = common.displacements(displacement, g)
     given = read_hazard_curve(curve, g, site)
     rates = displacement_hazard(result, given, lengths)
 
     def figure() -> "Figure":
-        from slipsweep.charts.kinds import figure_of
         from slipsweep.charts.limits import drawn_thresholds
 
         marked = rates["threshold"].values
         drawn = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
-        return figure_of(displacement_hazard(result, given, drawn).assign_attrs(marked=marked))
+        return common.figure_of(displacement_hazard(result, given, drawn).assign_attrs(marked=marked))
 
-    write_outputs(paths, overwrite, figure, {".xml": lambda path: write_fragility(result, path, lengths)})
+    common.write_outputs(paths, overwrite, figure, {".xml": lambda path: common.write_fragility(result, path, lengths)})
     if not quiet:
         _summarize(rates, g)
-        for path in paths:
-            typer.echo(path)
+        echo(*paths)
 
 
 def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
@@ -97,7 +76,7 @@ def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
     table = result[[name for name in names if name in result]].load()
     if "g" not in table.attrs:
         raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
-    typed = cuts(at)
+    typed = common.cuts(at)
     chosen = selected(table, file, typed, ("amplitude", "motion", "threshold"))
     for name in typed:
         if chosen.sizes.get(name, 1) > 1:
@@ -110,30 +89,30 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
 
     from slipsweep.studies.suite_statistics import point_names
 
-    attrs = rates.attrs
-    low, high = (float(one) / g for one in attrs["amplitude_range"])
-    start, end = (float(one) / g for one in attrs["hazard_curve_range"])
+    low, high = (float(one) / g for one in rates.attrs["amplitude_range"])
+    start, end = (float(one) / g for one in rates.attrs["hazard_curve_range"])
     # P is known between these, and the rate of what lies above and below is not
     first, last = max(low, start), min(high, end)
-    typer.echo(f"P(u > d | PGA): share over {attrs['suite_dimensions'].replace(' ', ' and ')}")
-    typer.echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
+    echo(f"P(u > d | PGA): share over {rates.attrs['suite_dimensions'].replace(' ', ' and ')}")
+    echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
     sizes = rates["valueless_share"].sizes
     for index, point in zip(np.ndindex(*sizes.values()), point_names(rates, sizes), strict=True):
         if point:
-            typer.echo(point)
+            echo(point)
         _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
-    if (rates["held_rate"] > _MUCH * rates["annual_rate"]).any():
+    rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
+    if (held > _MUCH * rate).any():
         axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
-        typer.echo(f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}")
-    if (rates["omitted_rate"] > _MUCH * rates["annual_rate"]).any():
-        typer.echo(f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower")
-    if rates["omitted_rate"].isnull().where(rates["annual_rate"].notnull(), False).any():
-        typer.echo(
+        echo(f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}")
+    if (omitted > _MUCH * rate).any():
+        echo(f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower")
+    if (omitted.isnull() & rate.notnull()).any():
+        echo(
             f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the rates are too "
             "small by an unknown part; begin the curve lower"
         )
-    if (rates["upper_rate"] > 2.0 * rates["lower_rate"]).where(rates["held_rate"] < rates["annual_rate"], False).any():
-        typer.echo(
+    if ((rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate)).any():
+        echo(
             "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; "
             "put more values on the axis amplitude"
         )
@@ -141,22 +120,23 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
 
 def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
     """The table of one grid point."""
-    import numpy as np
-
     share = rates["valueless_share"].item()
     if share > 0.0:
-        typer.echo(f"  up to {share:.1%} of the motions or samples have no value at an amplitude: left out of P")
-    if np.isnan(rates["annual_rate"]).any():
-        typer.echo("  no annual rate: fewer than two amplitudes have a value")
+        echo(f"  up to {share:.1%} of the motions or samples have no value at an amplitude: left out of P")
+    if rates["annual_rate"].isnull().any():
+        echo("  no annual rate: fewer than two amplitudes have a value")
         return
     above, below = f"above {last:.3g} g", f"below {first:.3g} g"
-    typer.echo(f"  {'d (m)':<10}{'annual rate':>12}{'period (years)':>16}{'steps':>14}{above:>14}{below:>16}")
+    echo(_ROW.format("d (m)", "annual rate", "period (years)", "steps", above, below))
     for d in rates["threshold"].values:
-        one = {str(name): float(values) for name, values in rates.sel(threshold=d).data_vars.items()}
-        rate = one["annual_rate"]
+        one = rates.sel(threshold=d)
+        rate = one["annual_rate"].item()
         if not rate > 0.0:
-            typer.echo(f"  {d:<10.6g}{0:>12}  not exceeded at any amplitude of the result")
+            echo(f"  {d:<10.6g}{0:>12}  not exceeded at any amplitude of the result")
             continue
-        left = "not known" if np.isnan(one["omitted_rate"]) else f"<= {one['omitted_rate'] / rate:.2%} more"
-        steps = f"{one['lower_rate'] / rate:.2f} to {one['upper_rate'] / rate:.2f}"
-        typer.echo(f"  {d:<10.6g}{rate:>12.4g}{1.0 / rate:>16.4g}{steps:>14}{one['held_rate'] / rate:>14.2%}{left:>16}")
+        lower, upper, held, omitted = (
+            one[f"{name}_rate"].item() / rate for name in ("lower", "upper", "held", "omitted")
+        )
+        left = "not known" if omitted != omitted else f"<= {omitted:.2%} more"
+        texts = (f"{d:.6g}", f"{rate:.4g}", f"{1.0 / rate:.4g}", f"{lower:.2f} to {upper:.2f}", f"{held:.2%}", left)
+        echo(_ROW.format(*texts))

@@ -5,21 +5,15 @@ from typing import Annotated
 
 import typer
 
-from slipsweep.cli.common import cuts, echo, echo_suite, echo_tally, examples
+from slipsweep.cli.common import LENGTH, At, command, cuts, echo, echo_suite, echo_tally
 from slipsweep.errors import InputError
 
-EXAMPLE = examples("slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
 
-
+@command("Read results", "slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
 def info(
     file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
-    displacement: Annotated[
-        list[str] | None,
-        typer.Option("--displacement", "-d", metavar="LENGTH", help="Of a suite: P(u > LENGTH), too; may be repeated."),
-    ] = None,
-    at: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of a suite: statistics at values of an axis only.")
-    ] = None,
+    displacement: Annotated[list[str] | None, LENGTH] = None,
+    at: At = None,
 ) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
     from slipsweep.files import contents
@@ -34,31 +28,22 @@ def info(
 
     table = read_result(file)
     echo(f"{Path(file)}  {size_text(nbytes_of(place_of(file)))}")
-    for title, entries in (
-        ("coordinates", contents.coordinate_texts(table)),
-        ("variables", contents.variable_texts(table)),
-    ):
-        echo(f"{title}:")
-        for name, text in entries.items():
-            echo(f"  {name:<23} {text}")
+    echo("coordinates:", *(f"  {name:<23} {text}" for name, text in contents.coordinate_texts(table).items()))
+    echo("variables:", *(f"  {name:<23} {text}" for name, text in contents.variable_texts(table).items()))
     recorded = read_embedded(table, Path(file))
     if isinstance(recorded, Record):
         echo(f"record: {recorded.summary()}")
-    motions = contents.motions_text(table)
-    if motions:
-        echo("motions, as recorded:")
-    for line in motions:
-        echo(f"  {line}")
+    if motions := contents.motions_text(table):
+        echo("motions, as recorded:", *(f"  {line}" for line in motions))
     try:
         echo_tally(contents.tally_in(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     if displacement and table.sizes.get("motion", 1) < 2:
         raise InputError(f"{file}: --displacement: is for results of a suite of motions")
-    echo_suite(selected(table, file, cuts(at), SUITE), most=100, typed=displacement or ())
+    echo_suite(selected(table, file, cuts(at), SUITE), most=100, typed=displacement)
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
         if name != RUN:
-            echo(f"{name}: {lines[0] if len(lines) == 1 else ''}".rstrip())
-            for line in lines if len(lines) > 1 else ():
-                echo(f"  {line}")
+            one = len(lines) == 1
+            echo(f"{name}: {lines[0]}".rstrip() if one else f"{name}:", *(f"  {line}" for line in lines if not one))

@@ -1,8 +1,9 @@
-"""Options of commands made from what is declared once (`slipsweep.model.choices`)."""
+"""Options of commands made from what is declared once: choices (`slipsweep.model.choices`) and dataclasses."""
 
 import functools
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 from slipsweep.cli.common import BLOCK, RARE, SHAKING
@@ -23,11 +24,12 @@ def option_name(text: str) -> str:
     return " ".join(words)
 
 
-def chooses(**choices: Family[Any] | type[Choice]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def chooses(**choices: Family[Any] | type[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Replace parameters of a command by the options that are declared for them.
 
     The command gets the choice made of a family, or None if its parameter may be and none of the options was typed; of
-    a single choice (`Reading`) the options typed, by name.
+    a single choice (`Reading`) the options typed, by name; of another dataclass, whose annotations are options of
+    typer, an object.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -37,40 +39,47 @@ def chooses(**choices: Family[Any] | type[Choice]) -> Callable[[Callable[..., No
         def wrapped(**given: Any) -> None:
             command(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
 
-        parameters: list[inspect.Parameter] = []
+        kinds: dict[str, tuple[Any, Any]] = {}
         for old in signature.parameters.values():
             choice = choices.get(old.name)
             if choice is None:
-                parameters.append(old)
+                kinds[old.name] = old.annotation, old.default
             elif isinstance(choice, Family):
-                needed = old.default is inspect.Parameter.empty
-                parameters += _family_parameters(choice, choice.default if needed else None)
+                kinds |= _family_options(choice, choice.default if old.default is inspect.Parameter.empty else None)
+            elif issubclass(choice, Choice):
+                kinds |= {one.name: (_annotation(one), None) for one in declared(choice)}
             else:
-                parameters += [_parameter(one) for one in declared(choice)]
-        wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-        wrapped.__annotations__ = {one.name: one.annotation for one in parameters} | {"return": None}
+                kinds |= {one.name: (one.type, one.default) for one in fields(choice)}
+        wrapped.__signature__ = signature.replace(  # type: ignore[attr-defined]
+            parameters=[
+                inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+                for name, (kind, default) in kinds.items()
+            ]
+        )
+        wrapped.__annotations__ = {name: kind for name, (kind, _) in kinds.items()} | {"return": None}
         del wrapped.__wrapped__
         return wrapped
 
     return decorate
 
 
-def _made(given: dict[str, Any], choice: Family[Any] | type[Choice]) -> Any:
+def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:
     """What a command gets for a choice; its options are taken from those given."""
-    if not isinstance(choice, Family):
-        typed = _typed(given, {one.name: one for one in declared(choice)})
-        try:
-            choice(**typed)
-        except InputError as error:
-            raise InputError(option_name(str(error))) from None
-        return typed
-    name = given.pop(choice.attribute)
-    typed = _typed(given, choice.options)
-    if name is None and not typed:
-        return None
-    return choice.made(
-        name or choice.default, typed, lambda text: option_name(text.replace(choice.key, choice.attribute, 1))
-    )
+    if isinstance(choice, Family):
+        name, typed = given.pop(choice.attribute), _typed(given, choice.options)
+        if name is None and not typed:
+            return None
+        return choice.made(
+            name or choice.default, typed, lambda text: option_name(text.replace(choice.key, choice.attribute, 1))
+        )
+    if not issubclass(choice, Choice):
+        return choice(**{one.name: given.pop(one.name) for one in fields(choice)})
+    typed = _typed(given, {one.name: one for one in declared(choice)})
+    try:
+        choice(**typed)
+    except InputError as error:
+        raise InputError(option_name(str(error))) from None
+    return typed
 
 
 def _typed(given: dict[str, Any], options: Mapping[str, Option]) -> dict[str, Any]:
@@ -86,19 +95,19 @@ def _typed(given: dict[str, Any], options: Mapping[str, Option]) -> dict[str, An
     return found
 
 
-def _family_parameters(family: Family[Any], default: str | None) -> list[inspect.Parameter]:
-    """Which choice, and the options of all."""
+def _family_options(family: Family[Any], default: str | None) -> dict[str, tuple[Any, Any]]:
+    """Which choice, and the options of all: annotations and defaults."""
     names = Literal[tuple(family.names)]  # type: ignore[valid-type]
     note = "" if default else f" (default: {family.default})"
-    about = _PANELS[family.attribute](
-        f"{family.keyword.capitalize()}: {', '.join(family.names)}{note}.", f"--{family.attribute}", metavar="NAME"
-    )
-    kind: Any = Annotated[names if default else names | None, about]
-    first = inspect.Parameter(family.attribute, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-    return [first, *(_parameter(one, family) for one in family.options.values())]
+    text = f"{family.keyword.capitalize()}: {', '.join(family.names)}{note}."
+    about = _PANELS[family.attribute](text, f"--{family.attribute}", metavar="NAME")
+    first: Any = Annotated[names if default else names | None, about]
+    return {family.attribute: (first, default)} | {
+        name: (_annotation(one, family), None) for name, one in family.options.items()
+    }
 
 
-def _parameter(one: Option, family: Family[Any] | None = None) -> inspect.Parameter:
+def _annotation(one: Option, family: Family[Any] | None = None) -> Any:
     """An option of a command; None where it is not typed.  Those that some choices only have are rare ones."""
     kind: Any = Literal[one.words] if one.words else str if one.is_list else one.kind
     notes, panel = [], RARE
@@ -112,7 +121,4 @@ def _parameter(one: Option, family: Family[Any] | None = None) -> inspect.Parame
         notes.append(f"default: {one.default}")
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
-    about = panel(text, option_name(one.name), metavar="A,B,..." if one.is_list else None)
-    return inspect.Parameter(
-        one.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, about]
-    )
+    return Annotated[kind | None, panel(text, option_name(one.name), metavar="A,B,..." if one.is_list else None)]

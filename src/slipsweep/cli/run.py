@@ -7,22 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from slipsweep.cli.common import (
-    OUTPUT,
-    Memory,
-    Overwrite,
-    Panel,
-    Quiet,
-    Resume,
-    Scheduler,
-    Watch,
-    Workers,
-    check_ending,
-    echo_suite,
-    echo_tally,
-    examples,
-    run_job,
-)
+from slipsweep.cli import common
+from slipsweep.cli.common import Large, Overwrite, Panel, Quiet, command, echo, written
+from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
 from slipsweep.model.variables import PARAMETERS, SlidingMode
@@ -32,14 +19,16 @@ if TYPE_CHECKING:
 
     from slipsweep.grid.tally import Tally
 
-EXAMPLE = examples(
+
+@command(
+    "Compute",
     "slipsweep run sweeps/design_chart.toml",
     "slipsweep run sweeps/paper.toml -o paper.nc --overwrite",
     "slipsweep run design_chart.nc -o again.nc --quiet",
 )
-
-
+@chooses(large=Large)
 def run(
+    *,
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to repeat.")
     ],
@@ -48,16 +37,11 @@ def run(
     ] = None,
     output: Annotated[
         str | None,
-        OUTPUT(
-            "File or store to write (default: output.path, else SWEEP.nc).", "--output", "-o", metavar="OUT.nc|OUT.zarr"
-        ),
+        written("File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr"),
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
-    resume: Resume = False,
-    memory: Memory = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    large: Large,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import spec
@@ -75,58 +59,44 @@ def run(
     if name is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = place_of(name or f"{sweep.stem}.nc")
-    check_ending(Path(path), (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
+    common.check_ending(Path(path), (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
     job = sweep_job(checked)
-    watch, unit = Watch(), "cells" if checked.sampling is None else "samples"
-    report = run_job(
-        job,
-        path,
-        quiet,
-        overwrite=overwrite,
-        resume=resume,
-        memory=memory,
-        workers=workers,
-        scheduler=scheduler,
-        unit=unit,
-    )
+    watch, unit = common.Watch(), "cells" if checked.sampling is None else "samples"
+    report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)
     if quiet:
         return
     grid, template = grid_text(job.plan.sizes) or "no axes", job.plan.template()
     if not report.found:
         cells, took = report.tally.cells, watch.text(report.tally.cells, unit)
         if checked.sampling is None:
-            typer.echo(f"{cells} cells ({grid}) in {took}")
+            echo(f"{cells} cells ({grid}) in {took}")
         else:
             runs = checked.sampling.sensitivity_runs
             more = f", among {runs} runs each for Sobol indices" if runs else ""
             pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
             points = math.prod(job.plan.sizes.values())
-            typer.echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{more}")
-            typer.echo(f"{cells} samples solved in {took}")
-    typer.echo(f"inputs: {template.attrs['friction_inputs']}")
+            echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{more}")
+            echo(f"{cells} samples solved in {took}")
+    echo(f"inputs: {template.attrs['friction_inputs']}")
     _echo_inputs(template)
     if checked.recorded is not None:
-        typer.echo(checked.recorded.summary())
+        echo(checked.recorded.summary())
     if "duplicate_motions" in template.attrs:
-        typer.echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
-    echo_tally(report.tally)
+        echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
+    common.echo_tally(report.tally)
     if why := _why_nothing_slides(template, report.tally):
-        typer.echo(why)
-    echo_suite(read_result(report.path), most=20)
-    typer.echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
+        echo(why)
+    common.echo_suite(read_result(report.path), most=20)
+    echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
 
 
 def _echo_inputs(table: "xr.Dataset") -> None:
     """Print the ranges of the parameters, with their units, accelerations also in g."""
     g = float(table.attrs["g"])
     for name, one in table.coords.items():
-        if name not in PARAMETERS:
-            continue
-        ends = [float(one.min()), float(one.max())][: 2 if one.size > 1 else 1]
-        units = PARAMETERS[str(name)]["units"]
-        text = f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}"
-        in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m s-2" else ""
-        typer.echo(f"  {name:<24}{text}{in_g}")
+        if name in PARAMETERS:
+            ends = [float(one.min()), float(one.max())][: 2 if one.size > 1 else 1]
+            echo(f"  {name:<24}{common.range_text(str(name), ends, g)}")
 
 
 def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
@@ -136,18 +106,16 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     modes = tally.modes or {}
     if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
-    g, coords = float(table.attrs["g"]), table.coords
     if not modes[SlidingMode.STUCK]:
         return (
             "no cell has a value: the flags above say why; statically_unstable: theta reaches the friction angle, "
             "atan(mu_s)"
         )
+    g, coords = float(table.attrs["g"]), table.coords
     if not {"amplitude", "theta", "mu_s"} <= {*coords}:
         return "no cell slides"
-    if "yield_acceleration" in coords:
-        least = float(coords["yield_acceleration"].min())
-    else:
-        least = g * float(np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max())))
+    coulomb = g * np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max()))
+    least = float(coords.get("yield_acceleration", coulomb).min())
     largest = float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
     return (
