@@ -1,5 +1,6 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
+from collections.abc import Hashable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -99,7 +100,8 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     from slipsweep.studies.suite_statistics import limit_quantiles, point_names, suite_dims
 
     limits, found = table["limit_amplitude"], limit_quantiles(table)
-    grid, suite = found["value_count"].sizes, {dim: limits.sizes[dim] for dim in suite_dims(limits)}
+    grid = found["value_count"].sizes
+    suite: dict[Hashable, int] = {dim: limits.sizes[dim] for dim in suite_dims(limits)}
     points, names = point_names(table, grid), point_names(table, suite)
     each = limits.transpose(*grid, *suite).values.reshape(len(points), -1)
     quantiles = found["limit_quantile"].values.reshape(len(points), -1)
