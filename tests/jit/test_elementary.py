@@ -86,15 +86,6 @@ def test_rising_phase() -> None:
     assert worst(found, lambda x, a: -mpmath.acos(x / a), x, amplitude) <= 3.5
 
 
-def test_sine_after() -> None:
-    """From −π/2 on, where the sine begins, without a loss of digits: the start is counted from there."""
-    random = np.random.default_rng(2)
-    start = np.concatenate([np.full(1000, -HALF_PI), random.uniform(-HALF_PI, 0.0, 2000)])
-    offset = -start * np.concatenate([np.exp(random.uniform(-300.0, 0.0, 1000)), random.uniform(0.0, 1.0, 2000)])
-    found = over(elementary.sine_after, start, offset)
-    assert worst(found, lambda start, offset: mpmath.sin(mpmath.mpf(HALF_PI) + start + offset), start, offset) <= 2.5
-
-
 def test_beyond_their_ranges() -> None:
     held = over(elementary.exp, np.array([-1e300, -710.0, -708.0, 709.0, 710.0, 1e300]))
     assert held.tolist() == [held[2]] * 3 + [held[3]] * 3

@@ -18,10 +18,8 @@ from slipsweep.grid import threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.problem import Problem
 from slipsweep.grid.solvers import PARAMETER_ROWS, ROWS, Solve, find_friction_parameters, solver_of
-from slipsweep.jit.decorators import of_arrays
 from slipsweep.kernels.block import UNSOLVED, Cell
 from slipsweep.kernels.grid import CELL
-from slipsweep.model import equations as eq
 from slipsweep.model.parameters import number_text
 from slipsweep.model.variables import RESULT_DTYPES, VALUELESS, Validity
 from slipsweep.motion.intensity import strength_factor
@@ -185,12 +183,6 @@ def phase_seconds(problem: Problem, arrays: Mapping[str, Array]) -> Array:
     if isinstance(problem.excitation, Waveform):
         return 1.0 / (2.0 * math.pi * arrays["frequency"]) if "frequency" in arrays else np.ones(1)
     return arrays["time_scale"]
-
-
-def coulomb_yield_acceleration(theta: Array, mu_s: Array, g: float) -> Array:
-    """Üy of Coulomb interfaces, m/s²; shapes as they broadcast."""
-    with np.errstate(all="ignore"):  # infinite where a surface is overhanging
-        return np.asarray(of_arrays(eq.coulomb_yield_acceleration)(mu_s, np.tan(np.radians(theta)), g))
 
 
 def cut(arrays: Mapping[str, Array], slices: tuple[slice, ...]) -> dict[str, Array]:

@@ -52,8 +52,3 @@ def _uncounted(array: Any) -> Any:
 
 
 uncounted = (lambda array: array) if numba.config.DISABLE_JIT else scalar(_uncounted)
-
-
-def of_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
-    """What was decorated, in Python: where all it does is arithmetic, it takes arrays."""
-    return getattr(function, "py_func", function)

@@ -24,7 +24,6 @@ _LN2_LOW = 1.90821492927058770002e-10
 _EXP_MIN = -708.0
 _EXP_MAX = 709.0
 _HALF_PI = 0.5 * math.pi
-_QUARTER_PI = 0.25 * math.pi
 #: Bit pattern of √½.
 _SQRT_HALF_BITS = 4604544271217802189
 
@@ -160,13 +159,6 @@ def rising_phase(x: float, amplitude: float) -> float:
     The quotient is taken here, where it is not turned into a product: 1/amplitude may overflow.
     """
     return -inverse_versine((amplitude - x) / amplitude)
-
-
-@elementary
-def sine_after(start: float, offset: float) -> float:
-    """1 − vers(start + offset) for a start and an end in [−π/2, 0], without cancellation at −π/2."""
-    phi, psi = (_HALF_PI + start) + offset, start + offset
-    return phi - angle_minus_sine(phi) if psi < -_QUARTER_PI else 1.0 - versine(psi)
 
 
 @elementary

@@ -30,7 +30,7 @@ def uncounted_wave(wave: Wave) -> Wave:
     return Wave(
         uncounted(wave.pieces), uncounted(wave.cycle), uncounted(wave.shape), uncounted(wave.interval),
         uncounted(wave.height), uncounted(wave.same), uncounted(wave.rises), wave.highest, wave.lowest, wave.lead,
-        wave.repeats, wave.again,
+        wave.repeats,
     )  # fmt: skip
 
 

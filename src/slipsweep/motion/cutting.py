@@ -235,7 +235,6 @@ def wave_of(waveform: Waveform) -> Wave:
         lowest=float(min(first.min(), joined.last.min())),
         lead=lead,
         repeats=repeats,
-        again=1 + int(wraps) if repeats else 0,
     )
 
 
@@ -320,5 +319,4 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         lowest=float(values.min()),
         lead=0,
         repeats=0,
-        again=0,
     )

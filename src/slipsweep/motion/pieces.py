@@ -53,8 +53,6 @@ class Wave(NamedTuple):
         Largest and least w.
     lead, repeats : int
         See above.
-    again : int
-        How many of the cycles that follow the plain one are like it.
     """
 
     pieces: np.ndarray
@@ -68,7 +66,6 @@ class Wave(NamedTuple):
     lowest: float
     lead: int
     repeats: int
-    again: int
 
 
 def pieces_of(
