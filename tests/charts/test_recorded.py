@@ -293,7 +293,7 @@ def test_statistics_are_drawn_as_they_are() -> None:
         "amplitude": {"kind": "factor", "distribution": "lognorm", "s": 0.3},
     }
     found = slipsweep.sample(
-        5, amplitude=[3.0, 4.5, 6.0], frequency=[1.0, 2.0], uncertain=uncertain, samples=256, sensitivity=True
+        5, amplitude=[4.0, 5.0, 6.0], frequency=[1.0, 2.0], uncertain=uncertain, samples=256, sensitivity=True
     )
     at = found.sel(frequency=2.0)
     figure = found.slipsweep.chart("fragility", at={"frequency": "2000mHz"})
