@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from slipsweep._version import __version__
 from slipsweep.cli import calibrate, chart, example, explore, export, hazard, info, limit, run, simulate
-from slipsweep.cli.common import app, printable
+from slipsweep.cli.common import app, echo
 from slipsweep.errors import InputError, RunError
 
 
@@ -31,8 +31,8 @@ class _Commands(TyperGroup):
         except BrokenPipeError:
             raise  # typer ends quietly
         except KeyboardInterrupt as error:
-            kept = "; ".join(getattr(error, "__notes__", ["nothing written"]))
-            _say(f"slipsweep: interrupted; {kept}")
+            kept = getattr(error, "__notes__", ["nothing written"])
+            echo(f"slipsweep: interrupted; {'; '.join(kept)}", err=True)
             raise typer.Exit(130) from None
         except InputError as error:
             raise _failed(error, 2) from None
@@ -42,7 +42,7 @@ class _Commands(TyperGroup):
 
 def _show_version(requested: bool) -> None:
     if requested:
-        typer.echo(f"slipsweep {__version__}")
+        echo(f"slipsweep {__version__}")
         raise typer.Exit
 
 
@@ -87,12 +87,7 @@ def _failed(error: Exception, status: int) -> typer.Exit:
     else:
         message = str(error)
     if status == 2:  # of the files of a suite, say: one each
-        _say(f"slipsweep: error: {message}", *(f"  {note}" for note in notes))
+        echo(f"slipsweep: error: {message}", *(f"  {note}" for note in notes), err=True)
     else:
-        _say(f"slipsweep: error: {'; '.join((message, *notes))}")
+        echo(f"slipsweep: error: {'; '.join((message, *notes))}", err=True)
     return typer.Exit(status)
-
-
-def _say(*lines: str) -> None:
-    for line in lines:
-        typer.echo(printable(line), err=True)

@@ -20,27 +20,14 @@ if TYPE_CHECKING:
 #: The group of options that say what of the measurement is used, and how.
 TEST = Panel("Measurement")
 
-Test = Annotated[
-    Path,
-    typer.Argument(
-        metavar="TEST.csv",
-        help="Columns time (s), table acceleration (g), block acceleration (m/s2), "
-        "relative velocity (m/s), relative displacement (mm).",
-    ),
-]
-Tests = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="TEST.csv...",
-        help="One test or several of one interface, with columns as for friction; of the block one column at least.",
-    ),
-]
-Offset = Annotated[
-    list[str] | None, TEST("Channel whose sensor has an offset, or all; may be repeated.", metavar="CHANNEL")
-]
-Drift = Annotated[
-    list[str] | None, TEST("Channel whose sensor drifts linearly, or all; may be repeated.", metavar="CHANNEL")
-]
+#: Columns of a test.
+_COLUMNS = (
+    "Columns time (s), table acceleration (g), block acceleration (m/s2), relative velocity (m/s), "
+    "relative displacement (mm)."
+)
+
+Offset = Annotated[list[str] | None, TEST("Channel with an offset, or all; may be repeated.", metavar="CHANNEL")]
+Drift = Annotated[list[str] | None, TEST("Channel that drifts linearly, or all; may be repeated.", metavar="CHANNEL")]
 
 #: Slides as a table: results, what stands above, and its width.
 _SLIDES = {
@@ -65,7 +52,7 @@ _OF_CYCLES = (*_FOUND, "attenuation_coefficient")
 )
 def friction(
     *,
-    test: Test,
+    test: Annotated[Path, typer.Argument(metavar="TEST.csv", help=_COLUMNS)],
     theta: common.Theta,
     mu_s: common.MuS,
     g: Annotated[float, BLOCK("Gravity, m/s².")] = 9.81,
@@ -73,7 +60,7 @@ def friction(
     drift: Drift = None,
     rest: Annotated[str | None, TEST("Times of rest, s, to find offsets and drifts by.", metavar="FROM:TO")] = None,
     threshold: Annotated[
-        str | None, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", metavar="VALUE")
+        str | None, TEST.value("Relative acceleration of a slide: 0.02g (default: 4 times its noise).")
     ] = None,
     output: Annotated[list[Path] | None, written("Write .nc, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: Overwrite = False,
@@ -96,10 +83,8 @@ def friction(
         echo(attrs["constant_friction"])
     echo(f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}", f"removed    {attrs['removed']}")
     _echo_coefficients(table)
-    if table.sizes["slide"]:
-        echo(f"{table.sizes['slide']} slides, s and m/s2:", "".join(f"{text:>{n}}" for text, n in _SLIDES.values()))
-    else:
-        echo("0 slides")
+    header = ["".join(f"{text:>{width}}" for text, width in _SLIDES.values())] if table.sizes["slide"] else []
+    echo(f"{table.sizes['slide']} slides{', s and m/s2:' if header else ''}", *header)
     for row in zip(*(table[name].values for name in _SLIDES), strict=True):
         echo("".join(f"{value:{width}.4g}" for value, (_, width) in zip(row, _SLIDES.values(), strict=True)))
     echo(*paths)
@@ -113,7 +98,9 @@ def friction(
 @chooses(model=MODELS)
 def calibrate(
     *,
-    tests: Tests,
+    tests: Annotated[
+        list[Path], typer.Argument(metavar="TEST.csv...", help=f"{_COLUMNS} One at least of the block's.")
+    ],
     theta: common.Theta,
     mu_s: common.MuS,
     offset: Offset = None,
@@ -165,8 +152,7 @@ def _echo_coefficients(table: "xr.Dataset") -> None:
 
 
 def _summarize(table: "xr.Dataset") -> None:
-    constant = table.attrs["constant_friction"]
-    if constant:
+    if constant := table.attrs["constant_friction"]:
         echo(constant)
     _echo_coefficients(table)
     echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")

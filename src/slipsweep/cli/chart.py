@@ -30,11 +30,7 @@ def chart(
     ] = None,
     at: Annotated[
         list[str] | None,
-        CHART(
-            "Value of another axis: theta=12, amplitude=0.3g, case=LABEL (default: the middle); "
-            "several select curves or panels: theta=8,11,14.",
-            metavar="NAME=VALUE",
-        ),
+        CHART("Value of another axis, by default the middle; several select curves: theta=8,11.", metavar="NAME=VALUE"),
     ] = None,
     x: Annotated[str | None, AXES("Axis to draw over; of intensity the measure: pgv, cav.", metavar="NAME")] = None,
     y: Annotated[str | None, AXES("Vertical axis of a map, or the curve parameter.", metavar="NAME")] = None,

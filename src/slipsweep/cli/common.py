@@ -51,6 +51,10 @@ class Panel(str):
         """An option of the group; names where its parameter does not give it, and what else typer takes."""
         return typer.Option(*names, help=about.replace("[", r"\["), rich_help_panel=self, **more)
 
+    def value(self, about: str) -> Any:
+        """An option of the group that takes a number with a unit."""
+        return self(about, metavar="VALUE")
+
 
 SHAKING, BLOCK, OUTPUT, LARGE = Panel("Shaking"), Panel("Block"), Panel("Output"), Panel("Large runs")
 
@@ -63,7 +67,7 @@ def written(about: str, metavar: str = "FILE") -> Any:
     return OUTPUT(about, "--output", "-o", metavar=metavar)
 
 
-Theta = Annotated[str, BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", metavar="VALUE")]
+Theta = Annotated[str, BLOCK.value("Inclination of the base: 5 (degrees), 0.1rad.")]
 MuS = Annotated[float, BLOCK("Static friction coefficient.")]
 Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrite")]
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
@@ -217,15 +221,11 @@ def run_job(job: "Job", path: "Place", large: Large, *, overwrite: bool, quiet: 
     return report
 
 
-def printable(text: str) -> str:
-    """The text with control characters escaped, whatever a name or a label of a file has in it."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
-def echo(*texts: object) -> None:
+def echo(*texts: object, err: bool = False) -> None:
     """Print lines; text that comes from a file sends no control sequences to the terminal."""
-    for text in texts:
-        typer.echo("\n".join(map(printable, str(text).split("\n"))))
+    for text in map(str, texts):
+        shown = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+        typer.echo("".join(shown), err=err)
 
 
 def taken_as(values: Mapping[str, float], g: float) -> str:

@@ -42,8 +42,7 @@ def export(
     """
     if output.suffix == ".xml":
         _export_fragility(file, output, at, overwrite)
-        if not quiet:
-            echo(output)
+        echo(*([] if quiet else [output]))
         return
     from slipsweep.files import export as tables
     from slipsweep.grid.resources import size_text

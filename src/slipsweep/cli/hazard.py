@@ -1,5 +1,6 @@
 """`slipsweep hazard`: the mean annual rate at which a displacement is exceeded."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -134,9 +135,8 @@ def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
         if not rate > 0.0:
             echo(f"  {d:<10.6g}{0:>12}  not exceeded at any amplitude of the result")
             continue
-        lower, upper, held, omitted = (
-            one[f"{name}_rate"].item() / rate for name in ("lower", "upper", "held", "omitted")
-        )
-        left = "not known" if omitted != omitted else f"<= {omitted:.2%} more"
-        texts = (f"{d:.6g}", f"{rate:.4g}", f"{1.0 / rate:.4g}", f"{lower:.2f} to {upper:.2f}", f"{held:.2%}", left)
-        echo(_ROW.format(*texts))
+        names = ("lower_rate", "upper_rate", "held_rate", "omitted_rate")
+        lower, upper, held, omitted = (one[name].item() / rate for name in names)
+        steps = f"{lower:.2f} to {upper:.2f}"
+        left = "not known" if math.isnan(omitted) else f"<= {omitted:.2%} more"
+        echo(_ROW.format(f"{d:.6g}", f"{rate:.4g}", f"{1.0 / rate:.4g}", steps, f"{held:.2%}", left))

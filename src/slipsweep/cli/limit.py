@@ -50,9 +50,8 @@ def limit(
     results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
         raise InputError(f"{results[1]}: a second result, beside {results[0]}; give one")
-    if not results:
-        for name in (name for name, value in vars(large).items() if value):
-            raise InputError(f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other")
+    for name in () if results else (name for name, value in vars(large).items() if value):
+        raise InputError(f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other")
     checked = spec.load(sweep)
     named = [Path(one) for one in output or () if one not in results]
     figures = common.check_outputs(named, (*FIGURES, ".nc", ".zarr"), overwrite, checked.files)

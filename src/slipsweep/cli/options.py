@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Annotated, Any, Literal
@@ -16,12 +17,8 @@ _PANELS = {"waveform": SHAKING, "model": BLOCK}
 
 def option_name(text: str) -> str:
     """An option as it is typed: ``--ramp-in`` for ``ramp_in``, also in a sum of several; what follows stays."""
-    words = text.split(" ")
-    for at in range(0, len(words), 2):
-        words[at] = "--" + words[at].replace("_", "-")
-        if words[at + 1 : at + 2] != ["+"]:
-            break
-    return " ".join(words)
+    names = re.compile(r"\w+( \+ \w+)*")
+    return names.sub(lambda found: "--" + found[0].replace("_", "-").replace("+ ", "+ --"), text, count=1)
 
 
 def chooses(**choices: Family[Any] | type[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:

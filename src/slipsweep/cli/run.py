@@ -78,7 +78,10 @@ def run(
             echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{more}")
             echo(f"{cells} samples solved in {took}")
     echo(f"inputs: {template.attrs['friction_inputs']}")
-    _echo_inputs(template)
+    for parameter, one in template.coords.items():
+        if parameter in PARAMETERS:
+            ends = [one.min().item(), one.max().item()][: 2 if one.size > 1 else 1]
+            echo(f"  {parameter:<24}{common.range_text(str(parameter), ends, checked.model.g)}")
     if checked.recorded is not None:
         echo(checked.recorded.summary())
     if "duplicate_motions" in template.attrs:
@@ -88,15 +91,6 @@ def run(
         echo(why)
     common.echo_suite(read_result(report.path), most=20)
     echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
-
-
-def _echo_inputs(table: "xr.Dataset") -> None:
-    """Print the ranges of the parameters, with their units, accelerations also in g."""
-    g = float(table.attrs["g"])
-    for name, one in table.coords.items():
-        if name in PARAMETERS:
-            ends = [float(one.min()), float(one.max())][: 2 if one.size > 1 else 1]
-            echo(f"  {name:<24}{common.range_text(str(name), ends, g)}")
 
 
 def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common
-from slipsweep.cli.common import BLOCK, FIGURES, OUTPUT, RARE, SHAKING, Overwrite, Panel, Quiet, command, echo, written
+from slipsweep.cli.common import BLOCK, FIGURES, OUTPUT, RARE, SHAKING, Overwrite, Quiet, command, echo, written
 from slipsweep.cli.options import chooses, option_name
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.options import MODELS, Model
@@ -30,35 +30,31 @@ if TYPE_CHECKING:
     from slipsweep.motion.records import Record
 
 
-def _with_unit(panel: Panel, about: str) -> Any:
-    return panel(about, metavar="VALUE")
-
-
 @dataclass(frozen=True)
 class Typed:
     """The parameters of a block and its shaking; text may have a unit."""
 
-    theta: Annotated[str | None, _with_unit(BLOCK, "Inclination of the base: 5 (degrees), 0.1rad.")] = None
+    theta: Annotated[str | None, BLOCK.value("Inclination of the base: 5 (degrees), 0.1rad.")] = None
     mu_s: Annotated[float | None, BLOCK("Static friction coefficient.")] = None
-    phi: Annotated[str | None, _with_unit(BLOCK, "Friction angle instead of --mu-s: 21 (degrees).")] = None
+    phi: Annotated[str | None, BLOCK.value("Friction angle instead of --mu-s: 21 (degrees).")] = None
     yield_acceleration: Annotated[
-        str | None, _with_unit(BLOCK, "Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).")
+        str | None, BLOCK.value("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).")
     ] = None
     yield_coefficient: Annotated[float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")] = None
     decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = None
     delta_mu: Annotated[float | None, BLOCK("Friction above static Δμ (default: Eqs. 10, 11).")] = None
     minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = None
     structure_frequency: Annotated[
-        str | None, _with_unit(RARE, "Natural frequency of the structure, Hz: flag flexible_block.")
+        str | None, RARE.value("Natural frequency of the structure, Hz: flag flexible_block.")
     ] = None
-    amplitude: Annotated[str | None, _with_unit(SHAKING, "Peak ground acceleration: 0.36g, 3.5 (m/s²).")] = None
+    amplitude: Annotated[str | None, SHAKING.value("Peak ground acceleration: 0.36g, 3.5 (m/s²).")] = None
     displacement_amplitude: Annotated[
-        str | None, _with_unit(SHAKING, "Peak ground displacement instead: 30mm, 0.03 (m); not with a record.")
+        str | None, SHAKING.value("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.")
     ] = None
-    frequency: Annotated[str | None, _with_unit(SHAKING, "Excitation frequency, Hz; not with a record.")] = None
+    frequency: Annotated[str | None, SHAKING.value("Excitation frequency, Hz; not with a record.")] = None
     scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = None
-    pgv: Annotated[str | None, _with_unit(RARE, "Peak ground velocity to scale a record to: 40cm/s.")] = None
-    arias_intensity: Annotated[str | None, _with_unit(RARE, "Arias intensity to scale a record to, m/s.")] = None
+    pgv: Annotated[str | None, RARE.value("Peak ground velocity to scale a record to: 40cm/s.")] = None
+    arias_intensity: Annotated[str | None, RARE.value("Arias intensity to scale a record to, m/s.")] = None
     time_scale: Annotated[float | None, RARE("Factor on a record's time (default: 1).")] = None
     polarity: Annotated[
         int | None, SHAKING("Sign of a record, 1 or -1; 1: positive drives downslope (default: 1).")
