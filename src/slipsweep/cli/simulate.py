@@ -85,8 +85,8 @@ def simulate(
     paths = common.check_outputs(output, (".nc", ".csv", *FIGURES), overwrite, [record] if record else [])
     with_unit: dict[str, Any] = {
         name: quantity(option_name(name), text, PARAMETERS[name]["units"], model.g)
-        for name, text in vars(typed).items()
-        if isinstance(text, str)
+        for name in PARAMETERS
+        if isinstance(text := getattr(typed, name, None), str)
     }
     taken_as, given = common.taken_as(with_unit, model.g), vars(typed) | with_unit
     motion = _motion(record, reading, excitation)
