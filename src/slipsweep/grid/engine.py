@@ -27,8 +27,9 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
 
-#: Cells that a kernel solves in a call: their arrays stay in the cache, and Ctrl-C is heard between two calls.
-_TILE = 16384
+#: Cells that a kernel solves in a call, at least and at most: so many that Python's part is small, so few that Ctrl-C
+#: is heard between two calls.
+_LEAST_TILE, _MOST_TILE = 16384, 65536
 
 #: Powers of 1/ω, or of the factor on a record's time, in results.
 _POWERS = {"permanent_displacement": 2, "newmark_displacement": 2, "peak_relative_velocity": 1}
@@ -220,7 +221,8 @@ def _fill(
     """Fill in results, tile by tile, by what finds these rows of a cell in `cost` times the time of a sine's."""
     scaled = scaled_dimension(request)
     cell_shape = tuple(1 if axis == scaled else size for axis, size in enumerate(request.shape))
-    tile = max(_TILE // cost, 1)
+    share = math.prod(cell_shape) // (8 * threads.thread_count())
+    tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // cost, 1)
     tiles = list(slabs(cell_shape, tile))
 
     def work(first: int, last: int) -> None:
