@@ -1,7 +1,7 @@
 """Arrays in, arrays out: the sweep without labels.
 
-A grid is cut into tiles of some thousand cells.  The inputs of a tile are gathered by NumPy, one array a parameter, and
-solved by a kernel (`slipsweep.grid.solvers`) on as many threads as there are; what it finds of a cell, in units of
+A grid is cut into tiles of some thousand cells.  The inputs of a tile are gathered by NumPy into an array of cells,
+which a kernel solves (`slipsweep.grid.solvers`), on as many threads as there are; what it finds of a cell, in units of
 phase, is spread over the frequencies of that cell: v = V/ω and u = W/ω² (the scaling law).
 """
 

@@ -33,8 +33,8 @@ single = _part(fastmath={"contract", "arcp"}, inline="always")
 elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
 
 
-#: The same for functions that are passed as values, those of a friction law and those that solve a cell: numba keeps a
-#: kernel on disk only if such a function is none that was compiled before.
+#: The same for functions that are passed as values, those of a friction law: numba keeps a kernel on disk only if such
+#: a function is none that was compiled before.
 registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
     error_model="numpy", fastmath={"contract", "arcp"}
 )
