@@ -21,7 +21,7 @@ ORDER = (
 LINES = {
     "jit": 410,
     "model": 1_490,
-    "motion": 2_360,
+    "motion": 2_250,
     "kernels": 3_310,
     "grid": 1_490,
     "studies": 5_090,

@@ -63,7 +63,7 @@ def test_all_damaged_files_are_named_at_once(folder: Path) -> None:
 def test_stems_that_are_alike_are_told_apart(tmp_path: Path) -> None:
     paths = [write(tmp_path / name) for name in ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c.csv")]
     assert read_suite(paths).labels == ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c")
-    assert Suite((noise(1), noise(1), noise(2))).labels == ("noise1", "noise1 (2)", "noise2")
+    assert Suite((noise(1), noise(1), noise(2))).labels == ("noise1.csv", "noise1.csv (2)", "noise2")
 
 
 def test_motions_that_are_the_same_are_told(folder: Path) -> None:
@@ -102,9 +102,9 @@ def test_measures_along_the_motions(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("motions", "labels", "words"),
     [
-        ((), (), r"motions = \[\]: must hold one motion"),
+        ((), (), "motions: 0: must be one at least"),
         ((noise(1), "b"), (), r"motions\[2\] = 'b': must be a Record"),
-        ((noise(1), Pair(noise(1), noise(2))), (), "all Records, or all Pairs"),
+        ((noise(1), Pair(noise(1), noise(2))), (), "all Records or all Pairs"),
         ((noise(1), noise(2)), ("a",), "^labels = "),
         ((noise(1), noise(2)), ("a", "a"), "^labels = "),
         ((noise(1), noise(2)), ("a", "\n"), "^labels: "),
@@ -124,8 +124,8 @@ def test_what_is_no_suite(motions: Any, labels: Any, words: str) -> None:
         ("none/*.csv", r"none/\*\.csv: no file fits this pattern"),
         ("none.csv", r"1 of 1 files cannot be read: none\.csv"),
         ([], r"paths = \[\]: must name one motion at least"),
-        (3, "paths = 3: must be a folder"),
-        ([("a.csv", "b.csv", "c.csv")], "must be two files"),
+        (3, "paths = 3: must be a list of files"),
+        ([("a.csv", "b.csv", "c.csv")], "pairs of files"),
         ("empty", "a folder without files"),
         ("\0", "cannot be read"),
     ],
@@ -177,7 +177,7 @@ def test_pairs_by_the_endings_of_their_names(tmp_path: Path) -> None:
     assert suite.measures["motion_file"].tolist() == ["one_NS.csv one_EW.csv", "two_NS.csv two_EW.csv"]
     write(tmp_path / "three_NS.csv")
     write(tmp_path / "vertical.csv")
-    with pytest.raises(InputError, match=r"without the other component: vertical\.csv, three_NS\.csv"):
+    with pytest.raises(InputError, match=r"without the other component: three_NS\.csv, vertical\.csv"):
         read_suite(tmp_path, pairs=("_NS", "_EW"))
     for pairs in ("_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)):
         with pytest.raises(InputError, match=r"^pairs = "):

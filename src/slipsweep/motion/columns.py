@@ -1,7 +1,7 @@
 """Files of columns that have names and units in their first line: tests on a shaking table, hazard curves."""
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +17,8 @@ def read_columns(
     holds: Callable[[str, set[str], str], tuple[str, float] | None],
     needed: Sequence[str],
     example: str,
-    may_be_blank: Collection[str] = (),
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns of numbers, by what they hold and in its unit.
+    """Columns of numbers, by what they hold and in its unit; a blank cell is NaN.
 
     The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
     or commas: the first of these that is in it.  Commas that do not separate are decimal.
@@ -36,8 +35,6 @@ def read_columns(
         What there must be.
     example : str
         A line of names, for errors.
-    may_be_blank : collection of str
-        What may have blank cells, NaN then.
 
     Raises
     ------
@@ -46,31 +43,29 @@ def read_columns(
     """
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     number, header = rows[0] if rows else (1, "")
-    separator = next((one for one in ("\t", ";", ",") if one in header), ",")
-    names = [cell.strip() for cell in header.split(separator)]
+    separator = next((one for one in "\t;," if one in header), ",")
+    names = [cell.strip(' "') for cell in header.split(separator)]
     columns: dict[str, tuple[int, float]] = {}
     for at, name in enumerate(names):
-        matched = re.fullmatch(r"(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*", name.strip('"'))
-        text, unit = (matched[1], matched[2]) if matched else (name.strip('"'), "")
-        found = holds(name, {*re.split(r"[\s_\-]+", text.lower())}, unit)
-        if found is not None and found[0] in columns:
+        text, _, unit = name.replace("[", "(").partition("(")
+        found = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]"))
+        if found is None:
+            continue
+        if found[0] in columns:
             raise InputError(f"{path}: line {number}: two columns are {found[0]}: must be one")
-        if found is not None:
-            columns[found[0]] = at, found[1]
+        columns[found[0]] = at, found[1]
     for what in needed:
         if what not in columns:
             raise InputError(f"{path}: line {number}: no column {what}: must name its columns, such as {example}")
 
-    values = {what: np.full(len(rows) - 1, np.nan) for what in columns}
+    values = {what: np.empty(len(rows) - 1) for what in columns}
     for row, (number, line) in enumerate(rows[1:]):
-        cells = [cell.strip() for cell in line.split(separator)]
+        cells = [(cell if separator == "," else cell.replace(",", ".")).strip() for cell in line.split(separator)]
         if len(cells) != len(names):
             raise InputError(f"{path}: line {number}: {len(cells)} cells, where {len(names)} columns are named")
         for what, (at, factor) in columns.items():
-            cell = cells[at] if separator == "," else cells[at].replace(",", ".")
             try:
-                if cell or what not in may_be_blank:
-                    values[what][row] = factor * float(cell)
+                values[what][row] = factor * float(cells[at] or "nan")
             except ValueError:
-                raise InputError(f"{path}: line {number}: {what} = {shown(cell)}: must be a number") from None
+                raise InputError(f"{path}: line {number}: {what} = {shown(cells[at])}: must be a number") from None
     return values

@@ -7,6 +7,7 @@ piece to the beginning of the next w may jump; before the first piece and after 
 happen in the intervals with w > 0 whose height exceeds Üy/A.
 """
 
+import bisect
 import functools
 import itertools
 import math
@@ -16,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.pieces import END, JUMPS, START, Wave, intervals_of, pieces_of
+from slipsweep.motion.intensity import spacing_of
+from slipsweep.motion.pieces import END, FIRST, JUMPS, LAST, START, Wave, pieces_of, wave_of_pieces
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
@@ -123,43 +125,40 @@ def _sign_changes(derivative: Derivative, order: int, edges: Exact, depth: int =
     return np.asarray(high)
 
 
-class _Pieces(NamedTuple):
-    """Pieces of one cycle: where they begin and end (parts of the cycle), and their polynomials."""
+class _Piece(NamedTuple):
+    """A piece of one cycle: where it begins and ends (parts of the cycle), and its polynomial about its anchor."""
 
-    start: Exact
-    end: Exact
-    first: Exact
-    last: Exact
-    at_end: NDArray[np.bool_]  # the anchor
+    start: float
+    end: float
+    first: float
+    last: float
+    at_end: bool  # the anchor
     coefficients: Exact
 
 
-def _joined(parts: Sequence[_Pieces]) -> _Pieces:
-    return _Pieces(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-
-
-def _pieces(waveform: Waveform, n: int) -> _Pieces:
+def _pieces(waveform: Waveform, n: int) -> list[_Piece]:
     """The pieces of cycle n."""
     period = _period(waveform.plain)
-    cycles, rise, fall = waveform.cycles, _Extended(waveform.ramp_in), _Extended(waveform.ramp_out)
-    inner = {float(rise - n), float(cycles - fall - n)}
-    cuts = [0.0, *sorted(u for u in inner if 0.0 < u < 1.0), 1.0]
-    parts = []
-    for low, high in itertools.pairwise(cuts):
+    rise, fall, left = _Extended(waveform.ramp_in), _Extended(waveform.ramp_out), waveform.cycles - n
+    places = [*period.breaks]
+    for place in (float(rise - n), float(left - fall)):
+        if 0.0 < place < 1.0 and min(abs(place - other) for other in places) > _SAME:
+            places.append(place)
+    found = []
+    for low, high in itertools.pairwise(sorted(places)):
         scale, rate = _Extended(1), _Extended(0)  # the ramp at `low`, and its slope by phase
         if n + 0.5 * (low + high) < rise:
             scale, rate = (n + _Extended(low)) / rise, 1 / (rise * _TURN)
-        elif cycles - n - 0.5 * (low + high) < fall:
-            scale, rate = (cycles - n - _Extended(low)) / fall, -1 / (fall * _TURN)
-        for derivative, start, end in zip(period.derivatives, period.breaks[:-1], period.breaks[1:], strict=True):
-            begin, stop = max(start, low), min(end, high)
-            if stop - begin > _SAME:
-                own = scale + rate * (_Extended(begin) - low) * _TURN
-                parts.append(_smooth_pieces(derivative, period.fastest, begin, stop, own, rate))
-    return _joined(parts)
+        elif left - 0.5 * (low + high) < fall:
+            scale, rate = (left - _Extended(low)) / fall, -1 / (fall * _TURN)
+        derivative = period.derivatives[bisect.bisect(period.breaks, low) - 1]
+        found += _smooth_pieces(derivative, period.fastest, low, high, scale, rate)
+    return found
 
 
-def _smooth_pieces(derivative: Derivative, fastest: int, low: float, high: float, scale: Any, rate: Any) -> _Pieces:
+def _smooth_pieces(
+    derivative: Derivative, fastest: int, low: float, high: float, scale: Any, rate: Any
+) -> list[_Piece]:
     """The pieces between two places of a smooth wave times its ramp, `scale` at `low` and of slope `rate`."""
 
     def ramped(u: Exact, order: int) -> Exact:
@@ -189,53 +188,42 @@ def _smooth_pieces(derivative: Derivative, fastest: int, low: float, high: float
     values[np.abs(values) < _ROUNDING] = 0.0
     at_end = np.abs(values[1:]) > np.abs(values[:-1])
     coefficients = np.where(at_end, series[1:-1, 1:], series[1:-1, :-1]).T.astype(np.float64)
-    return _Pieces(places[:-1], places[1:], values[:-1], values[1:], at_end, coefficients)
+    return [*map(_Piece, places[:-1], places[1:], values[:-1], values[1:], at_end, coefficients)]
 
 
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
     cycles, plain = waveform.cycles, _pieces(waveform.plain, 0)
-    wraps = bool(plain.first[0] > 0.0 and plain.last[-1] > 0.0)
+    wraps = int(plain[0].first > 0.0 and plain[-1].last > 0.0)
     # an interval that runs over from one cycle to the next makes the first cycle differ from the others
-    lead = min(math.ceil(waveform.ramp_in) + int(wraps), cycles)
+    lead = min(math.ceil(waveform.ramp_in) + wraps, cycles)
     # the last plain cycle stands apart, as another does not follow; where intervals run over, so does the one before
-    tail = min(math.ceil(waveform.ramp_out) + 1 + int(wraps), cycles - lead)
+    tail = min(math.ceil(waveform.ramp_out) + 1 + wraps, cycles - lead)
     repeats = cycles - lead - tail
     numbers = [*range(lead), *([lead] if repeats else []), *range(cycles - tail, cycles)]
     ramped = [n < waveform.ramp_in or n + 1 > cycles - waveform.ramp_out for n in numbers]
     rows = [_pieces(waveform, n) if own else plain for n, own in zip(numbers, ramped, strict=True)]
 
-    counts = [row.start.size for row in rows]
-    joined = _joined(rows)
-    offset = np.repeat(2.0 * math.pi * np.arange(len(rows)), counts)
-    before = np.concatenate([[0.0], joined.last[:-1]])
+    counts = [len(row) for row in rows]
+    start, end, first, last, at_end, coefficients = map(np.array, zip(*itertools.chain(*rows), strict=True))
+    before = np.concatenate([[0.0], last[:-1]])
     # two cycles' roundings are no jump
-    first = np.where(np.abs(joined.first - before) < _ROUNDING, before, joined.first)
+    first = np.where(np.abs(first - before) < _ROUNDING, before, first)
+    offset = np.repeat(np.arange(len(rows)), counts)
     table = pieces_of(
-        start=offset + 2.0 * math.pi * joined.start,
-        end=offset + 2.0 * math.pi * joined.end,
-        length=2.0 * math.pi * (joined.end - joined.start),
+        start=2.0 * math.pi * offset + 2.0 * math.pi * start,
+        end=2.0 * math.pi * offset + 2.0 * math.pi * end,
+        length=2.0 * math.pi * (end - start),
         first=first,
-        last=joined.last,
-        at_end=joined.at_end,
-        coefficients=joined.coefficients,
+        last=last,
+        at_end=at_end,
+        coefficients=coefficients,
         arc=np.repeat([_is_sine(waveform) and not own for own in ramped], counts),
     )
-    interval, height = intervals_of(table)
-    return Wave(
-        pieces=table,
-        cycle=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        shape=np.array([1 + n if own else 0 for n, own in enumerate(ramped)], np.int64),
-        interval=interval,
-        height=height,
-        same=_same(table, interval),
-        rises=_rises(first, joined.last, table[:, JUMPS] > 0.0),
-        highest=float(max(first.max(), joined.last.max())),
-        lowest=float(min(first.min(), joined.last.min())),
-        lead=lead,
-        repeats=repeats,
-    )
+    shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
+    wave = wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
+    return wave._replace(same=_same(wave), rises=_rises(table))
 
 
 def _is_sine(waveform: Waveform) -> bool:
@@ -245,20 +233,20 @@ def _is_sine(waveform: Waveform) -> bool:
     return waveform.name in ("sine", "cosine")
 
 
-def _same(pieces: NDArray[np.float64], interval: NDArray[np.int64]) -> NDArray[np.int64]:
+def _same(wave: Wave) -> NDArray[np.int64]:
     """The first interval of the same pieces as each up to the interval after it, but for when they come."""
-    shapes = np.delete(pieces, [START, END], axis=1)
+    shapes = np.delete(wave.pieces, [START, END], axis=1)
+    ways = itertools.pairwise([*wave.interval[:, 0], len(shapes)])
     first: dict[bytes, int] = {}
-    ways = itertools.pairwise([*interval[:, 0], pieces.shape[0]])
     return np.array([first.setdefault(shapes[p:q].tobytes(), k) for k, (p, q) in enumerate(ways)], np.int64)
 
 
-def _rises(first: NDArray[np.float64], last: NDArray[np.float64], jumps: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _rises(pieces: NDArray[np.float64]) -> NDArray[np.float64]:
     """Ranges of w > 0 passed through or jumped to without falling, joined where they overlap."""
-    above = first + last > 0.0
-    found = sorted((first[p], max(first[p], last[p])) for p in np.flatnonzero(above & ((last >= first) | jumps)))
+    first, last = pieces[:, FIRST], pieces[:, LAST]
+    rising = (first + last > 0.0) & ((last >= first) | (pieces[:, JUMPS] > 0.0))
     joined: list[list[float]] = []
-    for low, high in found:
+    for low, high in sorted(zip(first[rising], np.maximum(first, last)[rising], strict=True)):
         if joined and low <= joined[-1][1]:
             joined[-1][1] = max(joined[-1][1], high)
         else:
@@ -271,22 +259,11 @@ MOST_TABLES = 16
 TABLE_BYTES = 160
 
 
-def _spacing(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The intervals between samples: one, where the times are its multiples to rounding.
-
-    Differences of times have the rounding of the times, 1e-10 of an interval after a million samples.
-    """
-    spacing = np.diff(times)
-    even = (times[-1] - times[0]) / spacing.size
-    off = np.abs(times - (times[0] + even * np.arange(times.size))).max()
-    return np.full(spacing.size, even) if off <= 2.0 * np.spacing(np.abs(times).max()) else spacing
-
-
 @functools.lru_cache(maxsize=MOST_TABLES)
 def wave_of_record(record: Record, polarity: float) -> Wave:
     """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
     times, values = record.times, polarity * record.acceleration
-    spacing, change = _spacing(times), np.diff(values)
+    spacing, change = spacing_of(times), np.diff(values)
     slope = change / spacing
     # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
@@ -306,17 +283,4 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         coefficients=np.where(first == last, 0.0, slope[own])[:, np.newaxis],
         arc=np.zeros(own.size, np.bool_),
     )
-    interval, height = intervals_of(pieces)
-    return Wave(
-        pieces=pieces,
-        cycle=np.array([0, own.size], np.int64),
-        shape=np.zeros(1, np.int64),
-        interval=interval,
-        height=height,
-        same=np.arange(height.size),
-        rises=np.empty((0, 2)),  # each pulse has its own
-        highest=float(values.max()),
-        lowest=float(values.min()),
-        lead=0,
-        repeats=0,
-    )
+    return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])  # each pulse of a record has its own rises

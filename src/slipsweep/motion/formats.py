@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
 
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
-_COUNT = r"(\d{1,9})"
+_COUNT = r"(\d{1,9})\b"
 
 
 class Samples(NamedTuple):
@@ -46,10 +46,8 @@ def read_lines(path: Path) -> tuple[bytes, list[str]]:
     """The content of a file, and its lines (InputError: it cannot be read)."""
     try:
         content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except ValueError as error:  # a name that no system has
-        raise InputError(f"path = {shown(str(path))}: cannot be read: {error}") from None
+    except (OSError, ValueError) as error:  # ValueError: a name that no system has
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
     return content, content.decode("utf-8-sig", errors="replace").splitlines()
 
@@ -67,17 +65,22 @@ def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, S
 
 def _format_of(lines: list[str], reading: Reading) -> str:
     """The format of a file, from its header."""
-    if lines and _COSMOS_HEAD.search(lines[0]):
+    first = lines[0] if lines else ""
+    if re.search(_COSMOS_HEAD, first, re.IGNORECASE):
         return "cosmos"
     if any("NPTS" in line.upper() for line in lines[:6]):
         return "at2"
     if any(line.startswith("SAMPLING_INTERVAL_S:") for line in lines[:100]):
         return "esm"
-    if lines and lines[0].startswith("Origin Time"):
+    if first.startswith("Origin Time"):
         return "knet"
     header, body = _header(lines)
     has_times = not body or len(_cells(body[0][1])) > 1
-    return "csv" if has_times and reading.interval is None and not _interval_in(header) else "values"
+    return "csv" if has_times and reading.interval is None and not re.search(_INTERVAL, header) else "values"
+
+
+#: The sampling interval in the header of a file without times: ``dt = 0.01``.
+_INTERVAL = rf"(?i)\b(?:dt|interval)\s*[=:]\s*{_NUMBER}"
 
 
 def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
@@ -95,28 +98,26 @@ def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
 
 def _values(path: Path, lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
-    own = _interval_in(header)
+    found = re.search(_INTERVAL, header)
+    own = float(found[1]) if found else None
     step = reading.interval or own
     if step is None:
         raise InputError(f"{path}: interval: must be given, s: the file has accelerations alone, without times")
     if own and step != own:
         raise InputError(f"{path}: interval = {step:g}: the file itself says {own:g}; leave interval out")
-    # commas are decimal where no number has a point and none has two of them, as 0,123 has
-    comma = " " if any("." in line or re.search(r",[^\s,]*,", line) for _, line in body) else "."
-    found = _numbers(path, body, lambda line: line.replace(",", comma).replace(";", " ").split())
-    if found.size == 2 * len(body) and (np.diff(found[::2]) > 0.0).all() and len(body) > 1:
+    # in a single column of 0,123 commas are decimal, elsewhere as in any line
+    decimal = all(re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", line) for _, line in body)
+    values = _numbers(path, body, lambda line: [line.replace(",", ".")] if decimal else filter(None, _cells(line)))
+    if values.size == 2 * len(body) > 2 and (np.diff(values[::2]) > 0.0).all():
         raise InputError(f"{path}: interval = {step:g}: the first of two columns is that of times; leave interval out")
-    return Samples(_even(path, found, step), found, _unit_in(header))
+    return _even(path, values, step, _unit_in(header))
 
 
 def _header(lines: list[str]) -> tuple[str, list[tuple[int, str]]]:
     """The text before the numbers, and the numbered lines from the first that begins with one; no comments."""
-    numbered = enumerate(lines, 1)
-    first = next((at for at, line in numbered if any(re.fullmatch(_NUMBER, cell) for cell in _cells(line)[:1])), None)
-    if first is None:
-        return "\n".join(lines), []
-    rows = [(first, lines[first - 1]), *numbered]
-    return "\n".join(lines[: first - 1]), [row for row in rows if row[1].strip() and not row[1].startswith("#")]
+    first = next((at for at, line in enumerate(lines) if re.fullmatch(_NUMBER, [*_cells(line), ""][0])), len(lines))
+    rows = enumerate(lines[first:], first + 1)
+    return "\n".join(lines[:first]), [row for row in rows if row[1].strip() and not row[1].startswith("#")]
 
 
 def _cells(line: str) -> list[str]:
@@ -140,76 +141,63 @@ def _unit_in(header: str) -> str | None:
     return found
 
 
-def _interval_in(header: str) -> float | None:
-    """The sampling interval that a header gives: ``dt = 0.01``."""
-    found = re.search(rf"\b(?:dt|interval)\s*[=:]\s*{_NUMBER}", header, re.IGNORECASE)
-    return float(found[1]) if found else None
-
-
 def _at2(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), 0)
     if re.search("VELOCITY|DISPLACEMENT", "\n".join(lines[:at]), re.IGNORECASE):
         raise InputError(f"{path}: its header speaks of velocity or displacement: must be an acceleration (.AT2)")
-    line = lines[at] if lines else ""
     # in files of the first database "4096  0.0100  NPTS, DT"
-    old = re.match(rf"\s*{_COUNT}\s+{_NUMBER}\s+NPTS,\s*DT", line, re.IGNORECASE)
-    points = old[1] if old else _in_header(path, line, "NPTS=", rf"NPTS\s*=\s*{_COUNT}\b")
-    interval = old[2] if old else _in_header(path, line, "DT=", rf"DT\s*=\s*{_NUMBER}")
+    line = re.sub(rf"(?i)^\s*{_COUNT}\s+{_NUMBER}\s+NPTS,\s*DT", r"NPTS=\1, DT=\2", "".join(lines[at : at + 1]))
+    points, interval = (
+        _found(path, line, f"{name}= in its header", rf"{name}\s*=\s*{number}")[1]
+        for name, number in (("NPTS", _COUNT), ("DT", _NUMBER))
+    )
     values = _numbers(path, enumerate(lines[at + 1 :], at + 2))
-    return Samples(_even(path, values, float(interval), int(points)), values, "g")
+    return _even(path, values, float(interval), "g", int(points))
 
 
 def _esm(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
     interval, points, unit = (
-        _in_header(path, "\n".join(lines[:at]), name, rf"^{name}:\s*{pattern}\s*$")
+        _found(path, "\n".join(lines[:at]), f"{name} in its header", rf"^{name}:\s*{pattern}\s*$")[1]
         for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", _COUNT), ("UNITS", r"(\S+)"))
     )
     unit = unit.lower().replace("^", "")
     if unit not in UNITS:
         raise InputError(f"{path}: UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
-    values = _numbers(path, enumerate(lines[at:], at + 1))
-    return Samples(_even(path, values, float(interval), int(points)), values, unit)
+    return _even(path, _numbers(path, enumerate(lines[at:], at + 1)), float(interval), unit, int(points))
 
 
 def _knet(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
-    frequency, duration, full_scale, counts = (
-        float(_in_header(path, "\n".join(lines[:at]), name, rf"^{re.escape(name)}{pattern}"))
+    frequency, duration, gals, counts = (
+        float(number)
         for name, pattern in (
-            ("Sampling Freq(Hz)", rf"\s*{_NUMBER}"),
-            ("Duration Time(s)", rf"\s*{_NUMBER}"),
-            ("Scale Factor", rf"\s*{_NUMBER}\(gal\)/"),
-            ("Scale Factor", rf".*\(gal\)/{_NUMBER}"),
+            ("Sampling Freq(Hz)", _NUMBER),
+            ("Duration Time(s)", _NUMBER),
+            ("Scale Factor", rf"{_NUMBER}\(gal\)/{_NUMBER}"),
         )
+        for number in _found(
+            path, "\n".join(lines[:at]), f"{name} in its header", rf"^{re.escape(name)}\s*{pattern}"
+        ).groups()
     )
-    if not (0.0 < frequency < 1e6 and 0.0 < counts <= LARGEST and 0.0 < full_scale <= LARGEST):
-        raise InputError(f"{path}: {frequency:g} Hz, {full_scale:g} gal, {counts:g} counts: must be > 0")
-    values = _numbers(path, enumerate(lines[at + 1 :], at + 2)) * (full_scale / counts)
-    return Samples(_even(path, values, 1.0 / frequency, round(min(duration * frequency, 1e9))), values, "gal")
-
-
-def _in_header(path: Path, header: str, name: str, pattern: str) -> str:
-    """What a pattern finds in a header (InputError: nothing)."""
-    found = re.search(pattern, header, re.MULTILINE | re.IGNORECASE | re.ASCII)
-    if found is None:
-        raise InputError(f"{path}: no {name} in its header, or none that can be read: another format, or damaged")
-    return found[1]
+    if not (0.0 < frequency < 1e6 and 0.0 < counts <= LARGEST and 0.0 < gals <= LARGEST):
+        raise InputError(f"{path}: {frequency:g} Hz, {gals:g} gal, {counts:g} counts: must be > 0")
+    values = _numbers(path, enumerate(lines[at + 1 :], at + 2)) * (gals / counts)
+    return _even(path, values, 1.0 / frequency, "gal", round(min(duration * frequency, 1e9)))
 
 
 #: Codes of units that are accelerations (Table 2 of the format).
 _COSMOS_UNITS = {2: "g", 4: "cm/s2", 10: "gal"}
 
-_COSMOS_HEAD = re.compile(r"\(Format v\s*[\d.]+ with\s+(\d{1,4})\s+text lines\)", re.IGNORECASE)
-# of each section's first line: how many numbers (or lines) follow, how many to a line, and columns of each of them
-_FORMAT = r".*Format\s*=?\s*\((\d{0,3})[IFEG](\d{1,3})"
-_COSMOS_HEADER = rf"\s*{_COUNT}\s+%s-header values follow on\s+\d+\s+lines\s*,{_FORMAT}"
-_COSMOS_COMMENTS = rf"\s*{_COUNT}\s+Comment line"
-_COSMOS_DATA = rf"\s*{_COUNT}\s+\w+.*?\bpts?\b{_FORMAT}"
+_COSMOS_HEAD = r"\(Format v\s*[\d.]+ with\s+(\d{1,4})\s+text lines\)"
+# of each section's first line: how many numbers follow, how many to a line, and columns of each of them
+_COSMOS_FORMAT = r".*Format\s*=?\s*\((\d{0,3})[IFEG](\d{1,3})"
+_COSMOS_HEADER = rf"^\s*{_COUNT}\s+%s-header values follow on\s+\d+\s+lines\s*,{_COSMOS_FORMAT}"
+_COSMOS_DATA = rf"^\s*{_COUNT}\s+\w+.*?\bpts?\b{_COSMOS_FORMAT}"
 
 
 def _cosmos(path: Path, lines: list[str], reading: Reading) -> Samples:
-    starts = [at for at, line in enumerate(lines) if _COSMOS_HEAD.search(line)]
+    starts = [at for at, line in enumerate(lines) if re.search(_COSMOS_HEAD, line, re.IGNORECASE)]
     read = (_cosmos_channel(path, lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
     channels = [one for one in read if one is not None]
     if reading.channel is None and len(channels) > 1:
@@ -220,15 +208,33 @@ def _cosmos(path: Path, lines: list[str], reading: Reading) -> Samples:
     return channels[number - 1]
 
 
-def _cosmos_channel(path: Path, lines: list[str], start: int) -> Samples | None:
+def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
     """The channel that begins at a line and goes to the last one; None if it is no acceleration."""
-    at = start + int(_in_header(path, lines[start], "number of text lines", _COSMOS_HEAD.pattern))
-    at, whole = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Integer")
-    at, reals = _cosmos_values(path, lines, at, _COSMOS_HEADER % "Real")
+
+    def head(what: str, pattern: str) -> re.Match[str]:
+        return _found(path, "".join(lines[at : at + 1]), f"{what} in line {at + 1}", pattern)
+
+    def section(what: str, pattern: str) -> tuple[int, Floats]:
+        """The line after the values of a section, and these."""
+        found = head(what, pattern)
+        count, each, width = int(found[1]), int(found[2] or 1) or 1, int(found[3]) or 1
+        end = at + 1 + -(-count // each)
+
+        def cells(line: str) -> list[str]:
+            return [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
+
+        values = _numbers(path, enumerate(lines[at + 1 : end], at + 2), cells, f"numbers, {width} columns each")
+        if values.size != count:
+            raise InputError(f"{path}: line {end}: {values.size} values, where {count} are announced")
+        return end, values
+
+    at += int(head("number of text lines", _COSMOS_HEAD)[1])
+    at, whole = section("integer header", _COSMOS_HEADER % "Integer")
+    at, reals = section("real header", _COSMOS_HEADER % "Real")
     if whole.size < 3 or reals.size < 62:
-        raise InputError(f"{path}: line {start + 1}: {whole.size} integers and {reals.size} reals: not enough")
-    at += 1 + int(_cosmos_line(path, lines, at, _COSMOS_COMMENTS)[1])
-    at, values = _cosmos_values(path, lines, at, _COSMOS_DATA)
+        raise InputError(f"{path}: line {at}: {whole.size} integers and {reals.size} reals: not enough")
+    at += 1 + int(head("number of comment lines", rf"^\s*{_COUNT}\s+Comment line")[1])
+    at, values = section("number and format of values", _COSMOS_DATA)
     # what a V2 file may have behind the acceleration is its velocity and displacement
     if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
         raise InputError(f"{path}: no line End-of-data after the values: cut off, or damaged")
@@ -237,30 +243,15 @@ def _cosmos_channel(path: Path, lines: list[str], start: int) -> Samples | None:
     if whole[2] not in _COSMOS_UNITS:
         known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
         raise InputError(f"{path}: code {whole[2]:.0f} for the unit of its values: must be one of {known}")
-    return Samples(_even(path, values, reals[61] / 1000.0), values, _COSMOS_UNITS[int(whole[2])])
+    return _even(path, values, reals[61] / 1000.0, _COSMOS_UNITS[int(whole[2])])
 
 
-def _cosmos_line(path: Path, lines: list[str], at: int, pattern: str) -> re.Match[str]:
-    line = lines[at] if at < len(lines) else "the end of the file"
-    found = re.match(pattern, line, re.IGNORECASE)
+def _found(path: Path, text: str, what: str, pattern: str) -> re.Match[str]:
+    """What a pattern finds in a header (InputError: nothing)."""
+    found = re.search(pattern, text, re.MULTILINE | re.IGNORECASE | re.ASCII)
     if found is None:
-        raise InputError(f"{path}: line {at + 1}: {shown(line)}: not what the COSMOS format has here: damaged?")
+        raise InputError(f"{path}: no {what}, or none that can be read: another format, or damaged")
     return found
-
-
-def _cosmos_values(path: Path, lines: list[str], at: int, pattern: str) -> tuple[int, Floats]:
-    """A section: a line that says how many values follow and in what columns, then these; and the line after it."""
-    head = _cosmos_line(path, lines, at, pattern)
-    count, each, width = int(head[1]), int(head[2] or 1) or 1, int(head[3]) or 1
-    end = at + 1 + -(-count // each)
-
-    def cells(line: str) -> list[str]:
-        return [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
-
-    values = _numbers(path, enumerate(lines[at + 1 : end], at + 2), cells, f"numbers, {width} columns each")
-    if values.size != count:
-        raise InputError(f"{path}: line {end}: {values.size} values, where {count} are announced")
-    return end, values
 
 
 def _numbers(
@@ -279,10 +270,10 @@ def _numbers(
     return np.array(values)
 
 
-def _even(path: Path, values: Floats, interval: float, points: int | None = None) -> Floats:
-    """Times of evenly sampled values, whose header may say how many they are."""
+def _even(path: Path, values: Floats, interval: float, unit: str | None, points: int | None = None) -> Samples:
+    """Evenly sampled values, whose header may say how many they are."""
     if points is not None and values.size != points:
         raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
     if not 0.0 < interval <= LARGEST:
         raise InputError(f"{path}: sampling interval {interval:g}: must be a finite number > 0")
-    return np.arange(values.size, dtype=np.float64) * interval
+    return Samples(np.arange(values.size, dtype=np.float64) * interval, values, unit)

@@ -39,23 +39,20 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     InputError
         Something is missing, and `gaps` is not "linear": with the time and the value.
     """
-    missing = _is_fill(values)
+    missing, intervals = _is_fill(values), np.diff(times)
     findings = []
     if missing.any():
         kinds = ", ".join("blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[missing])[:3])
         count = f"{missing.sum()} fill value{'s' if missing.sum() > 1 else ''}"
         findings.append(f"{count} ({kinds}), first at t = {times[missing][0]:.6g} s")
-    intervals = np.diff(times)
     if intervals.size >= _FEWEST and (intervals > 0.0).all():
         median = float(np.median(intervals))
         wide = np.flatnonzero(intervals > _GAP * median)
-        more = f", and {wide.size - 1} more" if wide.size > 1 else ""
-        if wide.size:
-            at = wide[0]
-            findings.append(
-                f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
-                f"median interval of {median:.4g} s){more}"
-            )
+        findings += [
+            f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
+            f"median interval of {median:.4g} s)" + (f", and {wide.size - 1} more" if wide.size > 1 else "")
+            for at in wide[:1]
+        ]
         findings += _held(times[~missing], values[~missing])
     found = "; ".join(findings)
     if found and gaps == "refuse":
@@ -82,58 +79,55 @@ def check_plausible(record: Motion, unit: str, implausible: str, has_gaps: bool)
 
 def _is_fill(values: Floats) -> NDArray[np.bool_]:
     """Which values stand for missing samples."""
-    missing = np.isnan(values)
-    magnitude = np.where(missing, 0.0, np.abs(values))
+    missing, magnitude = np.isnan(values), np.abs(np.nan_to_num(values))
     known = np.isin(magnitude, _FILL)
     others = np.flatnonzero(~known & ~missing)
     if known.any() and others.size:
         # 999 gal may be a peak: then its neighbours are on the way to it
         between = np.interp(np.arange(values.size), others, values[others])
         missing |= known & (np.abs(values - between) > 0.5 * magnitude)
+    # the same number again and again, far above all others
     largest = magnitude == magnitude.max(initial=0.0)
     rest = magnitude[~largest].max(initial=0.0)
-    if largest.sum() > 1 and magnitude.max(initial=0.0) > 20.0 * rest > 0.0 and values.size > _FEWEST:
-        missing |= largest  # the same number again and again, far above all others
-    return missing
+    is_alone = largest.sum() > 1 and magnitude.max(initial=0.0) > 20.0 * rest > 0.0 and values.size > _FEWEST
+    return missing | (largest & is_alone)
 
 
 def _held(times: Floats, values: Floats) -> list[str]:
     """The first value that does not change while the ground shakes, in words."""
-    peak = np.abs(values).max(initial=0.0)
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    lasts = np.append(starts[1:], values.size) - 1
-    for first, last in zip(starts, lasts, strict=True):
-        if last - first < _HELD_SAMPLES or times[last] - times[first] < _HELD:
-            continue
-        within = first > 0 and last < values.size - 1
-        jumps = within and np.abs(values[[first - 1, last + 1]] - values[first]).min() > 0.05 * peak
-        if abs(values[first]) > 0.01 * peak or jumps:  # else the ground is at rest
-            return [f"the value {values[first]:.6g} is held from t = {times[first]:.6g} to {times[last]:.6g} s"]
-    return []
+    lasts = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
+    own, peak = values[starts], np.abs(values).max(initial=0.0)
+    before, after = values[np.maximum(starts - 1, 0)], values[np.minimum(lasts + 1, values.size - 1)]
+    jumps = np.minimum(np.abs(before - own), np.abs(after - own))
+    shakes = (np.abs(own) > 0.01 * peak) | (jumps > 0.05 * peak)  # else the ground is at rest
+    long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
+    return [
+        f"the value {own[at]:.6g} is held from t = {times[starts[at]]:.6g} to {times[lasts[at]]:.6g} s"
+        for at in np.flatnonzero(shakes & long)[:1]
+    ]
 
 
 def _odd_peak(record: Motion, unit: str) -> str:
     """A peak that was never recorded, and the unit that would explain it."""
     at = int(np.abs(record.acceleration).argmax())
-    peak = record.peak / STANDARD_GRAVITY
-    if (peak >= _WEAKEST or record.times.size <= _FEWEST) and peak <= _STRONGEST:
+    peak = record.acceleration[at] / STANDARD_GRAVITY
+    if (abs(peak) >= _WEAKEST or record.times.size <= _FEWEST) and abs(peak) <= _STRONGEST:
         return ""
-    limit = f"above {_STRONGEST:g} g" if peak > 1.0 else f"below {_WEAKEST:g} g"
-    read = f"peak acceleration {record.acceleration[at] / STANDARD_GRAVITY:.4g} g at t = {record.times[at]:.6g} s"
-    in_unit = {other: peak * factor / UNITS[unit] for other, factor in UNITS.items()}
+    in_unit = {other: abs(peak) * factor / UNITS[unit] for other, factor in UNITS.items()}
     likely = min(in_unit, key=lambda other: abs(np.log(max(in_unit[other], 1e-300) / 0.3)))
-    if 0.02 <= in_unit[likely] <= 1.5:
-        read += f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)"
-    return f"{read}: {limit}, check units"
+    explains = 0.02 <= in_unit[likely] <= 1.5
+    hint = f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)" if explains else ""
+    limit = f"above {_STRONGEST:g} g" if abs(peak) > 1.0 else f"below {_WEAKEST:g} g"
+    return f"peak acceleration {peak:.4g} g at t = {record.times[at]:.6g} s{hint}: {limit}, check units"
 
 
 def _drift(record: Motion) -> str:
     """A ground that moves away, as the integral of an offset does."""
     if record.times.size <= _FEWEST:
         return ""
-    displacement, velocity = peak_displacement(record), peak_velocity(record)
-    end = float(np.trapezoid(record.acceleration, record.times))
-    moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * velocity
+    displacement, end = peak_displacement(record), float(np.trapezoid(record.acceleration, record.times))
+    moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * peak_velocity(record)
     if not moves_on and not displacement > _LARGEST_DISPLACEMENT:
         return ""
     return (

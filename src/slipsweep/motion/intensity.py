@@ -30,8 +30,6 @@ class Motion(Protocol):
     def times(self) -> Floats: ...
     @property
     def acceleration(self) -> Floats: ...
-    @property
-    def peak(self) -> float: ...
 
 
 #: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
@@ -44,7 +42,7 @@ _RESAMPLED, _MOST_SAMPLES = 0.005, 2**22
 def intensity_measures(record: Motion) -> dict[str, float]:
     """All measures of `variables.INTENSITY_MEASURES` of a record; NaN where one is not defined."""
     return {
-        "pga": record.peak,
+        "pga": float(np.abs(record.acceleration).max()),
         "pgv": peak_velocity(record),
         "pgd": peak_displacement(record),
         "arias_intensity": arias_intensity(record),
@@ -68,7 +66,7 @@ def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
         if "scale" in given:
             return given["scale"]
         if "amplitude" in given:
-            return given["amplitude"] / record.peak
+            return given["amplitude"] / np.abs(record.acceleration).max()
         if "pgv" in given:
             return given["pgv"] / (peak_velocity(record) * given["time_scale"])
         return np.sqrt(given["arias_intensity"] / (np.float64(arias_intensity(record)) * given["time_scale"]))
@@ -119,7 +117,10 @@ def mean_period(record: Motion) -> float:
     than 20 s is continued with zeros (Rathje et al. 2004).  One that is not evenly sampled is sampled anew, at its
     median interval or, if that is longer, every 0.005 s.  NaN of a motion without such frequencies.
     """
-    samples, step = _evenly_sampled(record)
+    times, spacing = record.times, spacing_of(record.times)
+    step = float(spacing[0]) if np.ptp(spacing) == 0.0 else min(float(np.median(spacing)), _RESAMPLED)
+    step = max(step, max(float(np.ptp(times)), 1.0 / _SPACING) / _MOST_SAMPLES)
+    samples = np.interp(np.arange(times[0], times[-1] + 1e-6 * step, step), times, record.acceleration)
     length = max(samples.size, math.ceil(1.0 / (_SPACING * step)))
     frequency = np.fft.rfftfreq(length, step)
     chosen = (frequency >= _LOWEST * (1.0 - 1e-12)) & (frequency <= _HIGHEST * (1.0 + 1e-12))
@@ -127,19 +128,14 @@ def mean_period(record: Motion) -> float:
     return float((power / frequency[chosen]).sum() / power.sum()) if power.sum() > 0.0 else math.nan
 
 
-def _evenly_sampled(record: Motion) -> tuple[Floats, float]:
-    """The samples of a record at an even interval, and that."""
-    duration = float(record.times[-1] - record.times[0])
-    own = np.diff(record.times)
-    mean = duration / own.size
-    # times that are multiples of one interval are so to their rounding
-    is_even = np.allclose(own, mean, rtol=1e-6, atol=4.0 * float(np.spacing(np.abs(record.times).max())))
-    step = mean if is_even else min(float(np.median(own)), _RESAMPLED)
-    step = max(step, max(duration, 1.0 / _SPACING) / _MOST_SAMPLES)
-    if step == mean:
-        return record.acceleration, step
-    times = record.times[0] + step * np.arange(math.floor(duration / step) + 1)
-    return np.interp(times, record.times, record.acceleration), step
+def spacing_of(times: Floats) -> Floats:
+    """The intervals between samples: one, where the times are its multiples to rounding.
+
+    Differences of times have the rounding of the times, 1e-10 of an interval after a million samples.
+    """
+    even = np.linspace(times[0], times[-1], times.size)
+    is_even = np.abs(times - even).max() <= 2.0 * np.spacing(np.abs(times).max())
+    return np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1)) if is_even else np.diff(times)
 
 
 def _lines(record: Motion) -> "PPoly":
@@ -152,10 +148,9 @@ def _lines(record: Motion) -> "PPoly":
 
 def _energy(record: Motion) -> "PPoly":
     """∫ Üg² dt over time."""
-    from scipy.interpolate import PPoly
-
-    slope, first = _lines(record).c
-    return PPoly(np.array([slope * slope, 2.0 * slope * first, first * first]), record.times).antiderivative()
+    lines = _lines(record)
+    slope, first = lines.c
+    return type(lines)(np.array([slope * slope, 2.0 * slope * first, first * first]), lines.x).antiderivative()
 
 
 def _zeros(curve: "PPoly") -> Floats:

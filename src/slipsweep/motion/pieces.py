@@ -7,7 +7,7 @@ evaluates them.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 #: Columns of a table of pieces: the phases at which a piece begins and ends, the same counted from its
 #: anchor (one of the two is 0), w at its beginning, its end and its anchor, the degree of its polynomial
@@ -79,23 +79,13 @@ def pieces_of(
     """
     degree = np.where(coefficients != 0.0, np.arange(1, coefficients.shape[1] + 1), 0).max(axis=1)
     coefficients = coefficients[:, : max(int(degree.max()), 1)]
-    before = np.concatenate([[0.0], last[:-1]])
+    before, top = np.concatenate([[0.0], last[:-1]]), np.where(at_end, last, first)
     power = np.arange(1, coefficients.shape[1] + 1)
-    named = {
-        START: start,
-        END: end,
-        BEGIN: np.where(at_end, -length, 0.0),
-        FINISH: np.where(at_end, 0.0, length),
-        FIRST: first,
-        LAST: last,
-        TOP: np.where(at_end, last, first),
-        DEGREE: degree,
-        JUMPS: first > np.maximum(before, 0.0),
-        ARC: arc & (np.abs(np.where(at_end, last, first)) == 1.0) & (coefficients[:, 0] == 0.0),
-    }
     pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size))
-    for column, values in named.items():
-        pieces[:, column] = values
+    pieces[:, [START, END, FIRST, LAST, TOP, DEGREE]] = np.column_stack([start, end, first, last, top, degree])
+    pieces[:, BEGIN], pieces[:, FINISH] = np.where(at_end, -length, 0.0), np.where(at_end, 0.0, length)
+    pieces[:, JUMPS] = first > np.maximum(before, 0.0)
+    pieces[:, ARC] = arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0)
     series = COEFFICIENTS + TERM * power.size
     pieces[:, COEFFICIENTS:series:TERM] = coefficients
     pieces[:, ONCE:series:TERM] = coefficients / (power + 1)
@@ -113,14 +103,29 @@ def pieces_of(
     return pieces
 
 
-def intervals_of(pieces: np.ndarray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Runs of pieces above zero, the first and the first after each, and their heights; one that touches zero ends."""
+def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
+    """The wave of a table of pieces.
+
+    Its intervals are runs of pieces above zero, one that touches zero ends; each is taken as different from all others,
+    and `rises` are left out: what `same` and `rises` save is worth their computation where cycles repeat.
+    """
     first, last = pieces[:, FIRST], pieces[:, LAST]
     above = np.concatenate([[False], first + last > 0.0, [False]])
     touches = np.concatenate([[False], (last[:-1] == 0.0) & (first[1:] == 0.0), [False]])
     starts = np.flatnonzero(above[1:-1] & (~above[:-2] | touches[:-1]))
     ends = np.flatnonzero(above[1:-1] & (~above[2:] | touches[1:])) + 1
     interval = np.column_stack([starts, ends]).astype(np.int64)
-    top = np.concatenate([np.maximum(first, last), [0.0]])
-    height = np.maximum.reduceat(top, interval.ravel())[::2].copy() if interval.size else np.empty(0)
-    return interval, height
+    top = np.maximum(first, last)
+    return Wave(
+        pieces=pieces,
+        cycle=np.asarray(cycle, np.int64),
+        shape=np.asarray(shape, np.int64),
+        interval=interval,
+        height=np.maximum.reduceat(np.append(top, 0.0), interval.ravel())[::2].copy() if interval.size else np.empty(0),
+        same=np.arange(len(interval)),
+        rises=np.empty((0, 2)),
+        highest=float(top.max()),
+        lowest=float(np.minimum(first, last).min()),
+        lead=lead,
+        repeats=repeats,
+    )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
-from slipsweep.motion.formats import read_lines, read_samples
+from slipsweep.motion.formats import Samples, read_lines, read_samples
 from slipsweep.motion.inspection import check_plausible, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
@@ -65,10 +65,9 @@ class Record:
         object.__setattr__(self, "attrs", dict(self.attrs))
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Record):
-            return NotImplemented
         return (
-            (self.name, self.attrs) == (other.name, other.attrs)
+            isinstance(other, Record)
+            and (self.name, self.attrs) == (other.name, other.attrs)
             and np.array_equal(self.times, other.times)
             and np.array_equal(self.acceleration, other.acceleration)
         )
@@ -77,8 +76,8 @@ class Record:
         return hash((self.name, self.times.size, float(self.times[-1]), float(self.acceleration[-1])))
 
     def __repr__(self) -> str:
-        lasts = self.times[-1] - self.times[0]
-        return f"Record({self.name!r}: {self.times.size} samples, {lasts:.6g} s, peak {self.peak:.4g} m/s2)"
+        samples = f"{self.times.size} samples, {np.ptp(self.times):.6g} s"
+        return f"Record({self.name!r}: {samples}, peak {self.peak:.4g} m/s2)"
 
     @property
     def peak(self) -> float:
@@ -88,9 +87,8 @@ class Record:
     @classmethod
     def sampled(cls, acceleration: ArrayLike, interval: float, name: str = "record") -> "Record":
         """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
-        step = check_single("interval", interval)
         values = check_numbers("acceleration", acceleration)
-        return cls(np.arange(values.size, dtype=np.float64) * step, values, name)
+        return cls(check_single("interval", interval) * np.arange(values.size, dtype=np.float64), values, name)
 
     @classmethod
     def from_obspy(
@@ -119,20 +117,19 @@ class Record:
         'XX.A..HNE: 0.08 s at 0.01 s, PGA 0.1009 g, PGV 0.01832 m/s, read in m/s2'
         """
         try:
-            data, interval, own = trace.data, check_single("interval", trace.stats.delta), str(trace.id)
+            data, interval, own = trace.data, check_single("interval", trace.stats.delta), name or str(trace.id)
         except AttributeError:
             raise InputError(f"trace = {shown(trace)}: must be a Trace of ObsPy, one of those in a Stream") from None
-        reading = Reading(units=units, baseline=baseline, gaps=gaps, implausible=implausible)
-        if reading.units is None:
-            raise InputError(f"units = None: must be one of {', '.join(map(repr, UNITS))}")
+        check_choice("units", units, tuple(UNITS))
         if np.asarray(data).dtype.kind in "iu":
             raise InputError(
-                f"{name or own}: its data are whole numbers, counts of a digitizer: must be accelerations, such as "
+                f"{own}: its data are whole numbers, counts of a digitizer: must be accelerations, such as "
                 "what trace.remove_response(output='ACC') leaves"
             )
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
-        return _inspected(name or own, times, values, reading.units, reading, {"record_format": "obspy"})
+        reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
+        return _inspected(own, Samples(times, values, units), reading, {"record_format": "obspy"})
 
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
@@ -151,12 +148,11 @@ class Record:
         >>> slipsweep.read_record("sweeps/data/synthetic.csv").summary()
         'sweeps/data/synthetic.csv: 20 s at 0.01 s, PGA 0.35 g, PGV 0.412 m/s, read in g'
         """
-        duration = self.times[-1] - self.times[0]
-        unit = f", read in {self.attrs['record_units']}" if "record_units" in self.attrs else ""
-        accepted = f"; accepted: {self.attrs['record_accepted']}" if "record_accepted" in self.attrs else ""
+        notes = {", read in ": "record_units", "; accepted: ": "record_accepted"}
+        read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
         return (
-            f"{self.name}: {duration:.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
-            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{unit}{accepted}"
+            f"{self.name}: {np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
+            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
         )
 
 
@@ -166,16 +162,12 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
         if values.ndim != 1 or values.shape != times.shape:
             raise InputError(f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be rows")
         for at in np.flatnonzero(~(np.abs(values) <= LARGEST))[:1]:
-            raise InputError(
-                f"{name}: {what} of sample {at + 1} = {values[at]}: must be a finite number, at most {LARGEST:g}"
-            )
+            raise InputError(f"{name}: {what} of sample {at + 1} = {values[at]}: must be finite, at most {LARGEST:g}")
     if times.size < least:
         raise InputError(f"{name}: {times.size} samples: must be at least {least}")
     for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
-        raise InputError(
-            f"{name}: time of sample {at + 2} = {times[at + 1]:.15g}: must be greater than {times[at]:.15g}, "
-            "the time before it"
-        )
+        now, before = times[at + 1], times[at]
+        raise InputError(f"{name}: time of sample {at + 2} = {now:.15g}: must be greater than {before:.15g} before it")
 
 
 def read_record(
@@ -238,43 +230,35 @@ def read_record(
     >>> slipsweep.read_record("sweeps/data/synthetic.csv")
     Record('sweeps/data/synthetic.csv': 2001 samples, 20 s, peak 3.432 m/s2)
     """
-    try:
-        path = Path(path)
-    except TypeError:
-        raise InputError(f"path = {shown(path)}: must be a path") from None
     reading = Reading(
         units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
         channel=channel,
     )  # fmt: skip
-    return record_of(path, reading)
+    return record_of(Path(path), reading)
 
 
 def record_of(path: Path, reading: Reading) -> Record:
     """`read_record` of a file, as a `Reading` says."""
     content, lines = read_lines(path)
     kind, samples = read_samples(path, lines, reading)
-    if samples.unit and reading.units and UNITS[samples.unit] != UNITS[reading.units]:
-        raise InputError(
-            f"{path}: units = {reading.units!r}: the file itself says {samples.unit!r}; leave units out, or give that"
-        )
-    unit = samples.unit or reading.units
-    if unit is None:
-        raise InputError(
-            f"{path}: units: must be given, one of {', '.join(map(repr, UNITS))}: the file does not name the unit"
-        )
-    channel = {} if reading.channel is None else {"record_channel": str(reading.channel)}
-    attrs = {"record": path.name, "record_format": kind, "record_units": unit, **channel}
-    attrs["record_sha256"] = hashlib.sha256(content).hexdigest()
-    return _inspected(str(path), samples.times, samples.values, unit, reading, attrs)
+    own, given = samples.unit, reading.units
+    if own and given and UNITS[own] != UNITS[given]:
+        raise InputError(f"{path}: units = {given!r}: the file itself says {own!r}; leave units out, or give that")
+    if not own and not given:
+        known = ", ".join(map(repr, UNITS))
+        raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
+    attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
+    if reading.channel is not None:
+        attrs["record_channel"] = str(reading.channel)
+    return _inspected(str(path), samples._replace(unit=own or given), reading, attrs)
 
 
-def _inspected(
-    name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: Mapping[str, str]
-) -> Record:
-    """A record of values in a unit, looked at before it is used."""
-    times, values, missing = without_fill_values(name, times, values, reading.gaps)
-    record = Record(times, values * UNITS[unit], name, dict(attrs) | {"record_units": unit})
+def _inspected(name: str, samples: Samples, reading: Reading, attrs: dict[str, str]) -> Record:
+    """The record of what a file holds, looked at before it is used."""
+    assert samples.unit is not None
+    times, values, missing = without_fill_values(name, samples.times, samples.values, reading.gaps)
+    record = Record(times, values * UNITS[samples.unit], name, attrs | {"record_units": samples.unit})
     record = record.corrected(reading.baseline)
-    odd = check_plausible(record, unit, reading.implausible, has_gaps=bool(missing))
+    odd = check_plausible(record, samples.unit, reading.implausible, has_gaps=bool(missing))
     found = [text for text in (missing, odd) if text]
     return replace(record, attrs=record.attrs | {"record_accepted": "; ".join(found)}) if found else record

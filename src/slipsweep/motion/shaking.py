@@ -35,8 +35,9 @@ CHANNELS = (TABLE, *RESPONSES)
 #: Fewer tell nothing of three parameters and their noise.
 FEWEST_SAMPLES = 16
 
-#: Words of a column's name that say which channel it is: one of the first set, and one of the second.
-_NAMES: dict[str, tuple[set[str], set[str]]] = {
+#: Words of a column's name that say what it is: one of each set.
+_NAMES: dict[str, tuple[set[str], ...]] = {
+    "time": ({"time", "t"},),
     TABLE: ({"table", "ground", "plane", "base", "input"}, {"acceleration", "accelerations", "acc"}),
     "block_acceleration": ({"block", "mass"}, {"acceleration", "accelerations", "acc"}),
     "relative_velocity": ({"relative", "rel", "sliding"}, {"velocity", "vel"}),
@@ -78,12 +79,15 @@ class ShakingTest:
         if TABLE not in self.channels:
             raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
         times = check_numbers(f"{self.name}: time", self.times)
-        measured = [name for name in CHANNELS if name in self.channels]
-        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in measured}
+        kept = {
+            name: check_numbers(f"{self.name}: {name}", self.channels[name])
+            for name in CHANNELS
+            if name in self.channels
+        }
         blank = {name: np.isnan(values) & (name != TABLE) for name, values in kept.items()}
         filled = {name: np.where(blank[name], 0.0, values) for name, values in kept.items()}
         check_samples(self.name, times, filled, FEWEST_SAMPLES)
-        for name in (name for name in measured if blank[name].all()):
+        for name in (name for name, missing in blank.items() if missing.all()):
             raise InputError(f"{self.name}: {name}: no sample")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "channels", kept)
@@ -120,8 +124,7 @@ class ShakingTest:
             if len(bounds) != 2:
                 raise InputError(f"rest = {shown(rest)}: must be two times, s")
             chosen = (self.times >= bounds[0]) & (self.times <= bounds[1])
-        channels, removed = dict(self.channels), {}
-        since = self.times - self.times[0]
+        channels, removed, since = dict(self.channels), {}, self.times - self.times[0]
         for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
@@ -173,27 +176,19 @@ def read_test(path: str | Path) -> ShakingTest:
     InputError
         The file cannot be read, a column has no unit, or a line holds no numbers: with the number of the line.
     """
-    try:
-        path = Path(path)
-    except TypeError:
-        raise InputError(f"test = {shown(path)}: must be the path of a file, a Dataset or a ShakingTest") from None
+    path = Path(path)
 
     def channel_of(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
-        known = [one for one, (first, second) in _NAMES.items() if words & first and words & second]
-        channel = "time" if words & {"time", "t"} else known[0] if known else None
-        if channel is None:
-            return None
-        if not unit:
+        channel = next((one for one, names in _NAMES.items() if all(words & either for either in names)), None)
+        if channel and not unit:
             raise InputError(f"{path}: column {shown(column)}: must give its unit in brackets, such as (m/s2)")
-        return channel, unit_factor(f"{path}: column {column}: unit", channel, unit)
+        return (channel, unit_factor(f"{path}: column {column}: unit", channel, unit)) if channel else None
 
     content, lines = read_lines(path)
     example = "time (s), table acceleration (m/s2), block acceleration (m/s2)"
-    values = read_columns(path, lines, channel_of, ("time", TABLE), example, may_be_blank=RESPONSES)
-    attrs = {
-        "test": path.name.encode(errors="backslashreplace").decode(),
-        "test_sha256": hashlib.sha256(content).hexdigest(),
-    }
+    values = read_columns(path, lines, channel_of, ("time", TABLE), example)
+    name = path.name.encode(errors="backslashreplace").decode()
+    attrs = {"test": name, "test_sha256": hashlib.sha256(content).hexdigest()}
     return ShakingTest(values.pop("time"), values, str(path), attrs)
 
 

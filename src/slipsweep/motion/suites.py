@@ -2,10 +2,10 @@
 
 import glob
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, takewhile
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -59,15 +59,15 @@ class Pair:
     second: Record
 
     def __post_init__(self) -> None:
-        for name in ("first", "second"):
-            if not isinstance(getattr(self, name), Record):
-                raise InputError(f"{name} = {shown(getattr(self, name))}: must be a Record, one component of a motion")
+        for name, own in (("first", self.first), ("second", self.second)):
+            if not isinstance(own, Record):
+                raise InputError(f"{name} = {shown(own)}: must be a Record, one component of a motion")
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
         if np.abs(times[: other.size] - other).max() > _SAME_TIME * np.diff(other).min():
             raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
         for name, own in (("first", self.first), ("second", self.second)):
             filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
-            object.__setattr__(self, name, Record(times, filled, own.name, own.attrs))
+            object.__setattr__(self, name, replace(own, times=times, acceleration=filled))
 
     @property
     def name(self) -> str:
@@ -139,10 +139,8 @@ class Suite:
         for at, motion in enumerate(motions, 1):
             if not isinstance(motion, (Record, Pair)):
                 raise InputError(f"motions[{at}] = {shown(motion)}: must be a Record or a Pair")
-        if not motions:
-            raise InputError("motions = []: must hold one motion at least")
-        if len({type(motion) for motion in motions}) > 1:
-            raise InputError("motions: must be all Records, or all Pairs")
+        if len({type(motion) for motion in motions}) != 1:
+            raise InputError(f"motions: {len(motions)}: must be one at least, all Records or all Pairs")
         labels = tuple(check_list("labels", self.labels, "texts"))
         labels = labels or _labels([Path(_components(one)[0].name) for one in motions])
         for label in labels:
@@ -165,21 +163,16 @@ class Suite:
         return iter(self.motions)
 
     def __getitem__(self, which: Any) -> Any:
-        if isinstance(which, slice):
-            return self.only(self.labels[which])
-        if isinstance(which, (list, tuple)):
-            return self.only([one if isinstance(one, str) else self.labels[one] for one in which])
-        return self.motions[self.index(which) if isinstance(which, str) else which]
+        if not isinstance(which, (slice, list, tuple)):
+            return self.motions[self.index(which)]
+        places = [self.index(one) for one in (self.labels[which] if isinstance(which, slice) else which)]
+        return Suite(tuple(self.motions[at] for at in places), tuple(self.labels[at] for at in places), self.name)
 
-    def index(self, label: str) -> int:
+    def index(self, which: str | int) -> int:
         """The place of a motion (InputError: there is none of that label)."""
-        if label not in self.labels:
-            raise InputError(f"motion = {shown(label)}: not in the suite; {did_you_mean(label, self.labels)}")
-        return self.labels.index(label)
-
-    def only(self, labels: Sequence[str]) -> "Suite":
-        """The suite of some of the motions."""
-        return Suite(tuple(self.motions[self.index(label)] for label in labels), tuple(labels), self.name)
+        if isinstance(which, str) and which not in self.labels:
+            raise InputError(f"motion = {shown(which)}: not in the suite; {did_you_mean(which, self.labels)}")
+        return self.labels.index(which) if isinstance(which, str) else which
 
     @property
     def has_pairs(self) -> bool:
@@ -213,11 +206,13 @@ class Suite:
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
-        found = {f"motion_{name}": np.empty(azimuths.shape) for name in INTENSITY_MEASURES}
-        for cell in np.ndindex(azimuths.shape):
-            for name, value in intensity_measures(self.record(int(places[cell]), float(azimuths[cell]))).items():
-                found[f"motion_{name}"][cell] = value
-        return found
+        cells = [
+            intensity_measures(self.record(int(at), float(azimuth)))
+            for at, azimuth in zip(places.flat, azimuths.flat, strict=True)
+        ]
+        return {
+            f"motion_{name}": np.reshape([cell[name] for cell in cells], azimuths.shape) for name in INTENSITY_MEASURES
+        }
 
     def record(self, at: int, azimuth: float) -> Record:
         """The motion at a place, of a pair the component at an azimuth."""
@@ -320,13 +315,14 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         for part, reason in reasons.items():
             refused.add_note(f"{part}: {reason}")
         raise refused
-    stems = [source[0] if isinstance(source[0], Path) else Path(source[0].name) for source in sources]
+    names_of = [Path(source[0]) if isinstance(source[0], Path) else Path(source[0].name) for source in sources]
     if pairs is not None:
-        stems = [stem.with_name(stem.stem.removesuffix(pairs[0]).rstrip("_-. ") or stem.stem) for stem in stems]
-    found = [[records[part] for part in source] for source in sources]
-    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
+        names_of = [one.with_name(one.stem.removesuffix(pairs[0]).rstrip("_-. ") or one.stem) for one in names_of]
+    motions = tuple(
+        Pair(*(records[one] for one in source)) if len(source) == 2 else records[source[0]] for source in sources
+    )
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
-    return Suite(motions, _labels(stems), str(entry) if isinstance(entry, (str, Path)) else "suite")
+    return Suite(motions, _labels(names_of), str(entry) if isinstance(entry, (str, Path)) else "suite")
 
 
 def _components(motion: Motion) -> tuple[Record, ...]:
@@ -336,22 +332,20 @@ def _components(motion: Motion) -> tuple[Record, ...]:
 
 def _sources(given: Any, folder: Path) -> list[_Source]:
     """What entries name, each file once."""
-    if isinstance(given, (str, Path, Record, Pair)):
-        given = [given]
-    if not isinstance(given, Iterable) or isinstance(given, bytes):
-        raise InputError(f"paths = {shown(given)}: must be a folder, a pattern, or a list of files or Records")
+    what = "files, folders, patterns, pairs of files or Records"
     found: list[_Source] = []
-    for entry in given:
+    for entry in [given] if isinstance(given, (str, Path, Record, Pair)) else check_list("paths", given, what):
         if isinstance(entry, (Record, Pair)):
             found.append(_components(entry))
         elif isinstance(entry, (str, Path)):
             found += [(file,) for file in _matching(folder, entry) if (file,) not in found]
-        elif isinstance(entry, (list, tuple)):
-            if len(entry) != 2 or not all(isinstance(part, (str, Path, Record)) for part in entry):
-                raise InputError(f"paths: {shown(entry)}: must be two files, the components of one motion")
+        elif isinstance(entry, (list, tuple)) and [isinstance(one, (str, Path, Record)) for one in entry] == [
+            True,
+            True,
+        ]:
             found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
         else:
-            raise InputError(f"paths: {shown(entry)}: must be a file, a folder, a pattern or a Record")
+            raise InputError(f"paths: {shown(entry)}: must be one of {what}")
     if not found:
         raise InputError("paths = []: must name one motion at least")
     return found
@@ -359,55 +353,44 @@ def _sources(given: Any, folder: Path) -> list[_Source]:
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
     """The files that an entry names."""
-    if not str(entry).strip():
-        raise InputError(f"paths: {shown(entry)}: must be a file, a folder or a pattern")
-    path = folder / entry
-    try:
-        if not path.is_dir() and (path.exists() or not glob.has_magic(str(entry))):
-            return [path]
-        pattern = f"{glob.escape(str(entry))}/*" if path.is_dir() else str(entry)
-        found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
-        files = sorted(one for one in found if one.is_file())
-    except (OSError, ValueError) as error:
-        raise InputError(f"paths: {entry}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    path, pattern = folder / entry, str(entry)
+    if path.is_dir():
+        pattern = f"{glob.escape(pattern)}/*"
+    elif path.exists() or not glob.has_magic(pattern):
+        return [path]
+    found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
+    files = sorted(one for one in found if one.is_file())
     if not files:
-        what = "a folder without files" if path.is_dir() else "no file fits this pattern"
-        raise InputError(f"paths: {entry}: {what}")
+        raise InputError(
+            f"paths: {entry}: {'a folder without files' if path.is_dir() else 'no file fits this pattern'}"
+        )
     return files
 
 
 def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]:
     """Files put together two by two."""
-    endings = check_list("pairs", endings, "two endings of names, such as ('_NS', '_EW')")
-    if len(set(map(str, endings))) != 2 or not all(isinstance(one, str) and one for one in endings):
+    texts = [one for one in check_list("pairs", endings, "two endings of names") if isinstance(one, str) and one]
+    if len(texts) != len(endings) or len({*texts}) != 2:
         raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
-    first, second = endings
+    first, second = texts
     parts = list(chain.from_iterable(sources))
     pairs = {
         one: one.with_name(one.stem.removesuffix(first) + second + one.suffix)
         for one in parts
         if isinstance(one, Path) and one.stem.endswith(first)
     }
-    incomplete = [one for one in parts if one not in pairs and one not in pairs.values()]
-    incomplete += [one for one, other in pairs.items() if other not in parts]
-    if incomplete:
-        names = ", ".join(one.name for one in incomplete)
-        raise InputError(f"pairs = {shown(tuple(endings))}: without the other component: {names}")
+    whole = {one for pair in pairs.items() for one in pair if {*pair} <= {*parts}}
+    if incomplete := ", ".join(one.name for one in parts if one not in whole):
+        raise InputError(f"pairs = {shown(endings)}: without the other component: {incomplete}")
     return list(pairs.items())
 
 
 def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
-    """The stems of files; more of the path of those whose stems are alike, and a number where that does not help."""
-    stems, ways = Counter(path.stem for path in paths), Counter(paths)
-    levels = zip(*(path.parent.parts for path in paths), strict=False)
-    shared = len(list(takewhile(lambda parts: len({*parts}) == 1, levels)))
-    labels: list[str] = []
+    """The stems of files; with folder and ending where stems are alike, and numbered where that does not help."""
+    stems, seen = Counter(path.stem for path in paths), Counter[str]()
+    labels = []
     for path in paths:
-        needs_path = stems[path.stem] > 1 and ways[path] == 1
-        label = unique = "/".join(path.parts[shared:]) if needs_path else path.stem.strip() or "motion"
-        number = 1
-        while unique in labels:
-            number += 1
-            unique = f"{label} ({number})"
-        labels.append(unique)
+        label = "/".join(path.parts[-2:]) if stems[path.stem] > 1 else path.stem.strip() or "motion"
+        seen[label] += 1
+        labels.append(f"{label} ({seen[label]})" if seen[label] > 1 else label)
     return tuple(labels)

@@ -18,7 +18,7 @@ falls to 0 over the last `ramp_out`; A is the peak without it.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self, TypeAlias
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
@@ -27,6 +27,8 @@ from slipsweep.model.parameters import MOST_CYCLES, number_text
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+Floats: TypeAlias = "NDArray[np.float64]"
 
 #: Largest multiple of a harmonic.
 MOST_MULTIPLE = 100
@@ -53,11 +55,8 @@ class Waveform(Choice):
 
     def __str__(self) -> str:
         """In words, as a caption has it: ``10 cycles of a triangle wave, ramp in 2 cycles``."""
-        ramps = "".join(
-            f", ramp {word} {number_text(ramp)} cycles"
-            for ramp, word in ((self.ramp_in, "in"), (self.ramp_out, "out"))
-            if ramp
-        )
+        given = {"in": self.ramp_in, "out": self.ramp_out}
+        ramps = "".join(f", ramp {word} {number_text(ramp)} cycles" for word, ramp in given.items() if ramp)
         return f"{self.cycles} cycle{'s' if self.cycles > 1 else ''} of a {self._words()}{ramps}"
 
     def _words(self) -> str:
@@ -222,10 +221,7 @@ WAVEFORMS: Family[Waveform] = Family(
 )
 
 
-def peak_acceleration(
-    displacement_amplitude: "NDArray[np.float64]", frequency: "NDArray[np.float64]"
-) -> "NDArray[Any]":
+def peak_acceleration(displacement_amplitude: Floats, frequency: Floats) -> Floats:
     """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
-
     omega = 2.0 * math.pi * frequency
     return omega * omega * displacement_amplitude
