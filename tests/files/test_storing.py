@@ -186,7 +186,7 @@ def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
     text = (folder / "large.toml").read_text().replace("values = [0.3, 0.5]", "start = 0.3\nstop = 1\nnum = 900000")
     (folder / "large.toml").write_text(text)
     for name in ("a.nc", "a.zarr"):
-        with pytest.raises(InputError, match=rf"{name}: takes .*TB, and as much again .* are free on the disk"):
+        with pytest.raises(InputError, match=rf"{name}: takes .*TB, but .* are free on the disk"):
             stored(job_of(folder, "large"), folder / name)
         assert not [*folder.glob(f"{name}*")]
     with pytest.raises(InputError, match=r"--memory = 100 MB: must be .* at least"):

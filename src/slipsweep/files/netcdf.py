@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import netCDF4
 import numpy as np
@@ -68,6 +68,14 @@ def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
     if dtype.kind == "f" and name not in RECORD_SAMPLES:
         return float("nan")
     return int(SlidingMode.MISSING) if name in WITH_MISSING else None
+
+
+@contextmanager
+def opened(path: Path, mode: Literal["r", "r+"] = "r") -> Iterator[netCDF4.Dataset]:
+    """A netCDF file with its values as they are stored."""
+    with netCDF4.Dataset(path, mode) as file:
+        file.set_auto_maskandscale(False)
+        yield file
 
 
 @contextmanager

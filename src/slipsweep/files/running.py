@@ -12,7 +12,7 @@ from slipsweep.errors import InputError
 from slipsweep.files import cluster, netcdf
 from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import read_result
-from slipsweep.files.outputs import check_outputs, complete_or_absent, writing
+from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.storing import Arrays, Chunks, NetcdfChunks, Place, ZarrChunks, tally_of
 from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
@@ -94,17 +94,14 @@ def run(
         if progress is not None:
             progress(plan.part(chunks.chunk(number)).cells)
 
-    with chunks.locked():
-        chunks.begin(resume, overwrite)
-        with chunks.kept(), job.spec.named():
-            with writing(path), chunks.opened(command):
-                for number in chunks.done:
-                    tell(number)
-                if processes:
-                    _solve_elsewhere(chunks, workers, scheduler, tell)
-                else:
-                    _solve_here(chunks, tell)
-            return Report(path, chunks.finish(command, overwrite))
+    with chunks.begun(command, resume, overwrite), job.spec.named():
+        for number in chunks.done:
+            tell(number)
+        if processes:
+            _solve_elsewhere(chunks, workers, scheduler, tell)
+        else:
+            _solve_here(chunks, tell)
+        return Report(path, chunks.finish(overwrite))
 
 
 def _complete(job: Job, path: Place) -> xr.Dataset | None:

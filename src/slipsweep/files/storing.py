@@ -1,15 +1,13 @@
 """Where a chunk is written, and how a run goes on after an interruption.
 
 The chunks of a run, elements of the dask array that `slipsweep.grid.graph.solved_chunks` makes of its plan, are written
-while others are computed:
+while others are computed, each once: to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
+there (in a netCDF file: on the disk itself), an empty file ``000012.chunk`` beside them says so; `identity.json` says
+what they are chunks of.
 
-- for a netCDF file each to a file of its own, ``OUT.nc.part/000012.chunk``, then to its place in the netCDF file, which
-  a run that goes on begins anew from them.  It is written under another name and renamed: a chunk is a complete file
-  or is not there;
-- for a Zarr store each as a region of a store, ``OUT.zarr.part/store``, followed by an empty ``000012.chunk``.
-  A store at an address (``s3://…``) is written where it is, and has the attribute `unfinished` meanwhile.
-
-`identity.json` beside them says what they are chunks of.
+The netCDF file is made with all but the values of its results.  Chunks change nothing else in it, so that it can be
+read whenever a run ends, and what is marked is there.  A compressed file is made of it at the end.
+A store at an address (``s3://…``) is written where it is, and has the attribute `unfinished` meanwhile.
 """
 
 import json
@@ -17,12 +15,13 @@ import math
 import os
 import shutil
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import netCDF4
 import numpy as np
 import xarray as xr
 from fsspec.core import url_to_fs
@@ -37,9 +36,6 @@ from slipsweep.grid.anyplan import AnyPlan
 from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, grid_chunks, places
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
-
-if TYPE_CHECKING:
-    import netCDF4
 
 #: A file or folder, or the address of a store.
 Place = Path | str
@@ -75,6 +71,7 @@ class Chunks:
     path: Place
     lengths: dict[str, int]  # of a chunk, along each dimension of the grid
     done: set[int] = field(default_factory=set)  # what an interrupted run has left
+    marks: list[Future[None]] = field(default_factory=list)  # of chunks that are on their way to the disk
 
     @property
     def place(self) -> str:
@@ -93,7 +90,7 @@ class Chunks:
         return tuple(len(own) for own in self.cut.values())
 
     def missing(self) -> Iterator[tuple[int, tuple[int, ...]]]:
-        """Number and place of every chunk to compute; one after the other: there may be more than memory holds."""
+        """Number and index of every chunk to compute; one after the other: there may be more than memory holds."""
         return ((number, index) for number, index in enumerate(np.ndindex(*self.shape)) if number not in self.done)
 
     def chunk(self, number: int) -> Chunk:
@@ -103,8 +100,35 @@ class Chunks:
         return chunk_at(self.cut, tuple(map(int, np.unravel_index(number, self.shape))))
 
     @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep other runs away from this output (RunError: another run is writing it); an address has no lock."""
+    def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
+        """Take over the chunks of an interrupted run, or begin anew, while no other run writes this output.
+
+        Raises
+        ------
+        InputError
+            Neither may be done.
+        RunError
+            Another run is writing the output, or writing failed; a note says how many chunks are kept.
+        """
+        with self._locked():
+            self._begin(command, resume, overwrite)
+            try:
+                with writing(self.path):
+                    yield
+            except BaseException as error:
+                kept = len(self._finished())
+                error.add_note(
+                    f"{kept} of {math.prod(self.shape)} chunks are kept in {self.place}: --resume goes on"
+                    if kept
+                    else "nothing written"
+                )
+                if not kept:
+                    self._clear()
+                raise
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Keep other runs away from this output; an address has no lock."""
         from filelock import FileLock, Timeout
 
         if isinstance(self.path, str):
@@ -125,25 +149,21 @@ class Chunks:
             if folder.is_dir() and not (folder / "identity.json").exists():
                 shutil.rmtree(folder, ignore_errors=True)
 
-    def begin(self, resume: bool, overwrite: bool) -> None:
-        """Take over the chunks of an interrupted run, or begin anew (InputError: neither may be done)."""
+    def _begin(self, command: str, resume: bool, overwrite: bool) -> None:
         files, folder = url_to_fs(self.place)
         state = None
         with suppress(OSError, ValueError):
             state = json.loads(files.cat_file(f"{folder}/identity.json"))
         if state is None or overwrite:
-            self.clear()
-            self.check_space()
-            if (
-                not overwrite
-                and isinstance(self.path, str)
-                and files.exists(f"{files._strip_protocol(self.path)}/zarr.json")
-            ):
+            self._clear()
+            self._check_space()
+            if isinstance(self.path, str) and not overwrite and files.exists(f"{self.path.rstrip('/')}/zarr.json"):
                 raise InputError(
                     f"{self.path}: exists already; give --overwrite to replace it, or another name with -o"
                 )
             with writing(self.path):
-                self.make()
+                files.makedirs(folder, exist_ok=True)
+                self.make(command)
                 state = {"identity": self.job.identity, "lengths": self.lengths}
                 files.pipe_file(f"{folder}/identity.json", json.dumps(state).encode())
             return
@@ -164,21 +184,22 @@ class Chunks:
                 "--overwrite to start again"
             )
         self.lengths = state["lengths"]
-        self.done = self.finished()
+        self.done = self._finished()
 
-    def finished(self) -> set[int]:
+    def _finished(self) -> set[int]:
         """Numbers of the chunks that are there."""
+        wait(self.marks)
         files, folder = url_to_fs(self.place)
         return {int(Path(one).stem) for one in files.glob(f"{folder}/*.chunk")}
 
-    def clear(self) -> None:
+    def _clear(self) -> None:
         """Remove what an earlier run has left; the lock stays."""
         files, folder = url_to_fs(self.place)
         for one in files.ls(folder, detail=False) if files.exists(folder) else ():
             if not one.endswith("/lock"):
                 files.rm(one, recursive=True)
 
-    def check_space(self) -> None:
+    def _check_space(self) -> None:
         """Refuse what the disk has no room for."""
         if isinstance(self.path, str):
             return
@@ -186,112 +207,88 @@ class Chunks:
         needed = sum(math.prod(template[name].shape) * dtype.itemsize for name, dtype in self.job.dtypes.items())
         free = shutil.disk_usage(self.path.parent).free
         # a store is compressed, nobody knows how much
-        if needed * (0.05 if self.path.suffix == ".zarr" else 2.0) > free:
-            raise InputError(
-                f"{self.path}: takes {size_text(needed)}, and as much again for its chunks while it is written, but "
-                f"{size_text(free)} are free on the disk"
-            )
+        if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
+            raise InputError(f"{self.path}: takes {size_text(needed)}, but {size_text(free)} are free on the disk")
 
-    @contextmanager
-    def kept(self) -> Iterator[None]:
-        """Say with an error what is kept of the run."""
-        try:
-            yield
-        except BaseException as error:
-            kept = len(self.finished())
-            if kept:
-                error.add_note(f"{kept} of {math.prod(self.shape)} chunks are kept in {self.place}: --resume goes on")
-            else:
-                self.clear()
-                error.add_note("nothing written")
-            raise
-
-    def make(self) -> None:
-        """Get ready to write chunks."""
-
-    @contextmanager
-    def opened(self, command: str) -> Iterator[None]:
-        """What is open while chunks are written."""
-        yield
+    def make(self, command: str) -> None:
+        """Make the file or store that chunks are written to."""
+        raise NotImplementedError
 
     def written(self, solved: Any) -> Any:
         """A dask array of chunks that are written where they are computed; None if this process writes them."""
         return None
 
     def write(self, number: int, arrays: Arrays) -> None:
-        """Write a chunk."""
+        """Write a chunk, then its mark."""
         raise NotImplementedError
 
-    def finish(self, command: str, overwrite: bool) -> Tally:
+    def finish(self, overwrite: bool) -> Tally:
         """Give the output its name, and count its modes and flags."""
         raise NotImplementedError
 
 
 @dataclass
 class NetcdfChunks(Chunks):
-    """Chunks in files of arrays, and in the netCDF file, which is none before its last chunk."""
+    """Chunks as parts of a netCDF file."""
 
-    file: "netCDF4.Dataset | None" = None
-    tally: Tally = field(default_factory=Tally)
+    marker: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(1))
 
-    @contextmanager
-    def opened(self, command: str) -> Iterator[None]:
-        how = (Path(self.place, "result.nc"), self.lengths, self.job.spec.output.compression)
-        with netcdf.new_file(self.job.outline(command), *how) as self.file:
-            for number in sorted(self.done):
-                self._place(number, self._read(number))
-            yield
+    @property
+    def result(self) -> Path:
+        """The file that chunks are written to."""
+        return Path(self.place, "result.nc")
+
+    def make(self, command: str) -> None:
+        with netcdf.new_file(self.job.outline(command), self.result) as file:
+            for name in self.job.dtypes:  # with its first value an array gets its place in the file
+                file[name][(0,) * file[name].ndim or ...] = 0
 
     def write(self, number: int, arrays: Arrays) -> None:
-        with ThreadPoolExecutor(1) as other:  # both take as long, and neither needs the other
-            saved = other.submit(self._save, number, arrays)
-            self._place(number, arrays)
-            saved.result()
+        with netcdf.opened(self.result, "r+") as file:
+            for name, values in arrays.items():
+                file[name][self._region(number, file[name])] = values
+        wait(self.marks[-1:])  # the disk may be slower than all else
+        self.marks.append(self.marker.submit(self._mark, number))
 
-    def _save(self, number: int, arrays: Arrays) -> None:
-        temporary = Path(self.place, f"{number:06}.tmp")
-        with temporary.open("wb") as file:
-            for values in arrays.values():
-                np.save(file, values)
-        os.replace(temporary, temporary.with_suffix(".chunk"))
+    def _mark(self, number: int) -> None:
+        """Mark a chunk when a power cut can no longer take it, while another is written."""
+        with self.result.open("rb") as file:
+            os.fsync(file.fileno())
+        Path(self.place, f"{number:06}.chunk").touch()
 
-    def _read(self, number: int) -> Arrays:
-        path = Path(self.place, f"{number:06}.chunk")
-        try:
-            with path.open("rb") as file:
-                return {name: np.load(file) for name in self.job.dtypes}
-        except (OSError, ValueError, EOFError) as error:
-            raise RunError(f"{path}: is damaged ({error}); remove it, and give --resume to compute it again") from None
+    def _region(self, number: int, result: netCDF4.Variable) -> Any:
+        sizes = dict(zip(result.dimensions, result.shape, strict=True))
+        return tuple(places(self.chunk(number), sizes).values()) or ...
 
-    def _place(self, number: int, arrays: Arrays) -> None:
-        """Put a chunk where it lies in the netCDF file."""
-        assert self.file is not None
-        chunk = self.chunk(number)
-        for name, values in arrays.items():
-            one = self.file[name]
-            sizes = dict(zip(one.dimensions, one.shape, strict=True))
-            one[tuple(places(chunk, sizes).values()) or ...] = values
-        self.tally.merge(self.job.plan.part(chunk).tally(arrays))
-
-    def finish(self, command: str, overwrite: bool) -> Tally:
-        with writing(self.path):
-            appear(Path(self.place, "result.nc"), Path(self.path), overwrite)
+    def finish(self, overwrite: bool) -> Tally:
+        for mark in self.marks:
+            mark.result()
+        complete = self.result
+        if level := self.job.spec.output.compression:
+            complete = Path(self.place, "compressed.nc")
+            with netcdf.opened(self.result) as source:
+                outline = self.job.outline("").assign_attrs(history=source.history)
+                with netcdf.new_file(outline, complete, self.lengths, level) as file:
+                    for number in range(math.prod(self.shape)):
+                        for name in self.job.dtypes:
+                            region = self._region(number, file[name])
+                            file[name][region] = source[name][region]
+        appear(complete, Path(self.path), overwrite)
         shutil.rmtree(self.place)
-        self.tally.cells = self.job.plan.cells
-        return self.tally
+        return tally_of(read_result(self.path), self.job.plan)
 
 
 class ZarrChunks(Chunks):
-    """Chunks as regions of a Zarr store, each one shard of its arrays, with an empty file to mark that it is there."""
+    """Chunks as regions of a Zarr store, each one shard of its arrays."""
 
     @property
     def store(self) -> str:
         """The store that chunks are written to."""
         return self.path if isinstance(self.path, str) else f"{self.place}/store"
 
-    def make(self) -> None:
+    def make(self, command: str) -> None:
         check_zarr(self.path)
-        table = self.job.outline("").assign_attrs(unfinished="its run goes on with --resume")
+        table = self.job.outline(command).assign_attrs(unfinished="its run goes on with --resume")
         encoding = {name: self._encoding(table[name]) for name in self.job.dtypes}
         table.to_zarr(self.store, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
 
@@ -327,17 +324,15 @@ class ZarrChunks(Chunks):
     def write(self, number: int, arrays: Arrays) -> None:
         _write_region(arrays, **self._about, block_id=tuple(map(int, np.unravel_index(number, self.shape))))
 
-    def finish(self, command: str, overwrite: bool) -> Tally:
+    def finish(self, overwrite: bool) -> Tally:
         import zarr
 
-        with writing(self.path):
-            group = zarr.open_group(self.store, mode="r+")
-            attrs = {name: value for name, value in group.attrs.items() if name != "unfinished"}
-            group.attrs.put({**attrs, "history": netcdf.history_of(command)})
-            if isinstance(self.path, Path):
-                appear(Path(self.store), self.path, overwrite)
-            files, folder = url_to_fs(self.place)
-            files.rm(folder, recursive=True)
+        group = zarr.open_group(self.store, mode="r+")
+        group.attrs.put({name: value for name, value in group.attrs.items() if name != "unfinished"})
+        if isinstance(self.path, Path):
+            appear(Path(self.store), self.path, overwrite)
+        files, folder = url_to_fs(self.place)
+        files.rm(folder, recursive=True)
         return tally_of(read_result(self.path), self.job.plan)
 
 
