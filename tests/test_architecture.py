@@ -21,8 +21,8 @@ ORDER = (
 LINES = {
     "jit": 410,
     "model": 1_490,
-    "motion": 2_250,
-    "kernels": 3_310,
+    "motion": 2_262,
+    "kernels": 3_270,
     "grid": 1_490,
     "studies": 5_090,
     "files": 2_520,

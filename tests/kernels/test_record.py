@@ -12,12 +12,11 @@ from numba import njit
 
 import slipsweep
 from slipsweep import InputError, Record, sweep
-from slipsweep.kernels.block import MONOTONE, Cell, block_of
+from slipsweep.kernels.block import MONOTONE, Cell, block_of, interface_of
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.linear import held_stop
 from slipsweep.model.friction import exponential
 from slipsweep.motion.cutting import wave_of_record
-from slipsweep.motion.pieces import BEGIN, DEGREE, END, FINISH, FIRST, JUMPS, LAST, START
 from tests.support.cases import choices
 from tests.support.made_up_records import SEEN, difference, made
 from tests.support.reference import RecordSolution, solve_record
@@ -50,8 +49,8 @@ def shaking() -> Record:
 
 @njit
 def _followed(cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray) -> tuple[float, float]:
-    block = block_of(exponential(), Cell(*cell), MONOTONE, G)
-    return eq4_integrals(block, pieces, 0, pieces[0, BEGIN], pieces[0, FINISH])
+    block = block_of(exponential(), Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), MONOTONE, G)
+    return eq4_integrals(block, pieces[0], pieces[0].begin, pieces[0].finish)
 
 
 def _follow(decay: float, x: float, change: float) -> tuple[float, float]:
@@ -105,15 +104,15 @@ def test_a_record_is_a_wave_of_straight_pieces() -> None:
     """Cut at its zeros, in intervals above them, and with the samples and times as they are given."""
     record = Record(np.array([1.0, 2.0, 4.0, 5.0, 6.0, 7.5, 8.0]), np.array([3.0, -1.0, -1.0, 0.0, 2.0, 2.0, 0.0]))
     wave = wave_of_record(record, 1.0)
-    table = wave.pieces[:, [START, END, FIRST, LAST, DEGREE, JUMPS]]
+    table = wave.pieces[["start", "end", "first", "last", "degree", "jumps"]]
     assert table.tolist() == [
-        [1.0, 1.75, 3.0, 0.0, 1.0, 1.0],
-        [1.75, 2.0, 0.0, -1.0, 1.0, 0.0],
-        [2.0, 4.0, -1.0, -1.0, 0.0, 0.0],
-        [4.0, 5.0, -1.0, 0.0, 1.0, 0.0],
-        [5.0, 6.0, 0.0, 2.0, 1.0, 0.0],
-        [6.0, 7.5, 2.0, 2.0, 0.0, 0.0],
-        [7.5, 8.0, 2.0, 0.0, 1.0, 0.0],
+        (1.0, 1.75, 3.0, 0.0, 1, True),
+        (1.75, 2.0, 0.0, -1.0, 1, False),
+        (2.0, 4.0, -1.0, -1.0, 0, False),
+        (4.0, 5.0, -1.0, 0.0, 1, False),
+        (5.0, 6.0, 0.0, 2.0, 1, False),
+        (6.0, 7.5, 2.0, 2.0, 0, False),
+        (7.5, 8.0, 2.0, 0.0, 1, False),
     ]
     assert (wave.interval.tolist(), wave.height.tolist()) == ([[0, 1], [4, 7]], [3.0, 2.0])
     assert (wave.highest, wave.lowest) == (3.0, -1.0)

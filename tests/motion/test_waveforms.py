@@ -9,19 +9,6 @@ from mpmath import mp, mpf
 
 from slipsweep import Cosine, Cycle, Harmonics, Sine, Square, Step, Triangle, sweep
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.pieces import (
-    BEGIN,
-    COEFFICIENTS,
-    DEGREE,
-    END,
-    FINISH,
-    FIRST,
-    JUMPS,
-    LAST,
-    START,
-    TERM,
-    TOP,
-)
 from slipsweep.motion.waveforms import Waveform
 
 CYCLES = 4
@@ -92,17 +79,16 @@ def test_pieces_are_the_wave(name: str) -> None:
     if isinstance(waveform, Harmonics):
         scale, fastest = exact_peak(waveform), max(waveform.multiples)
     for p in range(len(wave.pieces)):
-        tau = wave.pieces[p, BEGIN] + np.linspace(0.01, 0.99, 23) * (wave.pieces[p, FINISH] - wave.pieces[p, BEGIN])
-        phase = wave.pieces[p, START] + (tau - wave.pieces[p, BEGIN])
+        tau = wave.pieces[p].begin + np.linspace(0.01, 0.99, 23) * (wave.pieces[p].finish - wave.pieces[p].begin)
+        phase = wave.pieces[p].start + (tau - wave.pieces[p].begin)
         if wave.repeats and p >= wave.cycle[wave.lead + 1]:
             phase += 2 * pi * (wave.repeats - 1)  # the table has the plain cycle once
-        degree, top = int(wave.pieces[p, DEGREE]), wave.pieces[p, TOP]
-        powers = [*wave.pieces[p, COEFFICIENTS : COEFFICIENTS + TERM * degree : TERM][::-1], top]
+        powers = [*wave.pieces[p].coefficients[: wave.pieces[p].degree][::-1], wave.pieces[p].top]
         found = np.polyval(powers, tau)
         error = np.abs(found - defined(waveform, phase) / scale).max()
         assert error < 1e-14 + 4e-16 * fastest * 8 * pi, f"piece {p}: off by {error:.1e}"
-        assert np.all(np.diff(found) * (wave.pieces[p, LAST] - wave.pieces[p, FIRST]) >= 0), f"piece {p}: not monotone"
-        assert np.all(found * (wave.pieces[p, FIRST] + wave.pieces[p, LAST]) > 0), f"piece {p}: changes its sign"
+        assert np.all(np.diff(found) * (wave.pieces[p].last - wave.pieces[p].first) >= 0), f"piece {p}: not monotone"
+        assert np.all(found * (wave.pieces[p].first + wave.pieces[p].last) > 0), f"piece {p}: changes its sign"
 
 
 def test_intervals_are_the_same_up_to_the_next() -> None:
@@ -117,14 +103,14 @@ def test_intervals_are_the_same_up_to_the_next() -> None:
 def test_pieces_join(name: str) -> None:
     """No phase is left out, and w jumps only where it is said to, upwards, or down."""
     wave = wave_of(EVERY[name])
-    assert wave.pieces[0, START] == 0.0
-    np.testing.assert_array_equal(wave.pieces[1:, START], wave.pieces[:-1, END])
-    assert wave.pieces[-1, END] == pytest.approx(2 * pi * (wave.cycle.size - 1), rel=1e-15)
-    leaps = wave.pieces[:, FIRST] - np.concatenate([[0.0], wave.pieces[:-1, LAST]])
+    assert wave.pieces[0].start == 0.0
+    np.testing.assert_array_equal(wave.pieces["start"][1:], wave.pieces["end"][:-1])
+    assert wave.pieces[-1].end == pytest.approx(2 * pi * (wave.cycle.size - 1), rel=1e-15)
+    leaps = wave.pieces["first"] - np.concatenate([[0.0], wave.pieces["last"][:-1]])
     if EVERY[name].name != "square":
         assert not leaps[1:].any(), "a jump in a continuous wave"
     np.testing.assert_array_equal(
-        wave.pieces[:, JUMPS] > 0.0, leaps > np.maximum(0.0, -np.concatenate([[0.0], wave.pieces[:-1, LAST]]))
+        wave.pieces["jumps"], leaps > np.maximum(0.0, -np.concatenate([[0.0], wave.pieces["last"][:-1]]))
     )
 
 
@@ -138,10 +124,10 @@ def test_peak_is_exact(seed: int) -> None:
         draw.normal(size=count).tolist(), multiples.tolist(), draw.uniform(0, 360, count).tolist(), cycles=1
     )
     wave = wave_of(waveform)
-    assert np.abs(wave.pieces[:, TOP]).max() == 1.0
+    assert np.abs(wave.pieces["top"]).max() == 1.0
     # scaled by the peak, the coefficients give it back
-    p = int(np.abs(wave.pieces[:, TOP]).argmax())
-    phase = wave.pieces[p, START] if wave.pieces[p, BEGIN] == 0.0 else wave.pieces[p, END]
+    p = int(np.abs(wave.pieces["top"]).argmax())
+    phase = wave.pieces[p].start if wave.pieces[p].begin == 0.0 else wave.pieces[p].end
     assert abs(defined(waveform, np.array([phase]))[0]) == pytest.approx(exact_peak(waveform), rel=1e-13)
 
 
@@ -149,7 +135,7 @@ def test_intervals_of_several_maxima() -> None:
     """sin φ + 0.6 sin 5φ is above zero in one run with three maxima, and its mirror image below."""
     wave = wave_of(Harmonics([1, 0.6], [1, 5], cycles=1))
     ((a, b),) = wave.interval[:1]
-    tops = [p for p in range(a, b - 1) if wave.pieces[p, FIRST] < wave.pieces[p, LAST] > wave.pieces[p + 1, LAST]]
+    tops = [p for p in range(a, b - 1) if wave.pieces[p].first < wave.pieces[p].last > wave.pieces[p + 1].last]
     assert len(wave.interval) == 3 or len(tops) == 3
     assert wave.height.max() == 1.0
 
@@ -163,7 +149,7 @@ def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
     """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)) in closed form, about π at distances 10⁻¹ to 10⁻⁵."""
     a, b = 1.0, 2 / 3 * (1 + 10.0 ** (-2 * power))
     ends = wave_of(Harmonics([a, b], [2, 3], cycles=1)).pieces
-    found = ends[ends[:, FIRST] == 0.0, START]
+    found = ends["start"][ends["first"] == 0.0]
     # 4b x² + 2a x − b = 0 in x = cos φ; the root near −1 as a distance from it
     top = (-2 * a - np.sqrt(4 * a * a + 16 * b * b)) / (8 * b)
     nearer = 2 * np.arcsin(np.sqrt((1 + top) / 2))

@@ -73,20 +73,16 @@ class Interface(NamedTuple):
 
 
 class Block(NamedTuple):
-    """A block with all its parameters, and what can be said of it before it moves."""
+    """A block with all that its motion depends on: few numbers, which fit into the registers of a call."""
 
     amplitude: float
     yield_acceleration: float
-    limiting_acceleration: float
-    acceleration_ratio: float
     mu_s: float
     tan_theta: float
     delta_mu: float
     decay_rate: float
     g: float
     rise: int
-    sliding_mode: int
-    validity: int
     law: FrictionLaw
 
 
@@ -156,13 +152,12 @@ def decay_rate_of(cell: Cell, delta_mu: float, minimum_friction: float, g: float
 
 
 @inlined
-def block_of(law: FrictionLaw, cell: Cell, rise: int, g: float) -> Block:
-    """A cell's block, with friction parameters (Eqs. 7-11, λ from Eq. 6), sliding mode and a-priori validity."""
-    found = interface_of(cell, rise, g)
-    decay_rate = decay_rate_of(cell, found.delta_mu, found.minimum_friction, g)
+def block_of(law: FrictionLaw, cell: Cell, interface: Interface, rise: int, g: float) -> Block:
+    """A cell's block, λ from Eq. 6 where it is not given."""
+    decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, g)
     return Block(
-        cell.amplitude, found.yield_acceleration, found.limiting_acceleration, found.acceleration_ratio, cell.mu_s,
-        cell.tan_theta, found.delta_mu, decay_rate, g, rise, found.sliding_mode, found.validity, law,
+        cell.amplitude, interface.yield_acceleration, cell.mu_s, cell.tan_theta, interface.delta_mu, decay_rate, g,
+        rise, law,
     )  # fmt: skip
 
 

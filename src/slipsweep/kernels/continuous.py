@@ -14,7 +14,7 @@ from slipsweep.kernels.exact import MOST_PHASES, Workspace, inside, next_break
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.kernels.pulse import Pulse
 from slipsweep.kernels.series import Gain, series_of
-from slipsweep.motion.pieces import BEGIN, FINISH, FIRST, LAST, TOP, Wave
+from slipsweep.motion.pieces import Wave
 
 
 @scalar
@@ -56,14 +56,14 @@ def find_zeros(block: Block, wants_peak: bool, wave: Wave, workspace: Workspace)
 def most_gained(block: Block, wave: Wave, q: int, start: float, end: float, workspace: Workspace) -> float:
     """The most that V gains on a part of piece q up to a zero of D (−∞, if it has none)."""
     pieces, amplitude, highest = wave.pieces, block.amplitude, -math.inf
-    side = 0 if pieces[q, TOP] > 0.0 else 1
-    first, last = amplitude * pieces[q, FIRST], amplitude * pieces[q, LAST]
+    side = 0 if pieces[q].top > 0.0 else 1
+    first, last = amplitude * pieces[q].first, amplitude * pieces[q].last
     for i in range(workspace.zero_counts[side]):
         zero = workspace.zeros[side, i]
         if min(first, last) < zero < max(first, last):
-            at = offset_at(pieces, q, amplitude, zero)
+            at = offset_at(pieces[q], amplitude, zero)
             if start < at < end:
-                highest = max(highest, eq4_integrals(block, pieces, q, start, at)[0])
+                highest = max(highest, eq4_integrals(block, pieces[q], start, at)[0])
     return highest
 
 
@@ -77,11 +77,11 @@ def follow_eq4(
     # apart, because over a symmetric cycle they cancel to the last digit
     above, below, both = 0.0, 0.0, 0.0
     for q in range(p, min(until + 1, pieces.shape[0])):
-        start, end = tau if q == p else pieces[q, BEGIN], tau_until if q == until else pieces[q, FINISH]
+        start, end = tau if q == p else pieces[q].begin, tau_until if q == until else pieces[q].finish
         if not end > start:
             continue
         peak = max(peak, velocity + most_gained(block, wave, q, start, end, workspace))
-        lag, upper = lag_integrals(block, pieces, q, start, end), pieces[q, TOP] > 0.0
+        lag, upper = lag_integrals(block, pieces[q], start, end), pieces[q].top > 0.0
         side_g = block.g if upper else -block.g
         displacement += velocity * (end - start) + side_g * lag.second + block.tan_theta * lag.second_x
         above, below = above + (lag.first if upper else 0.0), below + (0.0 if upper else lag.first)

@@ -13,19 +13,7 @@ from slipsweep.jit.decorators import scalar, summed
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.block import Block, friction
 from slipsweep.kernels.excitation import base_acceleration, offset_at
-from slipsweep.motion.pieces import (
-    ARC,
-    BEGIN,
-    COEFFICIENTS,
-    DEGREE,
-    FINISH,
-    FIRST,
-    LAST,
-    NODES,
-    TERM,
-    TOP,
-    WEIGHTS,
-)
+from slipsweep.motion.pieces import NODES, WEIGHTS, Piece
 
 #: Where panels of the quadrature end, in e-foldings of the friction from the end where it is larger;
 #: past the third it has decayed to 1e-18.
@@ -58,15 +46,15 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
 
 
 @scalar
-def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: float) -> np.ndarray:
+def at_nodes(piece: Piece, amplitude: float, start: float, width: float) -> np.ndarray:
     """|Üg| at the nodes of the quadrature from `start` on: power by power, so that LLVM takes nodes together."""
-    top, x = pieces[p, TOP], np.zeros(NODES.size)
-    if pieces[p, ARC] > 0.0:
+    top, x = piece.top, np.zeros(NODES.size)
+    if piece.arc:
         for node in range(NODES.size):
             x[node] = amplitude * (1.0 - versine(start + width * NODES[node]))
         return x
-    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        coefficient = pieces[p, COEFFICIENTS + TERM * k]
+    for k in range(piece.degree - 1, -1, -1):
+        coefficient = piece.coefficients[k]
         for node in range(NODES.size):
             x[node] = x[node] * (start + width * NODES[node]) + coefficient
     for node in range(NODES.size):
@@ -75,10 +63,10 @@ def at_nodes(pieces: np.ndarray, p: int, amplitude: float, start: float, width: 
 
 
 @summed
-def panel_lag(block: Block, pieces: np.ndarray, p: int, near: float, until: float, end: float) -> Lag:
+def panel_lag(block: Block, piece: Piece, near: float, until: float, end: float) -> Lag:
     """`Lag` over a panel of the quadrature: 16 nodes of Gauss and Legendre."""
     width = until - near
-    values = at_nodes(pieces, p, block.amplitude, near, width)
+    values = at_nodes(piece, block.amplitude, near, width)
     kept = block.mu_s - block.tan_theta
     first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
     for node in range(NODES.size):
@@ -94,7 +82,7 @@ def panel_lag(block: Block, pieces: np.ndarray, p: int, near: float, until: floa
 
 
 @scalar
-def curved_lag(block: Block, pieces: np.ndarray, p: int, start: float, end: float, x_start: float, x_end: float) -> Lag:
+def curved_lag(block: Block, piece: Piece, start: float, end: float, x_start: float, x_end: float) -> Lag:
     """`Lag` where |Üg| goes along a curve, panel by panel from the end where the friction is larger."""
     length = block.law.decay_length(block.decay_rate, block.g)
     e_foldings = abs(x_end - x_start) / length
@@ -104,8 +92,8 @@ def curved_lag(block: Block, pieces: np.ndarray, p: int, start: float, end: floa
     for bound in PANEL_BOUNDS:
         until = far
         if e_foldings > bound:
-            until = offset_at(pieces, p, block.amplitude, math.copysign(least + bound * length, pieces[p, TOP]))
-        panel = panel_lag(block, pieces, p, near, until, end)
+            until = offset_at(piece, block.amplitude, math.copysign(least + bound * length, piece.top))
+        panel = panel_lag(block, piece, near, until, end)
         lag = Lag(
             lag.first + panel.first,
             lag.second + panel.second,
@@ -119,23 +107,21 @@ def curved_lag(block: Block, pieces: np.ndarray, p: int, start: float, end: floa
 
 
 @scalar
-def lag_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float) -> Lag:
+def lag_integrals(block: Block, piece: Piece, start: float, end: float) -> Lag:
     """`Lag` over a part of piece p."""
     amplitude = block.amplitude
     # most parts begin or end where the piece does
-    x_start = (
-        amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
-    )
-    x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else base_acceleration(pieces, p, amplitude, end)
+    x_start = amplitude * piece.first if start == piece.begin else base_acceleration(piece, amplitude, start)
+    x_end = amplitude * piece.last if end == piece.finish else base_acceleration(piece, amplitude, end)
     x_start, x_end = abs(x_start), abs(x_end)
-    if int(pieces[p, DEGREE]) <= 1:
+    if piece.degree <= 1:
         return straight_lag(block, x_start, x_end - x_start, end - start)
-    return curved_lag(block, pieces, p, start, end, x_start, x_end)
+    return curved_lag(block, piece, start, end, x_start, x_end)
 
 
 @scalar
-def eq4_integrals(block: Block, pieces: np.ndarray, p: int, start: float, end: float) -> tuple[float, float]:
+def eq4_integrals(block: Block, piece: Piece, start: float, end: float) -> tuple[float, float]:
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest, after Eq. 4."""
-    lag = lag_integrals(block, pieces, p, start, end)
-    side_g = math.copysign(block.g, pieces[p, TOP])
+    lag = lag_integrals(block, piece, start, end)
+    side_g = math.copysign(block.g, piece.top)
     return side_g * lag.first + block.tan_theta * lag.first_x, side_g * lag.second + block.tan_theta * lag.second_x

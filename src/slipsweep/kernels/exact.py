@@ -20,7 +20,7 @@ from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
 from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, END, FINISH, FIRST, LAST, START, Wave
+from slipsweep.motion.pieces import Piece, Wave
 
 #: Signs at the start of a phase are read this fraction of the phase inside it, but no closer to the start than this
 #: fraction of that: where a phase ends at a turn of E, the sign just behind is known only beyond rounding.
@@ -139,10 +139,10 @@ def after(
     state: State, part: Part, kind: int, pieces: np.ndarray, p: int, start: float, log: np.ndarray
 ) -> State:  # fmt: skip
     """The state after a part of a slide along piece p from τ = `start` on; the log has it, if one is kept."""
-    stop = phase_at(pieces, p, part.end) if part.stops or log.size else 0.0
+    stop = phase_at(pieces[p], part.end) if part.stops or log.size else 0.0
     logged = state.logged
     if log.size:
-        note(log[logged], state, kind, p, start, phase_at(pieces, p, start), stop)
+        note(log[logged], state, kind, p, start, phase_at(pieces[p], start), stop)
         logged += 1
     return State(
         part.velocity, state.displacement + part.displacement, state.held, not part.stops,
@@ -251,19 +251,19 @@ def yield_governs(block: Block, wave: Wave) -> bool:
 
 
 @scalar
-def _held_lost(where: tuple[np.ndarray, int, float, float, float, float], tau: float) -> tuple[float, float]:
+def _held_lost(where: tuple[Piece, float, float, float, float], tau: float) -> tuple[float, float]:
     """−V at τ of a hold that V entered at `start`, and its rate."""
-    pieces, p, amplitude, held, velocity, start = where
-    left = velocity + held_gain(pieces, p, amplitude, held, start, tau)
-    return -left, held - base_acceleration(pieces, p, amplitude, tau)
+    piece, amplitude, held, velocity, start = where
+    left = velocity + held_gain(piece, amplitude, held, start, tau)
+    return -left, held - base_acceleration(piece, amplitude, tau)
 
 
 @scalar
-def _followed_lost(where: tuple[Block, np.ndarray, int, float, float], tau: float) -> tuple[float, float]:
+def _followed_lost(where: tuple[Block, Piece, float, float], tau: float) -> tuple[float, float]:
     """−V at τ where b follows Eq. 4, and its rate."""
-    block, pieces, p, velocity, start = where
-    left = velocity + eq4_integrals(block, pieces, p, start, tau)[0]
-    return -left, -physics.relative_acceleration(block, base_acceleration(pieces, p, block.amplitude, tau))
+    block, piece, velocity, start = where
+    left = velocity + eq4_integrals(block, piece, start, tau)[0]
+    return -left, -physics.relative_acceleration(block, base_acceleration(piece, block.amplitude, tau))
 
 
 _held_stop = root_of(_held_lost)
@@ -272,23 +272,23 @@ _followed_stop = root_of(_followed_lost)
 
 @scalar
 def hold_integrals(
-    pieces: np.ndarray, p: int, amplitude: float, held: float, rate: float, start: float, end: float
+    piece: Piece, amplitude: float, held: float, rate: float, start: float, end: float
 ) -> tuple[float, float]:
-    """Gains of V and W with b held on a part of piece p, at whose start Üg − b is `rate`."""
-    if pieces[p, DEGREE] <= 1.0:
-        return linear.held_integrals(rate, amplitude * pieces[p, COEFFICIENTS], end - start)
-    return held_integrals(pieces, p, amplitude, held, start, end)
+    """Gains of V and W with b held on a part of a piece, at whose start Üg − b is `rate`."""
+    if piece.degree <= 1:
+        return linear.held_integrals(rate, amplitude * piece.coefficients[0], end - start)
+    return held_integrals(piece, amplitude, held, start, end)
 
 
 @scalar
-def hold(pieces: np.ndarray, p: int, amplitude: float, held: float, velocity: float, start: float, end: float) -> Part:
-    """Slide with b held, V' = Üg − b, along piece p from start to end, or to the stop."""
+def hold(piece: Piece, amplitude: float, held: float, velocity: float, start: float, end: float) -> Part:
+    """Slide with b held, V' = Üg − b, along a piece from start to end, or to the stop."""
     # most parts are whole pieces, whose ends are known
-    x = amplitude * pieces[p, FIRST] if start == pieces[p, BEGIN] else base_acceleration(pieces, p, amplitude, start)
-    x_end = amplitude * pieces[p, LAST] if end == pieces[p, FINISH] else base_acceleration(pieces, p, amplitude, end)
+    x = amplitude * piece.first if start == piece.begin else base_acceleration(piece, amplitude, start)
+    x_end = amplitude * piece.last if end == piece.finish else base_acceleration(piece, amplitude, end)
     rate, rate_end = x - held, x_end - held
-    slope, straight = amplitude * pieces[p, COEFFICIENTS], pieces[p, DEGREE] <= 1.0
-    gained, displaced = hold_integrals(pieces, p, amplitude, held, rate, start, end)
+    slope, straight = amplitude * piece.coefficients[0], piece.degree <= 1
+    gained, displaced = hold_integrals(piece, amplitude, held, rate, start, end)
     low, high, peak, least = start, end, velocity, velocity
     stops = velocity + gained <= 0.0
     if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
@@ -300,8 +300,8 @@ def hold(pieces: np.ndarray, p: int, amplitude: float, held: float, velocity: fl
             turn = start - rate / slope
             extreme = velocity - 0.5 * rate * (rate / slope)
         else:
-            turn = offset_at(pieces, p, amplitude, held)
-            extreme = velocity + held_gain(pieces, p, amplitude, held, start, turn)
+            turn = offset_at(piece, amplitude, held)
+            extreme = velocity + held_gain(piece, amplitude, held, start, turn)
         if rate > 0.0:
             peak = max(extreme, peak)  # in this order a NaN is kept
             low = turn
@@ -314,22 +314,22 @@ def hold(pieces: np.ndarray, p: int, amplitude: float, held: float, velocity: fl
             if straight:
                 end = min(start + linear.held_stop(velocity, rate, slope), high)
             else:
-                where = (pieces, p, amplitude, held, velocity, start)
+                where = (piece, amplitude, held, velocity, start)
                 end = _held_stop(where, low, high, 0.5 * (low + high), start)
-        displaced = hold_integrals(pieces, p, amplitude, held, rate, start, end)[1]
+        displaced = hold_integrals(piece, amplitude, held, rate, start, end)[1]
     last = 0.0 if stops else velocity + gained
     return Part(end, last, velocity * (end - start) + displaced, max(peak, last), min(least, last), stops)
 
 
 @scalar
-def follow(block: Block, pieces: np.ndarray, p: int, velocity: float, start: float, end: float) -> Part:
-    """Slide under Eq. 4 along piece p, on which D keeps its sign, from start to end or to the stop."""
-    gained, displaced = eq4_integrals(block, pieces, p, start, end)
+def follow(block: Block, piece: Piece, velocity: float, start: float, end: float) -> Part:
+    """Slide under Eq. 4 along a piece, on which D keeps its sign, from start to end or to the stop."""
+    gained, displaced = eq4_integrals(block, piece, start, end)
     last = velocity + gained
     stops = last <= 0.0
     if stops:
-        end, last = _followed_stop((block, pieces, p, velocity, start), start, end, 0.5 * (start + end), start), 0.0
-        displaced = eq4_integrals(block, pieces, p, start, end)[1]
+        end, last = _followed_stop((block, piece, velocity, start), start, end, 0.5 * (start + end), start), 0.0
+        displaced = eq4_integrals(block, piece, start, end)[1]
     moved = velocity * (end - start) + displaced
     return Part(end, last, moved, max(last, velocity), min(last, velocity), stops)
 
@@ -340,12 +340,12 @@ def follow(block: Block, pieces: np.ndarray, p: int, velocity: float, start: flo
 @scalar
 def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, last: int) -> tuple[int, float]:
     """Where on the rise from τ on piece p to the end of piece `last` the base's acceleration comes to x."""
-    while p < last and block.amplitude * pieces[p, LAST] < x:
+    while p < last and block.amplitude * pieces[p].last < x:
         p += 1
-        tau = pieces[p, BEGIN]
-    if block.amplitude * pieces[p, LAST] <= x:
-        return p, pieces[p, FINISH]
-    return p, max(tau, offset_at(pieces, p, block.amplitude, x))
+        tau = pieces[p].begin
+    if block.amplitude * pieces[p].last <= x:
+        return p, pieces[p].finish
+    return p, max(tau, offset_at(pieces[p], block.amplitude, x))
 
 
 @scalar
@@ -353,7 +353,7 @@ def rise(
     block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
 ) -> State:  # fmt: skip
     """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
-    amplitude, top, p = block.amplitude, block.amplitude * pieces[last, LAST], first
+    amplitude, top, p = block.amplitude, block.amplitude * pieces[last].last, first
     follows = block.rise == physics.LITERAL
     for _ in range(MOST_PHASES * (1 + last - first)):
         if not state.sliding:
@@ -371,22 +371,22 @@ def rise(
         phase = phase_on_rise(block, x, top, state.held, follows)
         until, tau_until = place_of(block, pieces, phase.end, p, tau, last)
         while True:
-            end = tau_until if p == until else pieces[p, FINISH]
+            end = tau_until if p == until else pieces[p].finish
             if phase.follows:
-                part = follow(block, pieces, p, state.velocity, tau, end)
+                part = follow(block, pieces[p], state.velocity, tau, end)
             else:
-                part = hold(pieces, p, amplitude, state.held, state.velocity, tau, end)
+                part = hold(pieces[p], amplitude, state.held, state.velocity, tau, end)
             state = after(state, part, FOLLOW if phase.follows else HOLD, pieces, p, tau, log)
             tau = part.end
             if not state.sliding or p == until:
                 break
             p += 1
-            tau = pieces[p, BEGIN]
+            tau = pieces[p].begin
         if not state.sliding and (p < until or tau < tau_until):
             if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
                 p, tau, x = until, tau_until, phase.end
             else:
-                x = base_acceleration(pieces, p, amplitude, tau)
+                x = base_acceleration(pieces[p], amplitude, tau)
             continue
         x, follows = phase.end, phase.follows_after
         state = with_held(state, physics.response(block, x) if phase.follows else state.held)
@@ -403,7 +403,7 @@ def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State)
             return state
         eq4 = physics.response(block, x)
         return with_held(state, eq4 if block.rise == physics.LITERAL else max(state.held, eq4))
-    if x >= block.yield_acceleration and pieces[p, FIRST] >= pieces[p, LAST]:
+    if x >= block.yield_acceleration and pieces[p].first >= pieces[p].last:
         b = physics.starting_acceleration(block, x)
         if b < x:
             return begun(state, b)
@@ -413,7 +413,7 @@ def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State)
 @scalar
 def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
     """The last piece of the rise that begins with piece p, before piece `end`."""
-    while p + 1 < end and pieces[p, LAST] == pieces[p + 1, FIRST] < pieces[p + 1, LAST]:
+    while p + 1 < end and pieces[p].last == pieces[p + 1].first < pieces[p + 1].last:
         p += 1
     return p
 
@@ -423,7 +423,7 @@ def hold_on(
     pieces: np.ndarray, p: int, amplitude: float, start: float, end: float, state: State, log: np.ndarray
 ) -> State:
     """The state after `hold`."""
-    part = hold(pieces, p, amplitude, state.held, state.velocity, start, end)
+    part = hold(pieces[p], amplitude, state.held, state.velocity, start, end)
     return after(state, part, HOLD, pieces, p, start, log)
 
 
@@ -436,18 +436,18 @@ def recouple(
     By Eq. 12 with Ümax = b, or with b held on.  p lies past the last piece if there is no next pulse.
     """
     count = pieces.shape[0]
-    started = pieces[q, START] if q < count else pieces[q - 1, END]
+    started = pieces[q].start if q < count else pieces[q - 1].end
     stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
     if recoupling == physics.INTEGRATE:
         while state.sliding and q < min(p + 1, count):
-            end = tau if q == p else pieces[min(q, count - 1), FINISH]
-            if q < count and end > pieces[q, BEGIN]:
-                state = hold_on(pieces, q, block.amplitude, pieces[q, BEGIN], end, state, log)
+            end = tau if q == p else pieces[min(q, count - 1)].finish
+            if q < count and end > pieces[q].begin:
+                state = hold_on(pieces, q, block.amplitude, pieces[q].begin, end, state, log)
             q += 1
-        started, stopped_at = pieces[count - 1, END], math.inf
+        started, stopped_at = pieces[count - 1].end, math.inf
     if not state.sliding or (p < count and recoupling == physics.INTEGRATE):
         return state
-    duration = math.inf if p >= count else phase_at(pieces, p, tau) - started
+    duration = math.inf if p >= count else phase_at(pieces[p], tau) - started
     logged = state.logged
     if log.size:
         note(log[logged], state, ATTENUATE, 0, 0.0, started, started + min(duration, state.velocity / state.held))
@@ -470,7 +470,7 @@ def pulse(
     """
     pieces, log, end = wave.pieces, workspace.log, wave.interval[k, 1]
     q, tau = beginning(block, wave, k)
-    x = max(block.amplitude * pieces[q, FIRST], block.yield_acceleration)
+    x = max(block.amplitude * pieces[q].first, block.yield_acceleration)
     state = State(
         velocity=velocity,
         displacement=0.0,
@@ -486,21 +486,21 @@ def pulse(
     while q < end:
         if rises_anew(pieces, q):
             state = reset_held(block, pieces, q, x, state)
-        if pieces[q, FIRST] < pieces[q, LAST]:
+        if pieces[q].first < pieces[q].last:
             last = end_of_rise(pieces, q, end)
             state = rise(block, pieces, q, last, tau, x, state, log)
             q = last
         elif state.sliding:
-            level = pieces[q, FIRST] == pieces[q, LAST]
+            level = pieces[q].first == pieces[q].last
             least_held = least_held if level else min(least_held, state.held)
-            part = hold(pieces, q, block.amplitude, state.held, state.velocity, tau, pieces[q, FINISH])
+            part = hold(pieces[q], block.amplitude, state.held, state.velocity, tau, pieces[q].finish)
             state = after(state, part, HOLD, pieces, q, tau, log)
             if level and part.stops:
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
-                    state = hold_on(pieces, q, block.amplitude, part.end, pieces[q, FINISH], state, log)
+                    state = hold_on(pieces, q, block.amplitude, part.end, pieces[q].finish, state, log)
         q += 1
-        x, tau = block.amplitude * pieces[min(q, end - 1), FIRST], pieces[min(q, end - 1), BEGIN]
+        x, tau = block.amplitude * pieces[min(q, end - 1)].first, pieces[min(q, end - 1)].begin
     if state.sliding:
         if state.held <= 0.0:
             return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, physics.KD_NOT_POSITIVE)

@@ -11,76 +11,59 @@ evaluated by its shorter closed forms.  Times the amplitude A it is the base's a
 
 import math
 
-import numpy as np
-
 from slipsweep.jit.decorators import scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
 from slipsweep.kernels.events import root_of
-from slipsweep.motion.pieces import (
-    ARC,
-    BEGIN,
-    COEFFICIENTS,
-    DEGREE,
-    FINISH,
-    FIRST,
-    LAST,
-    ONCE,
-    START,
-    TERM,
-    TOP,
-    TWICE,
-    WHOLE,
-    WHOLE_MOMENT,
-)
+from slipsweep.motion.pieces import Piece
 
 
 @scalar
-def from_top(pieces: np.ndarray, p: int, tau: float) -> float:
+def from_top(piece: Piece, tau: float) -> float:
     """w − top on piece p, τ from its anchor."""
-    if pieces[p, ARC] > 0.0:
-        return -pieces[p, TOP] * versine(tau)
+    if piece.arc:
+        return -piece.top * versine(tau)
     sum_ = 0.0
-    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        sum_ = sum_ * tau + pieces[p, COEFFICIENTS + TERM * k]
+    for k in range(piece.degree - 1, -1, -1):
+        sum_ = sum_ * tau + piece.coefficients[k]
     return sum_ * tau
 
 
 @scalar
-def from_top_and_slope(pieces: np.ndarray, p: int, tau: float) -> tuple[float, float]:
+def from_top_and_slope(piece: Piece, tau: float) -> tuple[float, float]:
     """w − top and dw/dτ on piece p."""
-    if pieces[p, ARC] > 0.0:
-        return -pieces[p, TOP] * versine(tau), -pieces[p, TOP] * math.sin(tau)
+    if piece.arc:
+        return -piece.top * versine(tau), -piece.top * math.sin(tau)
     sum_, slope = 0.0, 0.0
-    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
+    for k in range(piece.degree - 1, -1, -1):
         slope = slope * tau + sum_
-        sum_ = sum_ * tau + pieces[p, COEFFICIENTS + TERM * k]
+        sum_ = sum_ * tau + piece.coefficients[k]
     return sum_ * tau, slope * tau + sum_
 
 
 @scalar
-def integral(pieces: np.ndarray, p: int, start: float, end: float) -> float:
+def integral(piece: Piece, start: float, end: float) -> float:
     """∫ (w − top) dτ over a part of piece p."""
-    if pieces[p, ARC] > 0.0:
-        return -pieces[p, TOP] * (angle_minus_sine(end) - angle_minus_sine(start))
+    if piece.arc:
+        return -piece.top * (angle_minus_sine(end) - angle_minus_sine(start))
     sum_start, sum_end = 0.0, 0.0
-    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        once = pieces[p, ONCE + TERM * k]
+    for k in range(piece.degree - 1, -1, -1):
+        once = piece.once[k]
         sum_start, sum_end = sum_start * start + once, sum_end * end + once
     return sum_end * end * end - sum_start * start * start
 
 
 @scalar
-def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[float, float]:
+def integrals(piece: Piece, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
-    if start == pieces[p, BEGIN] and end == pieces[p, FINISH]:
-        return pieces[p, WHOLE], pieces[p, WHOLE_MOMENT]
-    if pieces[p, ARC] > 0.0:
+    if start == piece.begin and end == piece.finish:
+        return piece.whole, piece.whole_moment
+    if piece.arc:
         sine_part = angle_minus_sine(start)
         remaining = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
-        return -pieces[p, TOP] * (angle_minus_sine(end) - sine_part), -pieces[p, TOP] * remaining
+        return -piece.top * (angle_minus_sine(end) - sine_part), -piece.top * remaining
     once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
-    for k in range(int(pieces[p, DEGREE]) - 1, -1, -1):
-        once, twice = pieces[p, ONCE + TERM * k], pieces[p, TWICE + TERM * k]
+    for k in range(piece.degree - 1, -1, -1):
+        once, twice = piece.once[k], piece.twice[k]
         once_start, once_end = once_start * start + once, once_end * end + once
         twice_start, twice_end = twice_start * start + twice, twice_end * end + twice
     once_start *= start * start
@@ -89,32 +72,30 @@ def integrals(pieces: np.ndarray, p: int, start: float, end: float) -> tuple[flo
 
 
 @scalar
-def base_acceleration(pieces: np.ndarray, p: int, amplitude: float, tau: float) -> float:
+def base_acceleration(piece: Piece, amplitude: float, tau: float) -> float:
     """The base's acceleration on piece p, τ from its anchor."""
-    return amplitude * (pieces[p, TOP] + from_top(pieces, p, tau))
+    return amplitude * (piece.top + from_top(piece, tau))
 
 
 @scalar
-def held_gain(pieces: np.ndarray, p: int, amplitude: float, held: float, start: float, end: float) -> float:
+def held_gain(piece: Piece, amplitude: float, held: float, start: float, end: float) -> float:
     """∫ (x − b) dτ for a held b on piece p: the gain of V."""
-    return (amplitude * pieces[p, TOP] - held) * (end - start) + amplitude * integral(pieces, p, start, end)
+    return (amplitude * piece.top - held) * (end - start) + amplitude * integral(piece, start, end)
 
 
 @scalar
-def held_integrals(
-    pieces: np.ndarray, p: int, amplitude: float, held: float, start: float, end: float
-) -> tuple[float, float]:
+def held_integrals(piece: Piece, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
     """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on piece p: gains of V and W from rest."""
     width = end - start
-    excess = amplitude * pieces[p, TOP] - held
-    first, second = integrals(pieces, p, start, end)
+    excess = amplitude * piece.top - held
+    first, second = integrals(piece, start, end)
     return excess * width + amplitude * first, 0.5 * excess * width * width + amplitude * second
 
 
 @scalar
-def _beyond(where: tuple[np.ndarray, int, float], tau: float) -> tuple[float, float]:
-    pieces, p, wanted = where
-    value, slope = from_top_and_slope(pieces, p, tau)
+def _beyond(where: tuple[Piece, float], tau: float) -> tuple[float, float]:
+    piece, wanted = where
+    value, slope = from_top_and_slope(piece, tau)
     return value - wanted, slope
 
 
@@ -123,27 +104,27 @@ offset_root = root_of(_beyond)
 
 
 @scalar
-def offset_at(pieces: np.ndarray, p: int, amplitude: float, x: float) -> float:
+def offset_at(piece: Piece, amplitude: float, x: float) -> float:
     """τ at which the base's acceleration is x on piece p (the nearer end, if x lies beyond)."""
-    far = pieces[p, BEGIN] + pieces[p, FINISH]  # one of them is 0
-    wanted = (x - amplitude * pieces[p, TOP]) / amplitude
-    farthest = pieces[p, FIRST] + pieces[p, LAST] - 2.0 * pieces[p, TOP]
+    far = piece.begin + piece.finish  # one of them is 0
+    wanted = (x - amplitude * piece.top) / amplitude
+    farthest = piece.first + piece.last - 2.0 * piece.top
     share = wanted / farthest if farthest != 0.0 else 0.0
     if not share > 0.0:
         return 0.0
     if share >= 1.0:
         return far
-    if int(pieces[p, DEGREE]) == 1:
+    if piece.degree == 1:
         return far * share
-    if pieces[p, ARC] > 0.0:
+    if piece.arc:
         return math.copysign(inverse_versine(abs(wanted)), far)
-    tau = far * (math.sqrt(share) if pieces[p, COEFFICIENTS] == 0.0 else share)
+    tau = far * (math.sqrt(share) if piece.coefficients[0] == 0.0 else share)
     if wanted < 0.0:
-        return offset_root((pieces, p, wanted), far, 0.0, tau, 0.0)
-    return offset_root((pieces, p, wanted), 0.0, far, tau, 0.0)
+        return offset_root((piece, wanted), far, 0.0, tau, 0.0)
+    return offset_root((piece, wanted), 0.0, far, tau, 0.0)
 
 
 @scalar
-def phase_at(pieces: np.ndarray, p: int, tau: float) -> float:
+def phase_at(piece: Piece, tau: float) -> float:
     """The phase of τ on piece p, in the table's count."""
-    return pieces[p, START] + (tau - pieces[p, BEGIN])
+    return piece.start + (tau - piece.begin)

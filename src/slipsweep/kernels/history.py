@@ -11,7 +11,7 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import Block, Cell, Options, block_of, response
+from slipsweep.kernels.block import Block, Cell, Options, block_of, interface_of, response
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.exact import ATTENUATE, FOLLOW, Workspace, pulse
 from slipsweep.kernels.excitation import base_acceleration, held_integrals, phase_at
@@ -19,7 +19,7 @@ from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.kernels.record import block_in_pulse, end_of_following, recorded_pulse, slides_continuously
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential
-from slipsweep.motion.pieces import BEGIN, END, FINISH, START, Wave
+from slipsweep.motion.pieces import Wave
 
 
 class History(NamedTuple):
@@ -52,19 +52,19 @@ def table_cycle(wave: Wave, n: int) -> int:
 def fill_base(amplitude: float, cycles: int, wave: Wave, phases: np.ndarray, found: History) -> None:
     """Fill the base's acceleration at increasing phases; at a jump, the value after it."""
     pieces, p = wave.pieces, 0
-    end = pieces[pieces.shape[0] - 1, END] + 2.0 * math.pi * max(wave.repeats - 1, 0)
+    end = pieces[pieces.shape[0] - 1].end + 2.0 * math.pi * max(wave.repeats - 1, 0)
     for at in range(phases.size):
         found.ground_acceleration[at] = 0.0
-        if pieces[0, START] <= phases[at] < end:
+        if pieces[0].start <= phases[at] < end:
             n = min(max(int(phases[at] / (2.0 * math.pi)), 0), cycles - 1)
             c = table_cycle(wave, n)
             phi = phases[at] - 2.0 * math.pi * (n - c)
-            if not wave.cycle[c] <= p < wave.cycle[c + 1] or phi < pieces[p, START]:
+            if not wave.cycle[c] <= p < wave.cycle[c + 1] or phi < pieces[p].start:
                 p = wave.cycle[c]
-            while p + 1 < wave.cycle[c + 1] and pieces[p, END] <= phi:
+            while p + 1 < wave.cycle[c + 1] and pieces[p].end <= phi:
                 p += 1
-            tau = min(max(pieces[p, BEGIN] + (phi - pieces[p, START]), pieces[p, BEGIN]), pieces[p, FINISH])
-            found.ground_acceleration[at] = base_acceleration(pieces, p, amplitude, tau)
+            tau = min(max(pieces[p].begin + (phi - pieces[p].start), pieces[p].begin), pieces[p].finish)
+            found.ground_acceleration[at] = base_acceleration(pieces[p], amplitude, tau)
 
 
 @scalar
@@ -96,10 +96,10 @@ def sample_part(
         gained, moved = -b * since, -0.5 * b * since * since
     elif part["kind"] == FOLLOW:
         found.block_acceleration[at] = response(block, found.ground_acceleration[at])
-        gained, moved = eq4_integrals(block, wave.pieces, part["piece"], tau, tau + since)
+        gained, moved = eq4_integrals(block, wave.pieces[part["piece"]], tau, tau + since)
     else:
         found.block_acceleration[at] = b
-        gained, moved = held_integrals(wave.pieces, part["piece"], block.amplitude, b, tau, tau + since)
+        gained, moved = held_integrals(wave.pieces[part["piece"]], block.amplitude, b, tau, tau + since)
     found.velocity[at] = max(part["velocity"] + gained, 0.0)
     found.displacement[at] = displacement + part["displacement"] + part["velocity"] * since + moved
 
@@ -110,7 +110,7 @@ def begins_at(block: Block, wave: Wave, k: int) -> float:
     if k >= wave.height.size:
         return math.inf
     p, tau = beginning(block, wave, k)
-    return phase_at(wave.pieces, p, tau)
+    return phase_at(wave.pieces[p], tau)
 
 
 @scalar
@@ -176,21 +176,21 @@ def sample_following(
     """
     velocity, displacement, at = now
     for q in range(p, min(until + 1, wave.pieces.shape[0])):
-        start = tau if q == p else wave.pieces[q, BEGIN]
-        end, end_phase = wave.pieces[q, FINISH], wave.pieces[q, END]
+        start = tau if q == p else wave.pieces[q].begin
+        end, end_phase = wave.pieces[q].finish, wave.pieces[q].end
         if q == until:
-            end, end_phase = tau_until, phase_at(wave.pieces, q, tau_until)
+            end, end_phase = tau_until, phase_at(wave.pieces[q], tau_until)
         if end <= start:
             continue
-        start_phase = phase_at(wave.pieces, q, start) + offset
+        start_phase = phase_at(wave.pieces[q], start) + offset
         while at < phases.size and phases[at] < end_phase + offset:
             since = max(phases[at] - start_phase, 0.0)
-            gained, moved = eq4_integrals(block, wave.pieces, q, start, min(start + since, end))
+            gained, moved = eq4_integrals(block, wave.pieces[q], start, min(start + since, end))
             found.block_acceleration[at] = response(block, found.ground_acceleration[at])
             found.velocity[at] = velocity + gained
             found.displacement[at] = displacement + velocity * since + moved
             at += 1
-        gained, moved = eq4_integrals(block, wave.pieces, q, start, end)
+        gained, moved = eq4_integrals(block, wave.pieces[q], start, end)
         displacement += velocity * (end - start) + moved
         velocity += gained
     return Moving(velocity, displacement, at)
@@ -204,15 +204,15 @@ def continuous_history(block: Block, cycles: int, wave: Wave, phases: np.ndarray
         return
     first, began = beginning(block, wave, k)
     at = 0
-    while at < phases.size and phases[at] < phase_at(wave.pieces, first, began):
+    while at < phases.size and phases[at] < phase_at(wave.pieces[first], began):
         at += 1
     now = Moving(0.0, 0.0, at)
     for n in range(cycles):
         c = table_cycle(wave, n)
         p, until = max(wave.cycle[c], first), wave.cycle[c + 1]
         if p < until:
-            tau = began if p == first and n == c else wave.pieces[p, BEGIN]
-            tau_until = wave.pieces[until, BEGIN] if until < wave.pieces.shape[0] else 0.0
+            tau = began if p == first and n == c else wave.pieces[p].begin
+            tau_until = wave.pieces[until].begin if until < wave.pieces.shape[0] else 0.0
             offset = 2.0 * math.pi * (n - c)
             now = sample_following(block, wave, p, tau, until, tau_until, offset, now, phases, found)
         if c == wave.lead:
@@ -229,7 +229,7 @@ def sample_continuous_pulse(
     p, tau = beginning(block, wave, k)
     until = end_of_following(block, wave, k, following)
     at = now.sample
-    while at < times.size and times[at] < phase_at(wave.pieces, p, tau):
+    while at < times.size and times[at] < phase_at(wave.pieces[p], tau):
         found.displacement[at] = now.displacement
         at += 1
     after = sample_following(
@@ -254,14 +254,15 @@ def record_history(
     """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
     fill_base(cell.amplitude, 1, wave, times, found)
     rest(found)
-    block = block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
+    block, interface = block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
     at, velocity, displacement = 0, 0.0, 0.0
     k = first_pulse(block, wave, 0)
     while at < times.size and k < wave.height.size:
         following, peak = first_pulse(block, wave, k + 1), cell.amplitude * wave.height[k]
-        block = block_in_pulse(exponential(), cell, options, peak)
-        now = recorded_pulse(block, options, wave, k, following, peak, velocity, workspace)
-        if slides_continuously(block, peak):
+        block, interface = block_in_pulse(exponential(), cell, options, peak)
+        continuous = slides_continuously(interface, options, peak)
+        now = recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
+        if continuous:
             moving = Moving(velocity, displacement, at)
             at = sample_continuous_pulse(block, wave, k, following, peak, moving, times, found)
         else:
@@ -278,11 +279,12 @@ def wave_history(
     cell: Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
 ) -> None:
     """Fill a history under a waveform at increasing phases."""
-    block = block_of(exponential(), cell, options.rise, options.g)
+    interface = interface_of(cell, options.rise, options.g)
+    block = block_of(exponential(), cell, interface, options.rise, options.g)
     fill_base(block.amplitude, options.cycles, wave, phases, found)
     rest(found)
-    if block.sliding_mode == eq.CONTINUOUS:
+    if interface.sliding_mode == eq.CONTINUOUS:
         continuous_history(block, options.cycles, wave, phases, found)
-    elif block.sliding_mode == eq.STICK_SLIP:
+    elif interface.sliding_mode == eq.STICK_SLIP:
         stick_slip_history(block, options, wave, workspace, phases, found)
     fill_friction(block, found)

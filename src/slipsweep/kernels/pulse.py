@@ -23,7 +23,7 @@ from slipsweep.kernels.block import (
     without_estimates,
 )
 from slipsweep.kernels.excitation import offset_at
-from slipsweep.motion.pieces import BEGIN, FIRST, JUMPS, LAST, Wave
+from slipsweep.motion.pieces import Wave
 
 #: Intervals of a rise at whose ends `yield_seems_to_govern` looks at Eq. 4.
 _INTERVALS = 32
@@ -55,29 +55,29 @@ def first_pulse(block: Block, wave: Wave, k: int) -> int:
 
 
 @scalar
-def validity_before(block: Block, wave: Wave) -> int:
+def validity_before(validity: int, block: Block, wave: Wave) -> int:
     """The flags known before the motion; ramps may keep the shaking below its peak, and a block from sliding."""
     slides = block.amplitude * wave.highest > block.yield_acceleration
-    return block.validity if slides else block.validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
+    return validity if slides else validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
 
 
 @scalar
 def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
     """Where in interval k the base's acceleration comes to Üy or jumps past it: a piece, and τ on it."""
     p = wave.interval[k, 0]
-    while block.amplitude * max(wave.pieces[p, FIRST], wave.pieces[p, LAST]) <= block.yield_acceleration:
+    while block.amplitude * max(wave.pieces[p].first, wave.pieces[p].last) <= block.yield_acceleration:
         p += 1
-    if block.amplitude * wave.pieces[p, FIRST] >= block.yield_acceleration:
-        return p, wave.pieces[p, BEGIN]
-    return p, offset_at(wave.pieces, p, block.amplitude, block.yield_acceleration)
+    if block.amplitude * wave.pieces[p].first >= block.yield_acceleration:
+        return p, wave.pieces[p].begin
+    return p, offset_at(wave.pieces[p], block.amplitude, block.yield_acceleration)
 
 
 @scalar
 def rises_anew(pieces: np.ndarray, p: int) -> bool:
     """Whether piece p, of Üg > 0, begins by a jump upwards, is a plateau, or rises after a fall."""
-    first, last = pieces[p, FIRST], pieces[p, LAST]
-    fell = p > 0 and pieces[p - 1, FIRST] > pieces[p - 1, LAST]
-    return pieces[p, JUMPS] > 0.0 or (first > 0.0 and (first == last or (first < last and fell)))
+    first, last = pieces[p].first, pieces[p].last
+    fell = p > 0 and pieces[p - 1].first > pieces[p - 1].last
+    return pieces[p].jumps or (first > 0.0 and (first == last or (first < last and fell)))
 
 
 @scalar
@@ -96,11 +96,11 @@ def yield_seems_to_govern(block: Block, wave: Wave) -> bool:
 
 
 @scalar
-def motion_of(block: Block, validity: int, found: Pulse) -> Motion:
+def motion_of(block: Block, sliding_mode: int, validity: int, found: Pulse) -> Motion:
     """The motion of a cell under a waveform; an iteration that has not ended has made its W or V NaN."""
     validity |= found.validity
     if math.isnan(found.displacement) and validity & NO_VALUE == 0:
         validity |= UNSOLVED
     validity = settled(without_estimates(validity), found.displacement, block.amplitude)
-    mode = -1 if validity & NO_VALUE else block.sliding_mode
+    mode = -1 if validity & NO_VALUE else sliding_mode
     return Motion(found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan)

@@ -14,7 +14,7 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels import block as physics
-from slipsweep.kernels.block import Block, Cell, Motion, Options
+from slipsweep.kernels.block import Block, Cell, Interface, Motion, Options
 from slipsweep.kernels.continuous import find_zeros, follow_eq4
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
 from slipsweep.kernels.excitation import phase_at
@@ -22,7 +22,7 @@ from slipsweep.kernels.grid import cell_at, uncounted_wave
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
-from slipsweep.motion.pieces import BEGIN, END, LAST, TOP, Wave
+from slipsweep.motion.pieces import Wave
 
 
 class Following(NamedTuple):
@@ -35,39 +35,37 @@ class Following(NamedTuple):
 
 
 @inlined
-def block_in_pulse(law: FrictionLaw, cell: Cell, options: Options, peak: float) -> Block:
+def block_in_pulse(law: FrictionLaw, cell: Cell, options: Options, peak: float) -> tuple[Block, Interface]:
     """The block in a pulse of that peak, for Eqs. 7-11 and λ; its `amplitude` is the factor on the record."""
-    own = physics.block_of(
-        law,
-        Cell(
-            cell.tan_theta, cell.mu_s, peak, cell.yield_acceleration, cell.decay_rate, cell.delta_mu,
-            cell.minimum_friction,
-        ),
-        options.rise,
-        options.g,
+    in_pulse = Cell(
+        cell.tan_theta, cell.mu_s, peak, cell.yield_acceleration, cell.decay_rate, cell.delta_mu,
+        cell.minimum_friction,
     )  # fmt: skip
-    return Block(
-        cell.amplitude, own.yield_acceleration, own.limiting_acceleration, own.acceleration_ratio, own.mu_s,
-        own.tan_theta, own.delta_mu, own.decay_rate, own.g, own.rise, own.sliding_mode, own.validity, law,
+    interface = physics.interface_of(in_pulse, options.rise, options.g)
+    own = physics.block_of(law, in_pulse, interface, options.rise, options.g)
+    block = Block(
+        cell.amplitude, own.yield_acceleration, own.mu_s, own.tan_theta, own.delta_mu, own.decay_rate, own.g,
+        own.rise, law,
     )  # fmt: skip
+    return block, interface
 
 
-@scalar
-def slides_continuously(block: Block, peak: float) -> bool:
+@inlined
+def slides_continuously(interface: Interface, options: Options, peak: float) -> bool:
     """Whether the block slides continuously in a pulse of that peak.
 
     Not its own mode, which is missing where the harmonic motion of that peak would uplift.
     """
-    return block.rise != physics.NEWMARK and peak > block.limiting_acceleration
+    return options.rise != physics.NEWMARK and peak > interface.limiting_acceleration
 
 
 @scalar
 def half_wave_after(wave: Wave, k: int) -> int:
     """The first piece after the negative half wave that follows interval k at once."""
     q = wave.interval[k, 1]
-    while q < wave.pieces.shape[0] and wave.pieces[q, TOP] < 0.0:
+    while q < wave.pieces.shape[0] and wave.pieces[q].top < 0.0:
         q += 1
-        if wave.pieces[q - 1, LAST] == 0.0:
+        if wave.pieces[q - 1].last == 0.0:
             break
     return q
 
@@ -80,14 +78,14 @@ def end_of_following(block: Block, wave: Wave, k: int, following: int) -> Follow
     """
     pieces, last = wave.pieces.shape[0], following >= wave.height.size
     until = half_wave_after(wave, k)
-    tau, ends = 0.0, wave.pieces[pieces - 1, END]
+    tau, ends = 0.0, wave.pieces[pieces - 1].end
     if until < pieces:
-        tau = wave.pieces[until, BEGIN]
-        ends = phase_at(wave.pieces, until, tau)
+        tau = wave.pieces[until].begin
+        ends = phase_at(wave.pieces[until], tau)
     begins = math.inf
     if not last:
         next_piece, next_tau = beginning(block, wave, following)
-        begins = phase_at(wave.pieces, next_piece, next_tau)
+        begins = phase_at(wave.pieces[next_piece], next_tau)
         if following == k + 1 and wave.interval[following, 0] == until:
             until, tau, ends = next_piece, next_tau, begins
     return Following(until, tau, ends, begins)
@@ -109,7 +107,7 @@ def continuous_pulse(
         return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
     gained, displaced, most = follow_eq4(block, wave, workspace, p, tau, until.piece, until.tau)
     after = velocity + gained
-    displacement = velocity * (until.ends - phase_at(wave.pieces, p, tau)) + displaced
+    displacement = velocity * (until.ends - phase_at(wave.pieces[p], tau)) + displaced
     if until.begins > until.ends:
         held, speed, side = physics.response(block, peak), abs(after), math.copysign(1.0, after)
         displacement += side * eq.attenuated_displacement(speed, held, until.begins - until.ends)
@@ -120,23 +118,24 @@ def continuous_pulse(
 
 @inlined
 def recorded_pulse(
-    block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float,
-    workspace: Workspace,
+    block: Block, continuous: bool, options: Options, wave: Wave, k: int, following: int, peak: float,
+    velocity: float, workspace: Workspace,
 ) -> Pulse:  # fmt: skip
-    """A pulse, in the mode of its `peak`, from Üg = Üy in interval k to the pulse of the `following` one."""
-    if slides_continuously(block, peak):
+    """A pulse, continuous or not, from Üg = Üy in interval k to the pulse of the `following` one."""
+    if continuous:
         return continuous_pulse(block, options, wave, k, following, peak, velocity, workspace)
     # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
     return pulse(block, options, wave, workspace, k, following, max(velocity, 0.0))
 
 
 @scalar
-def remarks_in(cell: Cell, block: Block, peak: float) -> int:
+def remarks_in(cell: Cell, block: Block, interface: Interface, continuous: bool, peak: float) -> int:
     """The flags of a pulse of that peak."""
     if block.rise == physics.NEWMARK:
         return 0
-    remarks = physics.remarks_on(cell, block.acceleration_ratio) | (block.validity & physics.FRICTION_NOT_DECAYING)
-    if slides_continuously(block, peak):
+    remarks = physics.remarks_on(cell, interface.acceleration_ratio)
+    remarks |= interface.validity & physics.FRICTION_NOT_DECAYING
+    if continuous:
         return remarks
     if physics.stays_below_yield(block, block.yield_acceleration, peak):
         remarks = physics.YIELD_GOVERNS | (remarks & ~physics.FRICTION_ESTIMATED)
@@ -157,8 +156,8 @@ def added(total: float, lost: float, term: float) -> tuple[float, float]:
 @scalar
 def validity_of_record(law: FrictionLaw, cell: Cell, options: Options, wave: Wave) -> int:
     """What is known before the motion: Üy ≤ 0, no limit by Eq. 7, or n ≤ 0 where Üg is lowest."""
-    block = block_in_pulse(law, cell, options, cell.amplitude * max(wave.highest, -wave.lowest))
-    validity = block.validity & (physics.STATICALLY_UNSTABLE | physics.LIMIT_UNDEFINED)
+    _, interface = block_in_pulse(law, cell, options, cell.amplitude * max(wave.highest, -wave.lowest))
+    validity = interface.validity & (physics.STATICALLY_UNSTABLE | physics.LIMIT_UNDEFINED)
     # n = g + Üg tan θ is least where the base's acceleration is lowest
     lowest = eq.normal_acceleration(cell.amplitude * wave.lowest, cell.tan_theta, options.g)
     return validity | (physics.UPLIFT if (lowest <= 0.0) & (options.rise != physics.NEWMARK) else 0)
@@ -169,20 +168,21 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, works
     """The response of a cell, pulse by pulse; `cell.amplitude` is the factor on the record."""
     scale = cell.amplitude
     validity = validity_of_record(law, cell, options, wave)
-    block = block_in_pulse(law, cell, options, scale * wave.highest)
+    block, interface = block_in_pulse(law, cell, options, scale * wave.highest)
     velocity, displacement, lost, highest, slips = 0.0, 0.0, 0.0, 0.0, 0.0
-    stick_slips, continuous = 0.0, 0.0
+    stick_slips, continuous_pulses = 0.0, 0.0
     k = first_pulse(block, wave, 0)
     while k < wave.height.size and validity & physics.NO_VALUE == 0:
         following, peak = first_pulse(block, wave, k + 1), scale * wave.height[k]
         if block.rise != physics.NEWMARK:
-            block = block_in_pulse(law, cell, options, peak)
-        validity |= remarks_in(cell, block, peak)
+            block, interface = block_in_pulse(law, cell, options, peak)
+        continuous = slides_continuously(interface, options, peak)
+        validity |= remarks_in(cell, block, interface, continuous, peak)
         if validity & physics.NO_VALUE:
             break
-        now = recorded_pulse(block, options, wave, k, following, peak, velocity, workspace)
-        if slides_continuously(block, peak):
-            continuous += 1.0
+        now = recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
+        if continuous:
+            continuous_pulses += 1.0
         else:
             stick_slips += 1.0
             # of a record there is a value if b > 0 at the end of the last rise
@@ -198,7 +198,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, works
     validity = physics.settled(validity, displacement, scale * max(wave.highest, -wave.lowest))
     if validity & physics.NO_VALUE:
         return Motion(math.nan, math.nan, math.nan, float(validity), -1.0, -1.0, -1.0)
-    return Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous)
+    return Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous_pulses)
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import Block
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
-from slipsweep.motion.pieces import BEGIN, Wave
+from slipsweep.motion.pieces import Wave
 
 
 class Gain(NamedTuple):
@@ -45,7 +45,7 @@ def series_of(follow: Callable[[Block, Wave, Any, int, int, float], Gain]) -> Ca
             if repeats == 0:
                 continue
             if wave.shape[c] != known:
-                whole, known = follow(block, wave, table, c, first, wave.pieces[first, BEGIN]), wave.shape[c]
+                whole, known = follow(block, wave, table, c, first, wave.pieces[first].begin), wave.shape[c]
             later = repeats - 1.0
             peak = max(peak, max(velocity, velocity + later * whole.velocity) + whole.peak)
             displacement += repeats * (whole.displacement + math.pi * (2.0 * velocity + whole.velocity * later))

@@ -32,7 +32,7 @@ from slipsweep.kernels.series import Gain, series_of
 from slipsweep.kernels.train import train_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
-from slipsweep.motion.pieces import BEGIN, END, FINISH, FIRST, JUMPS, LAST, START, TOP, Wave
+from slipsweep.motion.pieces import Piece, Wave
 from slipsweep.motion.steps import RECTANGLE, TRAPEZOID, Steps
 
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
@@ -145,9 +145,9 @@ def tabulate(block: Block, w: np.ndarray, rates: np.ndarray) -> None:
 
 
 @scalar
-def point_at(block: Block, pieces: np.ndarray, p: int, tau: float) -> Point:
-    """The instant τ on piece p, whose side of Üg = 0 it takes where rounding would take the other's."""
-    x = math.copysign(base_acceleration(pieces, p, block.amplitude, tau), pieces[p, TOP])
+def point_at(block: Block, piece: Piece, tau: float) -> Point:
+    """The instant τ on a piece, whose side of Üg = 0 it takes where rounding would take the other's."""
+    x = math.copysign(base_acceleration(piece, block.amplitude, tau), piece.top)
     return Point(tau, x, eq4_rate(block, x))
 
 
@@ -164,27 +164,27 @@ def turns(first: float, half: float, last: float) -> bool:
 
 
 @scalar
-def _beyond_and_slope(where: tuple[Block, np.ndarray, int, State, float], tau: float) -> tuple[float, float]:
-    block, pieces, p, state, part = where
-    value = beyond(point_at(block, pieces, p, tau), state)
-    return value, (beyond(point_at(block, pieces, p, tau + part), state) - value) / part
+def _beyond_and_slope(where: tuple[Block, Piece, State, float], tau: float) -> tuple[float, float]:
+    block, piece, state, part = where
+    value = beyond(point_at(block, piece, tau), state)
+    return value, (beyond(point_at(block, piece, tau + part), state) - value) / part
 
 
 _crossing = root_of(_beyond_and_slope)
 
 
 @scalar
-def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, state: State) -> tuple[Point, Point]:
+def next_event(block: Block, piece: Piece, start: Point, end: Point, state: State) -> tuple[Point, Point]:
     """Where in a step Eq. 4 comes beyond Ü of the block, or turns back beyond it (`end` if nowhere); and that turn."""
-    middle, top = point_at(block, pieces, p, 0.5 * (start.tau + end.tau)), end
+    middle, top = point_at(block, piece, 0.5 * (start.tau + end.tau)), end
     first, half, last = beyond(start, state), beyond(middle, state), beyond(end, state)
     if turns(first, half, last):
         low, high = start.tau, end.tau
         for _ in range(50):  # the largest value, by thirds
             left, right = low + (high - low) / 3.0, high - (high - low) / 3.0
-            lower = beyond(point_at(block, pieces, p, left), state) < beyond(point_at(block, pieces, p, right), state)
+            lower = beyond(point_at(block, piece, left), state) < beyond(point_at(block, piece, right), state)
             low, high = (left, high) if lower else (low, right)
-        top = point_at(block, pieces, p, 0.5 * (low + high))
+        top = point_at(block, piece, 0.5 * (low + high))
         top = top if beyond(top, state) > max(first, last) + ROUNDING * end.base else end
     if first >= 0.0 and not state.sliding:
         return start, top
@@ -192,9 +192,9 @@ def next_event(block: Block, pieces: np.ndarray, p: int, start: Point, end: Poin
         return top, top
     if beyond(top, state) <= 0.0:
         return end, top
-    where = (block, pieces, p, state, 1e-4 * (top.tau - start.tau))
+    where = (block, piece, state, 1e-4 * (top.tau - start.tau))
     tau = _crossing(where, start.tau, top.tau, 0.5 * (start.tau + top.tau), 0.0)
-    x = base_acceleration(pieces, p, block.amplitude, tau)
+    x = base_acceleration(piece, block.amplitude, tau)
     # Ü is by Eq. 4 there, without its rounding
     return Point(tau, x, x - state.held if state.sliding else 0.0), top
 
@@ -207,18 +207,18 @@ def begun(block: Block, at: Point, phase: float, grows: float, state: State) -> 
 
 
 @scalar
-def onset(block: Block, pieces: np.ndarray, p: int, start: Point, end: Point, state: State) -> tuple[Point, State]:
+def onset(block: Block, piece: Piece, start: Point, end: Point, state: State) -> tuple[Point, State]:
     """t1, if a block at rest begins to slide before `end`: Üg ≥ Üy, and Eq. 4 falls below Üg."""
     if end.base < block.yield_acceleration:
         return end, state
     if start.base < block.yield_acceleration:
-        tau = min(max(offset_at(pieces, p, block.amplitude, block.yield_acceleration), start.tau), end.tau)
+        tau = min(max(offset_at(piece, block.amplitude, block.yield_acceleration), start.tau), end.tau)
         start = Point(tau, block.yield_acceleration, eq4_rate(block, block.yield_acceleration))
-    began, top = next_event(block, pieces, p, start, end, state)
+    began, top = next_event(block, piece, start, end, state)
     if began.tau >= end.tau:
         return end, state
-    grows = (top.tau if top.tau < end.tau else pieces[p, FINISH]) - began.tau
-    return began, begun(block, began, phase_at(pieces, p, began.tau), grows, state)
+    grows = (top.tau if top.tau < end.tau else piece.finish) - began.tau
+    return began, begun(block, began, phase_at(piece, began.tau), grows, state)
 
 
 @inlined
@@ -262,32 +262,32 @@ def is_whole(how: int, start: Point, middle: Point, end: Point, longest: float, 
 
 @scalar
 def cut_step(
-    block: Block, pieces: np.ndarray, p: int, rule: int, per_cycle: int, how: int, start: Point, end: Point,
+    block: Block, piece: Piece, rule: int, per_cycle: int, how: int, start: Point, end: Point,
     limit: float, state: State,
 ) -> State:  # fmt: skip
     """A step in parts: cut at t1, where Eq. 4 comes beyond b or turns back, at the stop, and where it is too long."""
     size = end.tau - start.tau
     while start.tau < end.tau:
         if not state.sliding and how != HELD:
-            start, state = onset(block, pieces, p, start, end, state)
+            start, state = onset(block, piece, start, end, state)
         if not state.sliding:
             break
-        longest = min(2.0 * size, longest_step(per_cycle, phase_at(pieces, p, start.tau), state))
-        cut = end if start.tau + longest >= end.tau else point_at(block, pieces, p, start.tau + longest)
-        middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
+        longest = min(2.0 * size, longest_step(per_cycle, phase_at(piece, start.tau), state))
+        cut = end if start.tau + longest >= end.tau else point_at(block, piece, start.tau + longest)
+        middle = point_at(block, piece, 0.5 * (start.tau + cut.tau))
         bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
         while bend > limit and cut.tau - start.tau > LEAST_STEP:
             # friction may decay in a layer that is thinner than steps
-            cut, middle = middle, point_at(block, pieces, p, 0.5 * (start.tau + middle.tau))
+            cut, middle = middle, point_at(block, piece, 0.5 * (start.tau + middle.tau))
             bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
         if how == physics.MONOTONE:
-            event, _ = next_event(block, pieces, p, start, cut, state)
+            event, _ = next_event(block, piece, start, cut, state)
             cut = event if event.tau - start.tau > LEAST_STEP else cut
-            middle = point_at(block, pieces, p, 0.5 * (start.tau + cut.tau))
+            middle = point_at(block, piece, 0.5 * (start.tau + cut.tau))
         size = cut.tau - start.tau
         taken, state = slide(block, rule, how, start, middle, cut, state)
         stopped = start.tau + taken * size
-        start = cut if state.sliding or stopped <= start.tau else point_at(block, pieces, p, stopped)
+        start = cut if state.sliding or stopped <= start.tau else point_at(block, piece, stopped)
     return state
 
 
@@ -297,8 +297,8 @@ def walk(
 ) -> State:
     """From τ to `until` on piece p, step by step."""
     w, rates, rule, per_cycle, amplitude = steps.w, steps.rates, steps.rule, steps.per_cycle, block.amplitude
-    at, count, begin = steps.at[p], steps.counts[p], pieces[p, BEGIN]
-    h, shift, limit = (pieces[p, FINISH] - begin) / count, pieces[p, START] - begin, math.inf
+    at, count, begin = steps.at[p], steps.counts[p], pieces[p].begin
+    h, shift, limit = (pieces[p].finish - begin) / count, pieces[p].start - begin, math.inf
     i = min(max(int((tau - begin) / h), 0), count - 1)
     if how != HELD:
         tabulate(block, w[at + 2 * i : at + 2 * count + 1], rates[2 * i :])
@@ -306,19 +306,19 @@ def walk(
         # a second difference of (32/N)² of what friction takes off Üg at most, or of rounding
         most = (block.g + amplitude * block.tan_theta) * physics.friction(block, 0.0)
         limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * most + ROUNDING * amplitude
-    first, start = i if begin == 0.0 else i - count, point_at(block, pieces, p, tau)
+    first, start = i if begin == 0.0 else i - count, point_at(block, pieces[p], tau)
     while i < count and start.tau < until and (state.sliding or how != HELD):
         end = Point((first + 1) * h, amplitude * w[at + 2 * i + 2], rates[2 * i + 2])
         middle = Point((first + 0.5) * h, amplitude * w[at + 2 * i + 1], rates[2 * i + 1])
         if end.tau > until or start.tau > first * h:
-            end = end if end.tau <= until else point_at(block, pieces, p, until)
-            middle = point_at(block, pieces, p, 0.5 * (start.tau + end.tau))
+            end = end if end.tau <= until else point_at(block, pieces[p], until)
+            middle = point_at(block, pieces[p], 0.5 * (start.tau + end.tau))
         longest, after = longest_step(per_cycle, shift + start.tau, state), state
         whole = is_whole(how, start, middle, end, longest, limit, state)
         if whole:
             _, after = slide(block, rule, how, start, middle, end, state)
         if not whole or not (after.sliding or how == HELD):
-            after = cut_step(block, pieces, p, rule, per_cycle, how, start, end, limit, state)
+            after = cut_step(block, pieces[p], rule, per_cycle, how, start, end, limit, state)
         state, start, i, first = after, end, i + 1, first + 1
     return state
 
@@ -328,36 +328,36 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
     """A pulse of the paper: t1 to t5 in interval k of Üg > 0, and Eq. 12 up to the `following` one (see `train`)."""
     pieces, end, validity = wave.pieces, wave.interval[k, 1], 0
     p, tau = beginning(block, wave, k)
-    b = physics.starting_acceleration(block, max(block.amplitude * pieces[p, FIRST], block.yield_acceleration))
+    b = physics.starting_acceleration(block, max(block.amplitude * pieces[p].first, block.yield_acceleration))
     state = State(velocity, 0.0, b, velocity, velocity, velocity > 0.0, -math.inf, 0.0)
     for q in range(p, end):
-        begin = tau if q == p else pieces[q, BEGIN]
-        rises = pieces[q, FIRST] <= pieces[q, LAST]
-        if pieces[q, JUMPS] > 0.0 and not rises:
-            top = point_at(block, pieces, q, begin)
+        begin = tau if q == p else pieces[q].begin
+        rises = pieces[q].first <= pieces[q].last
+        if pieces[q].jumps and not rises:
+            top = point_at(block, pieces[q], begin)
             if state.sliding:
                 _, state = slide(block, RECTANGLE, block.rise, top, top, top, state)
             elif top.base >= block.yield_acceleration and top.rate > 0.0:
-                grows = offset_at(pieces, q, block.amplitude, physics.starting_acceleration(block, top.base)) - begin
-                state = begun(block, top, pieces[q, START], grows, state)
+                grows = offset_at(pieces[q], block.amplitude, physics.starting_acceleration(block, top.base)) - begin
+                state = begun(block, top, pieces[q].start, grows, state)
         if rises:
-            state = walk(block, pieces, steps, q, begin, pieces[q, FINISH], block.rise, state)
+            state = walk(block, pieces, steps, q, begin, pieces[q].finish, block.rise, state)
         else:
             validity = physics.KD_NOT_POSITIVE if state.sliding and state.held <= 0.0 else validity
-            state = walk(block, pieces, steps, q, begin, pieces[q, FINISH], HELD, state)
+            state = walk(block, pieces, steps, q, begin, pieces[q].finish, HELD, state)
     if state.sliding and state.held <= 0.0:
         return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
-    started = stopped_at = pieces[end - 1, END]  # t5: Üg = 0
+    started = stopped_at = pieces[end - 1].end  # t5: Üg = 0
     next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
     if following < wave.height.size:
         next_p, next_tau = beginning(block, wave, following)
-        begins = phase_at(pieces, next_p, next_tau)
+        begins = phase_at(pieces[next_p], next_tau)
     if options.recoupling == physics.INTEGRATE:
         for q in range(end, min(next_p + 1, pieces.shape[0])):
             if state.sliding:
-                until = next_tau if q == next_p else pieces[q, FINISH]
-                state = walk(block, pieces, steps, q, pieces[q, BEGIN], until, HELD, state)
-                stopped_at = math.inf if state.sliding else pieces[q, END]
+                until = next_tau if q == next_p else pieces[q].finish
+                state = walk(block, pieces, steps, q, pieces[q].begin, until, HELD, state)
+                stopped_at = math.inf if state.sliding else pieces[q].end
     velocity, displacement = state.velocity, state.displacement
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
@@ -370,8 +370,8 @@ def follow(block: Block, wave: Wave, steps: Steps, c: int, p: int, tau: float) -
     """Eq. 4 throughout, from rest at τ on piece p to the end of cycle c."""
     state = State(0.0, 0.0, 0.0, 0.0, 0.0, True, -math.inf, 0.0)
     for q in range(p, wave.cycle[c + 1]):
-        begin = tau if q == p else wave.pieces[q, BEGIN]
-        state = walk(block, wave.pieces, steps, q, begin, wave.pieces[q, FINISH], FOLLOWED, state)
+        begin = tau if q == p else wave.pieces[q].begin
+        state = walk(block, wave.pieces, steps, q, begin, wave.pieces[q].finish, FOLLOWED, state)
     return Gain(state.velocity, state.displacement, state.peak)
 
 
@@ -382,15 +382,16 @@ _slide_continuously = series_of(follow)
 @single
 def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps: Steps) -> Motion:
     """The response of a cell with any friction law."""
-    block = physics.block_of(law, cell, options.rise, options.g)
-    validity, unknown = validity_before(block, wave), math.nan if block.sliding_mode < 0 else 0.0
+    interface = physics.interface_of(cell, options.rise, options.g)
+    block, mode = physics.block_of(law, cell, interface, options.rise, options.g), interface.sliding_mode
+    validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
     found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
-    if block.sliding_mode == eq.CONTINUOUS:
+    if mode == eq.CONTINUOUS:
         found = _slide_continuously(block, wave, steps)
-    elif block.sliding_mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
+    elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
         validity |= physics.YIELD_GOVERNS if yield_seems_to_govern(block, wave) else 0
         found = _train(block, options, wave, steps, steps.known)
-    return motion_of(block, validity, found)
+    return motion_of(block, mode, validity, found)
 
 
 @kernel

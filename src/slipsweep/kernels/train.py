@@ -19,7 +19,7 @@ from slipsweep.kernels.block import (
     Options,
 )
 from slipsweep.kernels.pulse import Pulse, first_pulse
-from slipsweep.motion.pieces import END, START, Wave
+from slipsweep.motion.pieces import Wave
 
 
 @scalar
@@ -30,7 +30,7 @@ def keep(wave: Wave, k: int, now: Pulse, known: np.ndarray) -> None:
     matter.  `known`, (intervals, 2), has W and the largest V of such pulses; W is NaN where none is kept.
     """
     last = wave.pieces.shape[0] - 1
-    until = wave.pieces[wave.interval[k + 1, 0], START] if k + 1 < wave.height.size else wave.pieces[last, END]
+    until = wave.pieces[wave.interval[k + 1, 0]].start if k + 1 < wave.height.size else wave.pieces[last].end
     if now.velocity == 0.0 and now.validity == 0 and now.stopped_at <= until:
         known[wave.same[k], 0], known[wave.same[k], 1] = now.displacement, now.peak
 

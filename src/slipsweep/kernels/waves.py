@@ -12,6 +12,7 @@ from slipsweep.kernels.block import (
     Motion,
     Options,
     block_of,
+    interface_of,
     store,
 )
 from slipsweep.kernels.continuous import slide_continuously
@@ -29,8 +30,9 @@ _train = train_of(pulse)
 @single
 def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, workspace: Workspace) -> Motion:
     """The response of a cell of any law that gives what this kernel takes of it (`FrictionLaw.missing`)."""
-    block = block_of(law, cell, options.rise, options.g)
-    mode, validity = block.sliding_mode, validity_before(block, wave)
+    interface = interface_of(cell, options.rise, options.g)
+    block, mode = block_of(law, cell, interface, options.rise, options.g), interface.sliding_mode
+    validity = validity_before(interface.validity, block, wave)
     found = Pulse(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
     if mode == eq.CONTINUOUS:
         found = slide_continuously(block, options.wants_peak, wave, workspace)
@@ -39,7 +41,7 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, works
         found = _train(block, options, wave, workspace, workspace.known)
     elif mode < 0:
         found = Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
-    return motion_of(block, validity, found)
+    return motion_of(block, mode, validity, found)
 
 
 @kernel

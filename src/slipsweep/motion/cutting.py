@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.motion.intensity import spacing_of
-from slipsweep.motion.pieces import END, FIRST, JUMPS, LAST, START, Wave, pieces_of, wave_of_pieces
+from slipsweep.motion.pieces import Wave, pieces_of, wave_of_pieces
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
@@ -235,16 +235,17 @@ def _is_sine(waveform: Waveform) -> bool:
 
 def _same(wave: Wave) -> NDArray[np.int64]:
     """The first interval of the same pieces as each up to the interval after it, but for when they come."""
-    shapes = np.delete(wave.pieces, [START, END], axis=1)
+    shapes = wave.pieces.copy()
+    shapes["start"] = shapes["end"] = 0.0
     ways = itertools.pairwise([*wave.interval[:, 0], len(shapes)])
     first: dict[bytes, int] = {}
     return np.array([first.setdefault(shapes[p:q].tobytes(), k) for k, (p, q) in enumerate(ways)], np.int64)
 
 
-def _rises(pieces: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
     """Ranges of w > 0 passed through or jumped to without falling, joined where they overlap."""
-    first, last = pieces[:, FIRST], pieces[:, LAST]
-    rising = (first + last > 0.0) & ((last >= first) | (pieces[:, JUMPS] > 0.0))
+    first, last = pieces["first"], pieces["last"]
+    rising = (first + last > 0.0) & ((last >= first) | pieces["jumps"])
     joined: list[list[float]] = []
     for low, high in sorted(zip(first[rising], np.maximum(first, last)[rising], strict=True)):
         if joined and low <= joined[-1][1]:

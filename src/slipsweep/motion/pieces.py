@@ -1,28 +1,41 @@
-"""The table of pieces that every motion of the plane ends as: what its columns are, and how it is put together.
+"""The table of pieces that every motion of the base ends as: what a piece is, and how the table is put together.
 
-`slipsweep.motion.waveforms` and `slipsweep.motion.records` cut a motion into pieces, `slipsweep.kernels.excitation`
-evaluates them.
+`slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.excitation` evaluates them.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Columns of a table of pieces: the phases at which a piece begins and ends, the same counted from its
-#: anchor (one of the two is 0), w at its beginning, its end and its anchor, the degree of its polynomial
-#: (0 on a plateau, 1 on a straight line), 1 where w jumps up at its beginning, and 1 where it is a quarter
-#: of a sine about its peak, whose closed forms are shorter than its series.
-START, END, BEGIN, FINISH, FIRST, LAST, TOP, DEGREE, JUMPS, ARC = range(10)
-#: ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over the whole piece.
-WHOLE, WHOLE_MOMENT = 10, 11
-#: c₁, and the first ones of the sum's first and second integral from the anchor, τ² and τ³; those of the
-#: next power follow `TERM` columns on, as many as the longest series in a table has terms.
-COEFFICIENTS, ONCE, TWICE = 12, 13, 14
-TERM = 3
+#: A piece: a record of the fields of `piece_type`.
+Piece: TypeAlias = np.record
 
 #: Gauss-Legendre nodes on [0, 1], two SIMD registers.
 NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
+
+
+def piece_type(terms: int) -> np.dtype[Any]:
+    """The fields of a piece, τ counted from its anchor, that end of it where |w| is larger; w = top + c₁τ + c₂τ² + …
+
+    `start` and `end` are phases of the motion, `begin` and `finish` the same as τ (one of the two is 0); `first`,
+    `last` and `top` are w at the beginning, the end and the anchor.  The `degree` is 0 on a plateau and 1 on a straight
+    line; a piece `jumps` if w jumps up at its beginning, and is an `arc` if it is a quarter of a sine about its peak,
+    whose closed forms are shorter than its series.  `whole` and `whole_moment` are ∫ (w − top) dτ and
+    ∫ (end − τ)(w − top) dτ over the piece; c₁, c₂, … are `coefficients`, and `once` and `twice` those of the sum's
+    first and second integral from the anchor, of τ² and τ³ on.
+    """
+    numbers = ("start", "end", "begin", "finish", "first", "last", "top", "whole", "whole_moment")
+    series = ("coefficients", "once", "twice")
+    return np.dtype(
+        (
+            np.record,
+            [(name, np.float64) for name in numbers]
+            + [("degree", np.int64), ("jumps", np.bool_), ("arc", np.bool_)]
+            + [(name, np.float64, (terms,)) for name in series],
+        ),
+        align=True,
+    )
 
 
 class Wave(NamedTuple):
@@ -34,9 +47,8 @@ class Wave(NamedTuple):
 
     Attributes
     ----------
-    pieces : ndarray, shape (pieces, columns)
-        Columns `START` to `ARC` and the coefficients: one array, because a function that is handed many spends
-        its time, and its compilation, on handing them on.
+    pieces : record array, shape (pieces,)
+        See `piece_type`.
     cycle : ndarray of int, shape (cycles in the table + 1,)
         First piece of every cycle.
     shape : ndarray of int, shape (cycles in the table,)
@@ -72,34 +84,34 @@ def pieces_of(
     start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
     at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any],
 ) -> np.ndarray:  # fmt: skip
-    """The table of pieces, from the columns of these names.
+    """The table of pieces, from the fields of these names.
 
     `length` is that of a piece, which the difference of its ends would round; `at_end` is whether |w| is larger
     at its end, its anchor then, and row i of `coefficients` are c₁, c₂, … of piece i from there.
     """
     degree = np.where(coefficients != 0.0, np.arange(1, coefficients.shape[1] + 1), 0).max(axis=1)
-    coefficients = coefficients[:, : max(int(degree.max()), 1)]
-    before, top = np.concatenate([[0.0], last[:-1]]), np.where(at_end, last, first)
     power = np.arange(1, coefficients.shape[1] + 1)
-    pieces = np.empty((first.size, COEFFICIENTS + TERM * power.size))
-    pieces[:, [START, END, FIRST, LAST, TOP, DEGREE]] = np.column_stack([start, end, first, last, top, degree])
-    pieces[:, BEGIN], pieces[:, FINISH] = np.where(at_end, -length, 0.0), np.where(at_end, 0.0, length)
-    pieces[:, JUMPS] = first > np.maximum(before, 0.0)
-    pieces[:, ARC] = arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0)
-    series = COEFFICIENTS + TERM * power.size
-    pieces[:, COEFFICIENTS:series:TERM] = coefficients
-    pieces[:, ONCE:series:TERM] = coefficients / (power + 1)
-    pieces[:, TWICE:series:TERM] = coefficients / ((power + 1) * (power + 2))
+    top = np.where(at_end, last, first)
+    pieces = np.zeros(first.size, piece_type(power.size))
+    pieces["start"], pieces["end"] = start, end
+    pieces["begin"], pieces["finish"] = np.where(at_end, -length, 0.0), np.where(at_end, 0.0, length)
+    pieces["first"], pieces["last"], pieces["top"] = first, last, top
+    pieces["degree"] = degree
+    pieces["jumps"] = first > np.maximum(np.concatenate([[0.0], last[:-1]]), 0.0)
+    pieces["arc"] = arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0)
+    pieces["coefficients"] = coefficients
+    pieces["once"] = coefficients / (power + 1)
+    pieces["twice"] = coefficients / ((power + 1) * (power + 2))
     # one of the two ends is the anchor
     tau = np.where(at_end, -length, length)
     once, moment = np.zeros(first.size), np.zeros(first.size)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows here, overflows where it is used
-        for k in range(power.size - 1, -1, -1):
-            once = (once + pieces[:, ONCE + TERM * k]) * tau
-            moment = (moment + pieces[:, TWICE + TERM * k]) * tau
+        for k in range(int(degree.max()) - 1, -1, -1):
+            once = (once + pieces["once"][:, k]) * tau
+            moment = (moment + pieces["twice"][:, k]) * tau
         once, moment = once * tau, moment * tau * tau
-        pieces[:, WHOLE] = np.where(at_end, -once, once)
-        pieces[:, WHOLE_MOMENT] = np.where(at_end, -moment - once * length, moment)
+        pieces["whole"] = np.where(at_end, -once, once)
+        pieces["whole_moment"] = np.where(at_end, -moment - once * length, moment)
     return pieces
 
 
@@ -109,7 +121,7 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
     Its intervals are runs of pieces above zero, one that touches zero ends; each is taken as different from all others,
     and `rises` are left out: what `same` and `rises` save is worth their computation where cycles repeat.
     """
-    first, last = pieces[:, FIRST], pieces[:, LAST]
+    first, last = pieces["first"], pieces["last"]
     above = np.concatenate([[False], first + last > 0.0, [False]])
     touches = np.concatenate([[False], (last[:-1] == 0.0) & (first[1:] == 0.0), [False]])
     starts = np.flatnonzero(above[1:-1] & (~above[:-2] | touches[:-1]))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.motion.pieces import BEGIN, COEFFICIENTS, DEGREE, FINISH, FIRST, LAST, TERM, TOP, Wave
+from slipsweep.motion.pieces import Wave
 
 #: Rules by which steps are taken.
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
@@ -37,18 +37,20 @@ class Steps(NamedTuple):
 
 def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
     """The steps of a wave, `steps_per_cycle` at least in 2π of its phase."""
-    pieces, length = wave.pieces, wave.pieces[:, FINISH] - wave.pieces[:, BEGIN]
+    pieces, length = wave.pieces, wave.pieces["finish"] - wave.pieces["begin"]
     counts = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
     at = np.cumsum(2 * counts + 1) - (2 * counts + 1)
     p = np.repeat(np.arange(counts.size), 2 * counts + 1)
     # counted from the anchor of a piece, so that mirrored pieces have mirrored values
-    tau = (np.arange(p.size) - at[p] - np.where(pieces[p, BEGIN] < 0.0, 2 * counts[p], 0)) * (length / (2 * counts))[p]
+    tau = (np.arange(p.size) - at[p] - np.where(pieces["begin"][p] < 0.0, 2 * counts[p], 0)) * (length / (2 * counts))[
+        p
+    ]
     w = np.zeros(p.size)
-    for k in range(int(pieces[:, DEGREE].max()) - 1, -1, -1):
-        w = (w + pieces[p, COEFFICIENTS + TERM * k]) * tau
-    w += pieces[p, TOP]
-    w[at], w[at + 2 * counts] = pieces[:, FIRST], pieces[:, LAST]
-    w = np.copysign(np.maximum(np.copysign(1.0, pieces[p, TOP]) * w, 0.0), pieces[p, TOP])
+    for k in range(int(pieces["degree"].max()) - 1, -1, -1):
+        w = (w + pieces["coefficients"][p, k]) * tau
+    w += pieces["top"][p]
+    w[at], w[at + 2 * counts] = pieces["first"], pieces["last"]
+    w = np.copysign(np.maximum(np.copysign(1.0, pieces["top"][p]) * w, 0.0), pieces["top"][p])
     rates, known = np.empty(2 * int(counts.max()) + 1), np.empty((wave.height.size, 2))
     return Steps(rule, steps_per_cycle, counts, at, w, rates, known)
 

@@ -228,8 +228,8 @@ class _History:
             mode[:] = variables.SlidingMode.MISSING
         first, after = self.wave.interval.T
         found = {
-            "half_wave_start": self.unit * self.wave.pieces[first, pieces.START],
-            "half_wave_end": self.unit * self.wave.pieces[after - 1, pieces.END],
+            "half_wave_start": self.unit * self.wave.pieces["start"][first],
+            "half_wave_end": self.unit * self.wave.pieces["end"][after - 1],
             "half_wave_peak": peak,
             "half_wave_mode": mode,
         }
