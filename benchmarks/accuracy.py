@@ -1,7 +1,6 @@
 """The page docs/accuracy.md, from what has been measured: ``python -m benchmarks.accuracy``.
 
-Takes speed_vs_error.csv as it lies in benchmarks/results, and measures errors against closed forms and where double
-precision ends (a few 30-digit solutions, seconds).
+Takes speed_vs_error.csv as it lies in benchmarks/results, and measures errors against closed forms.
 """
 
 import csv
@@ -12,52 +11,27 @@ import numpy as np
 import slipsweep
 from benchmarks.grids import RULES, G
 from benchmarks.machine import DOCS, RESULTS, measured_on, number, table
+from benchmarks.speed_vs_error import REGIMES, Point, coarsest
 from tests.support import closed_forms
-from tests.support.reference import solve
 
 WANTED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
-REGIMES = ("stick_slip", "continuous", "newmark", "hard")
-
-#: θ (degrees) and μs of the cells brought near yield.
-PLANES = ((5.0, 0.38), (0.0, 0.5), (18.0, 0.4))
 
 
-def points() -> list[dict[str, Any]]:
+def points() -> list[Point]:
     """The points of speed_vs_error.csv."""
     with (RESULTS / "speed_vs_error.csv").open(newline="") as file:
         text = ("solver", "regime")
-        return [
-            {name: value if name in text else float(value) for name, value in row.items()}
-            for row in csv.DictReader(file)
-        ]
+        rows = [{key: one if key in text else float(one) for key, one in row.items()} for row in csv.DictReader(file)]
+    return [Point(**row) for row in rows]  # type: ignore[arg-type]
 
 
-def steps_for_errors(found: list[dict[str, Any]]) -> str:
-    """Least steps a cycle at which 95 of 100 cells are within an error."""
-    rows = []
-    for regime in REGIMES:
-        for rule in RULES:
-            own = [point for point in found if (point["solver"], point["regime"]) == (rule, regime)]
-            row = [regime.replace("_", "–"), rule]
-            for error in WANTED:
-                enough = [point for point in own if point["error_95"] <= error]
-                best = min(enough, key=lambda point: point["steps"], default=None)
-                row.append(f"{best['steps']:.0f} ({number(best['seconds_per_cell'] * 1e6, 2)} µs)" if best else "–")
-            rows.append(row)
-    return table(["regime", "rule", *(f"{error:.0e}" for error in WANTED)], rows)
-
-
-def cycle_errors(found: list[dict[str, Any]]) -> str:
+def cycle_errors(found: list[Point]) -> str:
     """Errors and time of the cycle solver."""
-    rows = [
-        [
-            point["regime"].replace("_", "–"),
-            *(number(point[name], 2) for name in ("median_error", "error_95", "worst_error")),
-            number(point["seconds_per_cell"] * 1e9),
-        ]
-        for point in found
-        if point["solver"] == "cycle"
-    ]
+    rows = []
+    for point in found:
+        if point.solver == "cycle":
+            errors = (number(one, 2) for one in (point.median_error, point.error_95, point.worst_error))
+            rows.append([point.regime.replace("_", "–"), *errors, number(point.seconds_per_cell * 1e9)])
     return table(["regime", "median", "95 %", "worst", "ns a cell and core"], rows)
 
 
@@ -78,29 +52,6 @@ def newmark() -> str:
         rows.append(row)
     names = ("pulse", "square", "sine", "triangle")
     return table(["Üy/A", *(f"{name}{what}" for name in names for what in (": u/(A T²)", ", error"))], rows)
-
-
-def near_yield() -> str:
-    """Error of the cycle solver at A = Üy (1 + 10⁻ᵏ), beside what one ulp of each input does to the answer."""
-
-    def exact(cell: dict[str, Any]) -> float:
-        return float(solve(**cell, frequency=1.0, cycles=1).permanent_displacement)
-
-    rows = []
-    for k in range(1, 16, 2):
-        row = [f"1e-{k}"]
-        for theta, mu_s in PLANES:
-            tan_theta = np.tan(np.radians(theta))
-            amplitude = float(G * (mu_s - tan_theta) / (1 + mu_s * tan_theta) * (1 + 10.0**-k))
-            cell: dict[str, Any] = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude}
-            reference = exact(cell)
-            moved = [exact(cell | {name: np.nextafter(value, np.inf)}) for name, value in cell.items()]
-            ulps = sum(abs(value - reference) for value in moved)
-            answer = float(slipsweep.sweep(**cell, frequency=1.0, excitation=slipsweep.Sine(1)).permanent_displacement)
-            row += [number(abs(answer - reference) / reference, 2), number(ulps / reference, 2)]
-        rows.append(row)
-    names = [f"θ {theta:g}°, μs {mu_s:g}: {what}" for theta, mu_s in PLANES for what in ("error", "one ulp")]
-    return table(["A/Üy − 1", *names], rows)
 
 
 def main() -> None:
@@ -134,10 +85,10 @@ both solvers with these forms. Errors here are those of the cycle solver.
 {newmark()}
 ## The step solver
 
-Steps a cycle, and time a cell on one core, for 95 of 100 cells to be within an error ("–": not within
-16384 steps):
+Time a cell on one core, µs, and in brackets the steps a cycle, for 95 of 100 cells to be within an error ("–": not
+within 16384 steps):
 
-{steps_for_errors(found)}
+{coarsest(found, REGIMES, RULES, WANTED)}
 In stick–slip and for Newmark's block the rectangle rule does better than its order: the first-order
 part of its error in the displacement is half a step times the change of velocity, and the block begins
 and ends at rest.
@@ -150,12 +101,10 @@ Each point is one solver with one number of steps
 ## Where double precision ends
 
 Just above yield the displacement grows as (A − Üy)²: a change of A, of μs or of θ by its last digit changes
-it by twice that digit over A/Üy − 1. "One ulp" is the sum of the relative changes of the exact displacement when each
-of the three changes by its last digit. No solver with inputs in double precision can guarantee a smaller error.
-[hard-cases.md](hard-cases.md) has all other cases, with their conditioning and the errors of each solver in units
-of it.
+it by twice that digit over A/Üy − 1. No solver with inputs in double precision can guarantee a smaller error.
+[hard-cases.md](hard-cases.md) has these cells and all other hard ones, with their conditioning and the errors of each
+solver in units of it.
 
-{near_yield()}
 ## Options of the model
 
 Differences between the options `rise`, `recoupling` and `model` are not numerical errors: the paper does not specify

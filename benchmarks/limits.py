@@ -17,7 +17,6 @@ import xarray as xr
 import slipsweep
 from benchmarks.machine import ROOT, arguments, measured_on, number, table
 from tests.support.cases import choices
-from tests.support.made_up_records import made
 from tests.support.strategies import G
 
 #: Blocks drawn of each kind, blocks compared together, and amplitudes of the dense scan.
@@ -63,16 +62,6 @@ def _rules(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def by_coulomb(rng: np.random.Generator, count: int) -> Group:
-    """A sine, Üy by Coulomb."""
-    return _group(rng, count, {}, None)
-
-
-def measured(rng: np.random.Generator, count: int) -> Group:
-    """A sine, a measured Üy, with which blocks often do not re-stick."""
-    return _group(rng, count, {}, _MEASURED)
-
-
 def any_wave(rng: np.random.Generator, count: int) -> Group:
     """Any rise, recoupling and waveform; a measured Üy in half of the groups."""
     waves = (
@@ -91,18 +80,12 @@ def motion(rng: np.random.Generator, count: int) -> Group:
     return replace(group, displacement=group.displacement / 30.0)
 
 
-def made_up(rng: np.random.Generator, count: int) -> Group:
-    """Made-up records of up to 40 samples, one for each group."""
-    record = made(int(rng.integers(2**31))).record
-    return _group(rng, count, _rules(rng) | {"excitation": record}, _MEASURED if rng.random() < 0.5 else None)
-
-
 KINDS = {
-    "sine, Üy by Coulomb": by_coulomb,
-    "sine, Üy between 0.05 and 3 m/s²": measured,
+    "sine, Üy by Coulomb": lambda rng, count: _group(rng, count, {}, None),
+    # with these blocks often do not re-stick
+    "sine, Üy between 0.05 and 3 m/s²": lambda rng, count: _group(rng, count, {}, _MEASURED),
     "any rise, recoupling and waveform": any_wave,
     "motions of the sample suite, any rise and recoupling": motion,
-    "made-up records of up to 40 samples": made_up,
 }
 
 

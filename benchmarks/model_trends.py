@@ -26,19 +26,15 @@ PRINTED_DELTA_MU = (0.09, 0.11)
 CYCLES = 5
 
 #: Inputs, and what is given of each experiment under them.
+_YIELD = {"yield_acceleration": MEASURED_YIELD}
+_DECAY = {**_YIELD, "decay_rate": PRINTED_DECAY}
 INPUTS: dict[str, tuple[dict[str, tuple[float, float]], Any]] = {
     "all estimated": ({}, "mendez"),
-    "Üy measured, the others estimated": ({"yield_acceleration": MEASURED_YIELD}, "mendez"),
-    "the same, recoupling by integration": (
-        {"yield_acceleration": MEASURED_YIELD},
-        slipsweep.Mendez(recoupling="integrate"),
-    ),
-    "Üy measured, λ as printed": ({"yield_acceleration": MEASURED_YIELD, "decay_rate": PRINTED_DECAY}, "mendez"),
-    "Üy measured, λ and Δμ as printed": (
-        {"yield_acceleration": MEASURED_YIELD, "decay_rate": PRINTED_DECAY, "delta_mu": PRINTED_DELTA_MU},
-        "mendez",
-    ),
-    "Newmark's block, Üy measured": ({"yield_acceleration": MEASURED_YIELD}, "newmark"),
+    "Üy measured, the others estimated": (_YIELD, "mendez"),
+    "the same, recoupling by integration": (_YIELD, slipsweep.Mendez(recoupling="integrate")),
+    "Üy measured, λ as printed": (_DECAY, "mendez"),
+    "Üy measured, λ and Δμ as printed": ({**_DECAY, "delta_mu": PRINTED_DELTA_MU}, "mendez"),
+    "Newmark's block, Üy measured": (_YIELD, "newmark"),
     "Newmark's block, Üy estimated": ({}, "newmark"),
 }
 
@@ -87,19 +83,12 @@ def sensitivity() -> str:
     """Change of the permanent displacement of both experiments when one input is a tenth larger or smaller."""
     shaking = slipsweep.Sine(cycles=CYCLES)
     rows: list[list[object]] = []
-    names = {
-        "yield_acceleration": "Üy",
-        "decay_rate": "λ",
-        "delta_mu": "Δμ",
-        "mu_s": "μs",
-        "theta": "θ",
-        "amplitude": "A",
-        "frequency": "f",
-    }
-    measured = zip(MEASURED_YIELD, PRINTED_DECAY, PRINTED_DELTA_MU, strict=True)
+    names = {"yield_acceleration": "Üy", "decay_rate": "λ", "delta_mu": "Δμ"}
+    names |= {"mu_s": "μs", "theta": "θ", "amplitude": "A", "frequency": "f"}
+    given = {**_DECAY, "delta_mu": PRINTED_DELTA_MU}
     cells = [
-        cell | dict(zip(("yield_acceleration", "decay_rate", "delta_mu"), values, strict=True))
-        for cell, values in zip((STICK_SLIP, CONTINUOUS), measured, strict=True)
+        cell | {name: values[which] for name, values in given.items()}
+        for which, cell in enumerate((STICK_SLIP, CONTINUOUS))
     ]
 
     def displacement(cell: dict[str, float]) -> float:

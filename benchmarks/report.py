@@ -42,16 +42,8 @@ def displacement(**options: Any) -> xr.DataArray:
 
 
 def size_of(grid: Mapping[str, Any]) -> int:
-    """Number of cells of a grid, crossed or zipped."""
-    zipped = [values.size for values in grid.values() if isinstance(values, xr.DataArray)]
-    crossed = [values.size for values in grid.values() if isinstance(values, np.ndarray)]
-    return int(np.prod(zipped[:1] + crossed))
-
-
-def percentiles(errors: np.ndarray) -> tuple[float, float]:
-    """Median and worst of the errors that have a value."""
-    finite = errors[np.isfinite(errors)]
-    return (float(np.median(finite)), float(finite.max())) if finite.size else (0.0, 0.0)
+    """Number of cells of a grid."""
+    return int(np.prod([values.size for values in grid.values() if isinstance(values, np.ndarray)]))
 
 
 def cycle_solver(tiny: bool) -> str:
@@ -68,13 +60,10 @@ def cycle_solver(tiny: bool) -> str:
     rows = []
     for name, grid in grids.items():
         regimes = [name] if name in groups else ["stuck", "stick_slip", "continuous"]
-        errors = [
-            group.errors(displacement_of(group, solver="cycle")) for regime in regimes for group in groups[regime]
-        ]
-        middle, worst = percentiles(np.concatenate(errors))
-        seconds, cells = times[name], size_of(grid)
-        row = [name.replace("_", "–"), f"{cells:,}", number(seconds * cores() / cells * 1e9)]
-        rows.append([*row, number(middle, 2), number(worst, 2)])
+        errors = [group.errors(group.displacement("cycle")) for regime in regimes for group in groups[regime]]
+        error, cells = np.concatenate(errors), size_of(grid)
+        row = [name.replace("_", "–"), f"{cells:,}", number(times[name] * cores() / cells * 1e9)]
+        rows.append([*row, number(float(np.nanmedian(error)), 2), number(float(np.nanmax(error)), 2)])
     grid = grids["design chart"]
     found = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
     shares = ", ".join(f"{np.mean(found == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode)
@@ -85,11 +74,6 @@ def cycle_solver(tiny: bool) -> str:
         f"Of the design chart {shares.replace('_', '–')}. Errors are relative, "
         f"against 30 digits, over {sample.SIZE} random cells a regime (benchmarks/data/sample.csv).\n"
     )
-
-
-def displacement_of(group: sample.Group, **options: Any) -> np.ndarray:
-    """Displacements of a group of the sample."""
-    return np.asarray(slipsweep.sweep(**group.sweep_arguments(), **options).permanent_displacement)
 
 
 def four_dimensions(tiny: bool) -> str:

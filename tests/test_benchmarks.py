@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 WRITES = {
     "report": ["report.md"],
-    "speed_vs_error": ["speed_vs_error.csv", "speed_vs_error.png"],
+    "speed_vs_error": ["speed_vs_error.csv", "engines.md", "speed_vs_error.png"],
     "records": ["records.md"],
     "large_sweeps": ["large_sweeps.md"],
     "faults": ["faults.md"],
