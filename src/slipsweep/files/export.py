@@ -4,6 +4,7 @@ A result is read and written in pieces of `CHUNK_CELLS`, so that memory stays sm
 """
 
 import importlib
+import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -360,26 +361,25 @@ def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write
 @contextmanager
 def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
     import pandas as pd
-    from xlsxwriter.exceptions import XlsxWriterException
 
-    options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True}
+    # to memory: where a disk is full, zipfile of Python 3.13 would print a traceback besides the error
+    options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True, "in_memory": True}
     below: dict[str, int] = {}
-    try:
-        with pd.ExcelWriter(path, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
+    whole = io.BytesIO()
+    with pd.ExcelWriter(whole, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
 
-            def write(table: Table, frame: pd.DataFrame, is_first: bool) -> None:
-                for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
-                    frame[name] = frame[name].astype(str).astype(float)
-                start = below.get(table.name, 0)
-                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=is_first, index=False)
-                below[table.name] = start + len(frame) + is_first
+        def write(table: Table, frame: pd.DataFrame, is_first: bool) -> None:
+            for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
+                frame[name] = frame[name].astype(str).astype(float)
+            start = below.get(table.name, 0)
+            frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=is_first, index=False)
+            below[table.name] = start + len(frame) + is_first
 
-            yield write
-            about = pd.DataFrame(_about(tables, source))
-            about.to_excel(book, sheet_name="about", header=False, index=False)
-            book.sheets["about"].set_column(0, 1, 40)
-    except XlsxWriterException as error:
-        raise OSError(str(error)) from error
+        yield write
+        about = pd.DataFrame(_about(tables, source))
+        about.to_excel(book, sheet_name="about", header=False, index=False)
+        book.sheets["about"].set_column(0, 1, 40)
+    path.write_bytes(whole.getbuffer())
 
 
 def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
