@@ -7,7 +7,6 @@ one line, never a traceback.  What a command needs is imported inside it, so tha
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -26,8 +25,7 @@ class _Commands(TyperGroup):
         """Run the command."""
         try:
             super().invoke(ctx)
-            if sys.stdout is not None:
-                sys.stdout.flush()  # a full disk or a reader that went away is noticed here, and not at the exit
+            sys.stdout.flush()  # a full disk or a reader that went away is noticed here, and not at the exit
         except BrokenPipeError:
             raise  # typer ends quietly
         except KeyboardInterrupt as error:
@@ -63,10 +61,6 @@ app.registered_commands.sort(key=lambda one: _MODULES.index(one.callback.__modul
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     os.environ["MPLBACKEND"] = "agg"  # figures go to files only
-    try:
-        Path.home()
-    except RuntimeError:  # no HOME and no account: libraries that look for their settings find none
-        os.environ["HOME"] = os.devnull
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # an alphabet without λ fails no command
@@ -86,8 +80,7 @@ def _failed(error: Exception, status: int) -> typer.Exit:
         message = f"{error.filename or 'what is printed'}: {error.strerror}"
     else:
         message = str(error)
-    if status == 2:  # of the files of a suite, say: one each
-        echo(f"slipsweep: error: {message}", *(f"  {note}" for note in notes), err=True)
-    else:
-        echo(f"slipsweep: error: {'; '.join((message, *notes))}", err=True)
+    # notes of bad input are of the files of a suite, say: one each
+    between = "\n  " if status == 2 else "; "
+    echo(f"slipsweep: error: {between.join((message, *notes))}", err=True)
     return typer.Exit(status)

@@ -38,10 +38,7 @@ app = typer.Typer(context_settings={"help_option_names": ["-h", "--help"]}, pret
 
 def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Add a command to the program, by what it is for; its examples stand below its help."""
-    heading = "Example:" if len(examples) == 1 else "Examples:"
-    return app.command(
-        rich_help_panel=task, epilog="\n\n".join((heading, *(line.replace("[", r"\[") for line in examples)))
-    )
+    return app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))
 
 
 class Panel(str):
@@ -120,10 +117,8 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
     for text in map(str.strip, texts):
         length = quantity("--displacement", text, "m", g)
         if length > _MOST_WITHOUT_UNIT and not text[-1].isalpha():
-            raise InputError(
-                f"--displacement = {text}: without a unit that is {length:g} m; give the unit: -d {text}mm or "
-                f"-d {text}m"
-            )
+            units = f"give the unit: -d {text}mm or -d {text}m"
+            raise InputError(f"--displacement = {text}: without a unit that is {length:g} m; {units}")
         found.add(length)
     return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
 
@@ -171,12 +166,12 @@ def write_outputs(
     drawn = functools.cache(figure)
     for path in paths:
         with complete_or_absent(path, overwrite) as temporary:
-            if path.suffix not in FIGURES:
+            if path.suffix in FIGURES:
+                content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+                drawn().savefig(content, format=path.suffix[1:], dpi=150)
+                temporary.write_bytes(content.getvalue())
+            else:
                 (writers or {})[path.suffix](temporary)
-                continue
-            content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
-            drawn().savefig(content, format=path.suffix[1:], dpi=150)
-            temporary.write_bytes(content.getvalue())
 
 
 def write_netcdf(table: "xr.Dataset", path: Path, title: str, recorded: "Record | None" = None) -> None:
@@ -200,22 +195,13 @@ def run_job(job: "Job", path: "Place", large: Large, *, overwrite: bool, quiet: 
     from slipsweep.grid.resources import parse_size
 
     if large.resume and overwrite:
-        raise InputError(
-            "--resume, --overwrite: --resume continues an interrupted run, --overwrite starts it again; give one"
-        )
+        raise InputError("--resume, --overwrite: the first continues an interrupted run, the second starts it again")
     nbytes = None if large.memory is None else parse_size("--memory", large.memory)
     with progress_bar(job.plan.cells, quiet, unit) as progress:
         report = running.run(
-            job,
-            path,
-            command=typed_command(),
-            overwrite=overwrite,
-            resume=large.resume,
-            memory=nbytes,
-            workers=large.workers,
-            scheduler=large.scheduler,
-            progress=progress,
-        )
+            job, path, command=typed_command(), overwrite=overwrite, resume=large.resume, memory=nbytes,
+            workers=large.workers, scheduler=large.scheduler, progress=progress,
+        )  # fmt: skip
     if report.found and not quiet:
         echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
@@ -230,14 +216,13 @@ def echo(*texts: object, err: bool = False) -> None:
 
 def taken_as(values: Mapping[str, float], g: float) -> str:
     """Inputs in the units that they were taken in: ``amplitude 3.55 m/s2 (0.3619 g), frequency 1.8 Hz``."""
-    texts = (f"{name.replace('_', ' ')} {range_text(name, (value,), g)}" for name, value in values.items())
-    return ", ".join(texts).replace("m s-2", "m/s2")
+    return ", ".join(f"{name.replace('_', ' ')} {range_text(name, (value,), g)}" for name, value in values.items())
 
 
 def range_text(name: str, ends: Sequence[float], g: float) -> str:
-    """Values of a parameter with their unit, accelerations also in g: ``1 to 4 m s-2 (0.1019 to 0.4077 g)``."""
-    units = PARAMETERS[name]["units"]
-    in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m s-2" else ""
+    """Values of a parameter with their unit, accelerations also in g: ``1 to 4 m/s2 (0.1019 to 0.4077 g)``."""
+    units = PARAMETERS[name]["units"].replace("m s-2", "m/s2")
+    in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m/s2" else ""
     return f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}{in_g}"
 
 
@@ -249,12 +234,10 @@ def echo_tally(tally: "Tally") -> None:
     if tally.flags is not None:
         seen = Validity(sum(flag for flag, count in tally.flags.items() if count))
         echo("flags (validity):" if seen else "flags (validity): none")
-        for kind in FlagKind:
-            if seen & flags_of(kind):
-                echo(f"  {kind}: {FLAG_KIND_TEXT[kind]}")
-            for flag in seen & flags_of(kind):
-                share = tally.share(tally.flags[flag])
-                echo(f"    {(flag.name or '').lower():<22}{share:7.2%}  {flag.text}")
+        for kind, flags in ((kind, seen & flags_of(kind)) for kind in FlagKind):
+            echo(*([f"  {kind}: {FLAG_KIND_TEXT[kind]}"] if flags else ()))
+            shares = {flag: tally.share(tally.flags[flag]) for flag in flags}
+            echo(*(f"    {(flag.name or '').lower():<22}{share:7.2%}  {flag.text}" for flag, share in shares.items()))
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
         echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
@@ -324,11 +307,10 @@ class Watch:
 
     def speed(self, count: float) -> float:
         """What was solved in a second, compilation apart."""
-        seconds = time.perf_counter() - self._started - (self._compiling() - self._before)
-        return count / max(seconds, 1e-9)
+        return count / max(time.perf_counter() - self._started - (self._compiling() - self._before), 1e-9)
 
     def text(self, count: int, unit: str) -> str:
         """The time, and the speed."""
-        compiling = self._compiling() - self._before
-        apart = f" ({compiling:.2f} s to compile, once)" if compiling > 0.0 else ""
+        once = self._compiling() - self._before
+        apart = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
         return f"{time.perf_counter() - self._started:.2f} s{apart}, {self.speed(count):.3g} {unit}/s"

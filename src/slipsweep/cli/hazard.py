@@ -98,25 +98,20 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
     echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
     sizes = rates["valueless_share"].sizes
     for index, point in zip(np.ndindex(*sizes.values()), point_names(rates, sizes), strict=True):
-        if point:
-            echo(point)
+        echo(*([point] if point else ()))
         _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
-    if (held > _MUCH * rate).any():
-        axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
-        echo(f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}")
-    if (omitted > _MUCH * rate).any():
-        echo(f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower")
-    if (omitted.isnull() & rate.notnull()).any():
-        echo(
-            f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the rates are too "
-            "small by an unknown part; begin the curve lower"
-        )
-    if ((rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate)).any():
-        echo(
-            "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; "
-            "put more values on the axis amplitude"
-        )
+    axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
+    notes = {
+        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held > _MUCH * rate,
+        f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
+        > _MUCH * rate,
+        f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the rates are too small "
+        "by an unknown part; begin the curve lower": omitted.isnull() & rate.notnull(),
+        "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
+        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate),
+    }
+    echo(*(text for text, holds in notes.items() if holds.any()))
 
 
 def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
@@ -129,14 +124,11 @@ def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
         return
     above, below = f"above {last:.3g} g", f"below {first:.3g} g"
     echo(_ROW.format("d (m)", "annual rate", "period (years)", "steps", above, below))
-    for d in rates["threshold"].values:
-        one = rates.sel(threshold=d)
-        rate = one["annual_rate"].item()
+    names = ("threshold", "annual_rate", "lower_rate", "upper_rate", "held_rate", "omitted_rate")
+    for d, rate, *parts in zip(*(rates[name].values for name in names), strict=True):
         if not rate > 0.0:
             echo(f"  {d:<10.6g}{0:>12}  not exceeded at any amplitude of the result")
             continue
-        names = ("lower_rate", "upper_rate", "held_rate", "omitted_rate")
-        lower, upper, held, omitted = (one[name].item() / rate for name in names)
-        steps = f"{lower:.2f} to {upper:.2f}"
-        left = "not known" if math.isnan(omitted) else f"<= {omitted:.2%} more"
+        lower, upper, held, omitted = (part / rate for part in parts)
+        steps, left = f"{lower:.2f} to {upper:.2f}", "not known" if math.isnan(omitted) else f"<= {omitted:.2%} more"
         echo(_ROW.format(f"{d:.6g}", f"{rate:.4g}", f"{1.0 / rate:.4g}", steps, f"{held:.2%}", left))

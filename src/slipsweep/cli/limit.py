@@ -81,22 +81,24 @@ def _summarize(table: "xr.Dataset") -> None:
     grid = grid_text({str(dim): size for dim, size in limits.sizes.items()}) or "one cell"
     echo(f"{limits.size} limits ({grid})")
     if limits.notnull().any():
-        for text, value in (("smallest", limits.min()), ("median", limits.median()), ("largest", limits.max())):
-            echo(f"  {text:<24}{value.item():.6g} m/s2 ({value.item() / g:.4g} g)")
+        values = {"smallest": limits.min(), "median": limits.median(), "largest": limits.max()}
+        echo(*(f"  {text:<24}{common.range_text('amplitude', [value.item()], g)}" for text, value in values.items()))
     wanted = ", ".join(f"{one:.6g}" for one in table["displacement"].values.flat)
-    highest = common.taken_as({"amplitude": float(table.attrs["maximum_amplitude"])}, g).removeprefix("amplitude ")
+    highest = common.range_text("amplitude", [float(table.attrs["maximum_amplitude"])], g)
     echo(f"displacement {wanted} m, searched up to {highest}", f"inputs: {table.attrs['friction_inputs']}")
     if limits.sizes.get("motion", 1) > 1:
         _summarize_suite(table, g)
-    echo("status (limit_status):")
-    for one in LimitStatus:
-        if share := np.mean(status == one):
-            echo(f"  {one.name.lower():<24}{share:7.2%}  {one.text}")
+    shares = {one: np.mean(status == one) for one in LimitStatus}
+    rows = (f"  {one.name.lower():<24}{share:7.2%}  {one.text}" for one, share in shares.items() if share)
+    echo("status (limit_status):", *rows)
 
 
 def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     """Print the limit of each motion, and the suite's quantiles, at every grid point."""
     from slipsweep.studies.suite_statistics import limit_quantiles, point_names, suite_dims
+
+    def text(value: float) -> str:
+        return f"{value:.6g} ({value / g:.4g})" if abs(value) < float("inf") else "none"
 
     limits, found = table["limit_amplitude"], limit_quantiles(table)
     grid = found["value_count"].sizes
@@ -109,12 +111,9 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
     for number, point in enumerate(points[:_MOST_POINTS]):
         of = f"of {counts[number]}" + (f", {beyond[number]} of them not reached" if beyond[number] else "")
-        echo(f"  {point + ': ' if point else ''}{', '.join(_text(one, g) for one in quantiles[number])} {of}")
-        for name, value in zip(names, each[number], strict=True) if each.size <= _MOST_MOTIONS else ():
-            echo(f"    {name.removeprefix('motion = '):<{width}}{_text(value, g)}")
+        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, quantiles[number]))} {of}")
+        if each.size <= _MOST_MOTIONS:
+            motions = zip(names, each[number], strict=True)
+            echo(*(f"    {name.removeprefix('motion = '):<{width}}{text(value)}" for name, value in motions))
     if len(points) > _MOST_POINTS:
         echo(f"  and {len(points) - _MOST_POINTS} grid points more")
-
-
-def _text(value: float, g: float) -> str:
-    return f"{value:.6g} ({value / g:.4g})" if abs(value) < float("inf") else "none"

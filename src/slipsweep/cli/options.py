@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Annotated, Any, Literal
 
-from slipsweep.cli.common import BLOCK, RARE, SHAKING
+from slipsweep.cli.common import BLOCK, RARE, SHAKING, Panel
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, Option, declared
 
@@ -30,25 +30,16 @@ def chooses(**choices: Family[Any] | type[Any]) -> Callable[[Callable[..., None]
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        signature = inspect.signature(command)
+        kinds: dict[str, tuple[Any, Any]] = {}
+        for name, old in inspect.signature(command).parameters.items():
+            kinds |= _options(choices[name], old.default) if name in choices else {name: (old.annotation, old.default)}
 
         @functools.wraps(command)
         def wrapped(**given: Any) -> None:
             command(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
 
-        kinds: dict[str, tuple[Any, Any]] = {}
-        for old in signature.parameters.values():
-            choice = choices.get(old.name)
-            if choice is None:
-                kinds[old.name] = old.annotation, old.default
-            elif isinstance(choice, Family):
-                kinds |= _family_options(choice, choice.default if old.default is inspect.Parameter.empty else None)
-            elif issubclass(choice, Choice):
-                kinds |= {one.name: (_annotation(one), None) for one in declared(choice)}
-            else:
-                kinds |= {one.name: (one.type, one.default) for one in fields(choice)}
-        wrapped.__signature__ = signature.replace(  # type: ignore[attr-defined]
-            parameters=[
+        wrapped.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [
                 inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
                 for name, (kind, default) in kinds.items()
             ]
@@ -82,40 +73,38 @@ def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:
 def _typed(given: dict[str, Any], options: Mapping[str, Option]) -> dict[str, Any]:
     """Take the options that were typed, lists as lists."""
     found = {name: value for name in options if (value := given.pop(name)) is not None}
-    for name in found:
-        if options[name].is_list:
-            try:
-                found[name] = [float(one) for one in found[name].split(",")]
-            except ValueError:
-                message = f"{option_name(name)} {found[name]}: must be numbers with commas between"
-                raise InputError(message) from None
+    for name in (name for name in found if options[name].is_list):
+        try:
+            found[name] = [float(one) for one in found[name].split(",")]
+        except ValueError:
+            raise InputError(f"{option_name(name)} {found[name]}: must be numbers with commas between") from None
     return found
 
 
-def _family_options(family: Family[Any], default: str | None) -> dict[str, tuple[Any, Any]]:
-    """Which choice, and the options of all: annotations and defaults."""
-    names = Literal[tuple(family.names)]  # type: ignore[valid-type]
-    note = "" if default else f" (default: {family.default})"
-    text = f"{family.keyword.capitalize()}: {', '.join(family.names)}{note}."
-    about = _PANELS[family.attribute](text, f"--{family.attribute}", metavar="NAME")
-    first: Any = Annotated[names if default else names | None, about]
-    return {family.attribute: (first, default)} | {
-        name: (_annotation(one, family), None) for name, one in family.options.items()
-    }
+def _options(choice: Family[Any] | type[Any], default: Any) -> dict[str, tuple[Any, Any]]:
+    """The options of a choice, of a family first which one: annotations and defaults."""
+    if not isinstance(choice, Family):
+        if issubclass(choice, Choice):
+            return {one.name: (_annotation(one, RARE), None) for one in declared(choice)}
+        return {one.name: (one.type, one.default) for one in fields(choice)}
+    panel, may_be_none = _PANELS[choice.attribute], default is None
+    note = f" (default: {choice.default})" if may_be_none else ""
+    text = f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}."
+    names: Any = Literal[tuple(choice.names)]
+    which = Annotated[names | None if may_be_none else names, panel(text, f"--{choice.attribute}", metavar="NAME")]  # type: ignore[valid-type]
+    found: dict[str, tuple[Any, Any]] = {choice.attribute: (which, None if may_be_none else choice.default)}
+    for name, one in choice.options.items():
+        of = [kind.name for kind in choice.choices if name in {other.name for other in declared(kind)}]
+        every = len(of) == len(choice.choices)
+        found[name] = _annotation(one, *([panel] if every else [RARE, f"with {', '.join(of)}"])), None
+    return found
 
 
-def _annotation(one: Option, family: Family[Any] | None = None) -> Any:
-    """An option of a command; None where it is not typed.  Those that some choices only have are rare ones."""
+def _annotation(one: Option, panel: Panel, *notes: str) -> Any:
+    """An option of a command in a group; None where it is not typed."""
     kind: Any = Literal[one.words] if one.words else str if one.is_list else one.kind
-    notes, panel = [], RARE
-    if family is not None:
-        of = [choice.name for choice in family.choices if one.name in {other.name for other in declared(choice)}]
-        if len(of) == len(family.choices):
-            panel = _PANELS[family.attribute]
-        else:
-            notes.append(f"with {', '.join(of)}")
     if one.default is not None and not one.is_list:
-        notes.append(f"default: {one.default}")
+        notes += (f"default: {one.default}",)
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
     return Annotated[kind | None, panel(text, option_name(one.name), metavar="A,B,..." if one.is_list else None)]

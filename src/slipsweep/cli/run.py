@@ -67,15 +67,14 @@ def run(
         return
     grid, template = grid_text(job.plan.sizes) or "no axes", job.plan.template()
     if not report.found:
-        cells, took = report.tally.cells, watch.text(report.tally.cells, unit)
-        if checked.sampling is None:
+        cells, took, sampling = report.tally.cells, watch.text(report.tally.cells, unit), checked.sampling
+        if sampling is None:
             echo(f"{cells} cells ({grid}) in {took}")
         else:
-            runs = checked.sampling.sensitivity_runs
+            runs, points = sampling.sensitivity_runs, math.prod(job.plan.sizes.values())
             more = f", among {runs} runs each for Sobol indices" if runs else ""
             pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
-            points = math.prod(job.plan.sizes.values())
-            echo(f"{points} grid points ({grid}), {pooled}{checked.sampling.samples} samples each{more}")
+            echo(f"{points} grid points ({grid}), {pooled}{sampling.samples} samples each{more}")
             echo(f"{cells} samples solved in {took}")
     echo(f"inputs: {template.attrs['friction_inputs']}")
     for parameter, one in template.coords.items():
@@ -97,22 +96,16 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     """The likely reason why every cell is stuck or has no value; empty where one slides."""
     import numpy as np
 
-    modes = tally.modes or {}
+    modes, g, coords = tally.modes or {}, float(table.attrs["g"]), table.coords
     if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
     if not modes[SlidingMode.STUCK]:
-        return (
-            "no cell has a value: the flags above say why; statically_unstable: theta reaches the friction angle, "
-            "atan(mu_s)"
-        )
-    g, coords = float(table.attrs["g"]), table.coords
+        why = "statically_unstable: theta reaches the friction angle, atan(mu_s)"
+        return f"no cell has a value: the flags above say why; {why}"
     if not {"amplitude", "theta", "mu_s"} <= {*coords}:
         return "no cell slides"
     coulomb = g * np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max()))
-    least = float(coords.get("yield_acceleration", coulomb).min())
-    largest = float(coords["amplitude"].max())
+    least, largest = float(coords.get("yield_acceleration", coulomb).min()), float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
-    return (
-        f"no cell slides: largest amplitude {largest:.4g} m/s2 = {largest / g:.3g} g, smallest yield acceleration "
-        f"{least:.4g} m/s2 = {least / g:.3g} g{hint}"
-    )
+    texts = (common.range_text("amplitude", (one,), g) for one in (largest, least))
+    return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint

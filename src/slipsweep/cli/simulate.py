@@ -9,18 +9,9 @@ from slipsweep.cli import common
 from slipsweep.cli.common import BLOCK, FIGURES, OUTPUT, RARE, SHAKING, Overwrite, Quiet, command, echo, written
 from slipsweep.cli.options import chooses, option_name
 from slipsweep.errors import InputError, RunError
+from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import (
-    HISTORY,
-    PARAMETERS,
-    RECORD_COUNTS,
-    VALUELESS,
-    FlagKind,
-    SlidingMode,
-    Validity,
-    flags_of,
-)
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
@@ -84,8 +75,8 @@ def simulate(
     """Compute the time history of one case, as files and a figure."""
     paths = common.check_outputs(output, (".nc", ".csv", *FIGURES), overwrite, [record] if record else [])
     with_unit: dict[str, Any] = {
-        name: quantity(option_name(name), text, PARAMETERS[name]["units"], model.g)
-        for name in PARAMETERS
+        name: quantity(option_name(name), text, about["units"], model.g)
+        for name, about in variables.PARAMETERS.items()
         if isinstance(text := getattr(typed, name, None), str)
     }
     taken_as, given = common.taken_as(with_unit, model.g), vars(typed) | with_unit
@@ -93,7 +84,7 @@ def simulate(
     from slipsweep.studies.history import simulate as simulated
 
     table = simulated(**given, excitation=motion, model=model, points_per_cycle=points)
-    if flags := Validity(table["validity"].item()) & VALUELESS:
+    if flags := variables.Validity(table["validity"].item()) & variables.VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags)
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
@@ -115,12 +106,13 @@ def _summarize(table: "xr.Dataset") -> None:
     echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
-        echo(f"sliding mode            {SlidingMode(table['sliding_mode'].item()).name.lower()}")
-    echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in RECORD_COUNTS if name in table))
+        echo(f"sliding mode            {variables.SlidingMode(table['sliding_mode'].item()).name.lower()}")
+    counts = (name for name in variables.RECORD_COUNTS if name in table)
+    echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
-    for kind in FlagKind:
-        for flag in Validity(table["validity"].item()) & flags_of(kind):
-            echo(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}")
+    for kind in variables.FlagKind:
+        flags = variables.Validity(table["validity"].item()) & variables.flags_of(kind)
+        echo(*(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}" for flag in flags))
 
 
 def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":
@@ -137,7 +129,6 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
 
 
 def _write_csv(table: "xr.Dataset", path: Path) -> None:
-    columns = {name: f"{name} ({table[name].attrs['units']})" for name in HISTORY if name in table}
-    time = f"time ({table['time'].attrs['units']})"
-    frame = table[list(columns)].to_dataframe()[list(columns)].rename(columns=columns)
-    frame.to_csv(path, index_label=time)
+    titles = {name: f"{name} ({table[name].attrs['units']})" for name in ("time", *variables.HISTORY) if name in table}
+    frame = table[[name for name in titles if name != "time"]].to_dataframe()[[*titles][1:]]
+    frame.rename(columns=titles).to_csv(path, index_label=titles["time"])
