@@ -28,7 +28,7 @@ LINES = {
     "files": 2_520,
     "charts": 2_900,
     "explore": 735,
-    "cli": 1_505,
+    "cli": 1_510,
 }
 
 #: Modules in all, and lines of a function's body.

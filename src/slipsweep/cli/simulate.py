@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common
-from slipsweep.cli.common import BLOCK, FIGURES, OUTPUT, RARE, SHAKING, Overwrite, Quiet, command, echo, written
+from slipsweep.cli.common import BLOCK, RARE, SHAKING, Overwrite, Quiet, command, echo, written
 from slipsweep.cli.options import chooses, option_name
 from slipsweep.errors import InputError, RunError
 from slipsweep.model import variables
@@ -69,11 +69,13 @@ def simulate(
     reading: Mapping[str, Any],
     output: Annotated[list[Path] | None, written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: Overwrite = False,
-    points: Annotated[int | None, OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)] = None,
+    points: Annotated[
+        int | None, common.OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    paths = common.check_outputs(output, (".nc", ".csv", *FIGURES), overwrite, [record] if record else [])
+    paths = common.check_outputs(output, (".nc", ".csv", *common.FIGURES), overwrite, [record] if record else [])
     with_unit: dict[str, Any] = {
         name: quantity(option_name(name), text, about["units"], model.g)
         for name, about in variables.PARAMETERS.items()
