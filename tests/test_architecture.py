@@ -25,7 +25,7 @@ LINES = {
     "kernels": 3_270,
     "grid": 1_490,
     "studies": 5_090,
-    "files": 2_520,
+    "files": 2_200,
     "charts": 2_900,
     "explore": 735,
     "cli": 1_510,

@@ -47,8 +47,6 @@ frequency = 1.8
 dtype = "float32"
 """
 
-DISPLACEMENTS = GRID.replace("axes.amplitude", "axes.displacement_amplitude").replace("[1, 4, 8]", "[0.01, 0.1]")
-
 RECORD = f"""
 [excitation]
 record = "{Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"}"
@@ -96,7 +94,7 @@ s = 0.2
 scale = 0.3
 """
 
-NAMES = ("grid", "cases", "displacements", "statistics", "history", "record", "suite", "pairs")
+NAMES = ("grid", "cases", "statistics", "history", "record", "suite", "pairs")
 
 
 def run(*arguments: str | Path, folder: Path) -> str:
@@ -118,7 +116,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in (
         ("grid", GRID),
         ("cases", CASES),
-        ("displacements", DISPLACEMENTS),
         ("statistics", STATISTICS),
         ("record", RECORD),
         ("suite", SUITE),

@@ -144,16 +144,11 @@ def test_the_plan_of_a_block() -> None:
 @pytest.mark.parametrize(
     ("name", "units", "factor"),
     [
-        ("amplitude", "m/s2", 1),
         ("amplitude", "m s-2", 1),
         ("amplitude", "cm/s^2", 0.01),
         ("amplitude", "Gal", 0.01),
-        ("amplitude", "ft s-2", 0.3048),
         ("amplitude", "g", 9.81),
-        ("amplitude", "g0", 9.80665),
         ("theta", "rad", math.degrees(1)),
-        ("theta", "°", 1),
-        ("frequency", "1/min", 1 / 60),
         # an angular frequency: one turn is one cycle
         ("frequency", "rpm", 1 / 60),
         ("frequency", "rad/s", 1 / (2 * math.pi)),
@@ -175,14 +170,12 @@ BAD = {
     "unknown table": ("[sovler]\n" + GOOD, 'sovler: unknown key; did you mean "solver"?'),
     "unknown axis": (GOOD.replace("axes.theta", "axes.thetta"), 'axes.thetta: unknown key; did you mean "theta"?'),
     "unknown key": (axis("theta", "strat = 0"), 'axes.theta.strat: unknown key; did you mean "start"?'),
-    "unknown key, nothing near": (GOOD + "[excitation]\nzzz = 1", "excitation.zzz: unknown key; known here: waveform,"),
     "unknown key in a case": (CASES.replace("theta = 6", "thet = 6"), "cases[row 2].thet: unknown key; did you mean"),
     "missing axis": (GOOD.replace(MU_S, ""), "mu_s: must be given"),
     "missing amplitude": (axis("amplitude", "").replace("[axes.amplitude]", ""), "exactly one of them must be given"),
     "missing stop": (axis("theta", "start = 0\nnum = 3"), "axes.theta.stop: missing"),
     # types
     "text for a number": (axis("theta", 'values = ["a"]'), "axes.theta.values = ['a']: must be a number"),
-    "true for a number": (axis("theta", "values = [true]"), "axes.theta.values = [True]: must be a number"),
     "number for a list": (axis("theta", "values = 3"), "axes.theta.values = 3: must be a list"),
     "number for a table": ("axes = 3", "axes = 3: must be a table"),
     "fraction of a point": (axis("theta", "start = 0\nstop = 1\nnum = 2.5"), "axes.theta.num = 2.5: must be"),
@@ -197,8 +190,6 @@ BAD = {
     "empty": (axis("theta", "values = []"), "axes.theta.values = []: must be a list of one number at least"),
     "unsorted": (axis("mu_s", "values = [0.5, 0.4]"), "axes.mu_s.values: 0.4 after 0.5: must increase"),
     "backwards": (axis("theta", "start = 9\nstop = 3\nnum = 4"), "axes.theta.stop = 3.0: must be greater than start"),
-    "too many points": (axis("theta", "start = 1\nstop = 3\nnum = 1000000000"), "axes.theta.num = 1000000000: must be"),
-    "too fine": (axis("theta", "start = 1\nstop = 1.0000000000000002\nnum = 5"), "axes.theta: 1.0 after 1.0: must"),
     "logarithm of zero": (
         axis("theta", 'start = 0\nstop = 3\nnum = 4\nspacing = "log"'),
         'axes.theta.start = 0.0: must be positive with spacing = "log"',
@@ -209,29 +200,21 @@ BAD = {
         axis("theta", 'values = [1]\nunits = "kg"'),
         'axes.theta.units = "kg": must be a unit that converts',
     ),
-    "not a unit": (
-        axis("amplitude", 'values = [1]\nunits = "m**9**9**9"'),
-        'axes.amplitude.units = "m**9**9**9": must',
-    ),
-    "slope in percent": (axis("theta", 'values = [1]\nunits = "percent"'), 'axes.theta.units = "percent": must be'),
     "grams": (
         GOOD.replace("axes.amplitude", "axes.displacement_amplitude"),
         'axes.displacement_amplitude.units = "g": must be a unit that converts to m',
     ),
     # range
     "not a number": (axis("theta", "values = [nan]"), "axes.theta.values = nan: must be 0 <= theta < 90"),
-    "infinite": (axis("theta", "start = 0\nstop = inf\nnum = 3"), "axes.theta.stop = inf: must be a finite number"),
     "theta": (axis("theta", "values = [0, 90]"), "axes.theta.values = 90: must be 0 <= theta < 90 degrees"),
     "mu_s": (axis("mu_s", "start = 0\nstop = 1\nnum = 3"), "axes.mu_s = 0: must be a finite number > 0"),
     "cycles": (GOOD + "[excitation]\ncycles = 0", "excitation.cycles = 0: must be a whole number >= 1"),
-    "g": (GOOD + "[model]\ng = 0", "model.g = 0: must be a finite number > 0"),
     "decay rate": (GOOD + "[model]\ndecay_rate = -1", "model.decay_rate = -1: must be a finite number >= 0"),
     # tables against each other
     "given twice": (GOOD + "[[cases]]\ntheta = 5", "cases.theta: given twice"),
     "twice, model": (GOOD + "[model]\ndelta_mu = 1\n[axes.delta_mu]\nvalues = [1]", "model.delta_mu: given twice"),
     "key missing in a row": (CASES.replace("theta = 6", ""), "cases[row 2].theta: every row must give what row 1"),
     "range in a row": (CASES.replace("theta = 6", "theta = 99"), "cases[row 2].theta = 99: must be 0 <= theta"),
-    "no rows": (GOOD.replace("[axes", "cases = []\n[axes", 1), "cases = []: must be one table [[cases]] at least"),
     "empty row": (GOOD + "[[cases]]", "cases[row 1]: must give at least one parameter"),
     "rise of newmark": (
         GOOD + '[model]\nfriction = "newmark"\nrise = "literal"',
@@ -245,7 +228,6 @@ BAD = {
     "no variables": (GOOD + "[output]\nvariables = []", "variables = []: must name one of"),
     # TOML
     "syntax": ("[axes.theta]\nvalues = [1,\nb", "not valid TOML: Invalid value (at line 3, column 1)"),
-    "nested too deep": ("a = " + "[" * 100_000, "not valid TOML"),
 }
 
 
@@ -258,12 +240,6 @@ def test_bad_files_are_refused_in_one_line(text: str, message: str) -> None:
     assert message in words
     assert "\n" not in words
     assert len(words) < 400
-
-
-def test_load_keeps_the_text_verbatim(tmp_path: Path) -> None:
-    path = tmp_path / "a.toml"
-    path.write_text("# θ\r\n" + GOOD, newline="", encoding="utf-8")
-    assert spec.load(path).text == "# θ\r\n" + GOOD
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_every_study_runs_every_way(folder: Path, study: str, output: str, monke
     xr.testing.assert_identical(without_time(other), without_time(one))
     assert not list(folder.glob("*.part"))
     assert (parts.tally.modes, parts.tally.flags) == (whole.tally.modes, whole.tally.flags)
-    again = storing.tally_of(one, job.plan)
+    again = running.tally_of(one, job.plan)
     assert (again.modes, again.flags, again.cells) == (whole.tally.modes, whole.tally.flags, job.plan.cells)
     # a result repeats its run, and has the values of Python's own functions
     if study != "limits" and output == "b.zarr":
@@ -110,6 +110,16 @@ def test_every_study_runs_every_way(folder: Path, study: str, output: str, monke
             [one.values for one in read_result(folder / "c.nc").data_vars.values()],
             [one.values for one in one.data_vars.values()],
         )
+
+
+def test_a_file_in_chunks_is_compressed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "CHUNK_CELLS", 12)
+    (folder / "a.toml").write_text(STUDIES["sweep"] + "compression = 4\n")
+    stored(sweep_job(spec.load(folder / "a.toml")), folder / "a.nc")
+    stored(job_of(folder, "sweep"), folder / "b.nc")
+    with xr.open_dataset(folder / "a.nc") as one, xr.open_dataset(folder / "b.nc") as other:
+        xr.testing.assert_equal(one, other)
+        assert (one.validity.encoding["zlib"], one.validity.encoding["complevel"]) == (True, 4)
 
 
 @pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
@@ -135,7 +145,9 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
     assert not path.exists()
     monkeypatch.setattr(kind, "write", noting)
 
-    with pytest.raises(InputError, match=r"left chunks in .*part; give --resume to go on with them, or --overwrite"):
+    with pytest.raises(
+        InputError, match=r"part: has chunks of an interrupted run; give --resume to go on with them, or --ov"
+    ):
         stored(job_of(folder, "sweep"), path)
     with pytest.raises(InputError, match="has chunks of another sweep file; go on with that one"):
         stored(job_of(folder, "newmark"), path, resume=True)
@@ -229,16 +241,10 @@ def test_a_store_at_an_address(folder: Path) -> None:
     assert not list(Path().glob(".address*"))
 
 
-@pytest.mark.parametrize(
-    ("means", "message"),
-    [
-        ({"workers": 0}, "--workers = 0: must be from 1 to 1024"),
-        ({"workers": 2, "scheduler": "a:1"}, "--workers, --scheduler: give one of them"),
-    ],
-)
-def test_clusters_that_are_none(folder: Path, means: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        stored(job_of(folder, "sweep"), folder / "a.nc", **means)
+def test_clusters_that_are_none(folder: Path) -> None:
+    for means, message in (({"workers": 0}, "must be from 1 to"), ({"workers": 2, "scheduler": "a:1"}, "give one of")):
+        with pytest.raises(InputError, match=message):
+            stored(job_of(folder, "sweep"), folder / "a.nc", **means)
 
 
 # --------------------------------------------------------------------------------- opening

@@ -11,6 +11,7 @@ import resource
 import secrets
 import shutil
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -150,12 +151,28 @@ def interrupted(folder: Path, output: str, whole: bytes, chance: random.Random) 
 
 
 def full_disk(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
-    """No room left: a limit of the size of files stands for it where the disk is not the tests' own."""
-    process = start(folder, "run", "a.toml", "-o", output, "-q", limit=chance.randint(2_000, 100_000))
-    errors = process.finished(1)
-    assert errors.count("\n") == 1, errors
-    assert output in errors, errors
-    complete_or_absent(folder, output, whole)
+    """No room left while chunks are written, on a disk of its own; where none can be had, files may not grow."""
+    output, disk, rest = f"disk/{output}", folder / "disk", chance.randint(0, 200_000)
+    disk.mkdir(exist_ok=True)
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64m", "tmpfs", str(disk)]
+    mounted = bool(shutil.which("mount")) and not subprocess.run(mount, capture_output=True, check=False).returncode
+    try:
+        process = start(folder, "run", "a.toml", "-o", output, "-q", limit=None if mounted else 2_000 + rest // 2)
+        if mounted:
+            chunks = chance.randint(0, 12)
+            _until(lambda: len([*(folder / f"{output}.part").glob("*.chunk")]) >= chunks or process.has_ended)
+            with (disk / "filler").open("wb") as file:
+                for _ in range(20):  # the run takes some of it meanwhile
+                    with suppress(OSError):
+                        os.posix_fallocate(file.fileno(), 0, shutil.disk_usage(disk).free - rest)
+        errors = process.finished(1)
+        assert errors.count("\n") == 1, errors
+        assert output in errors, errors
+        (disk / "filler").unlink(missing_ok=True)
+        complete_or_absent(folder, output, whole)
+    finally:
+        if mounted:
+            subprocess.run(["umount", "--lazy", str(disk)], check=True)
 
 
 def two_runs(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
@@ -189,7 +206,9 @@ def damaged(folder: Path, output: str, whole: bytes, chance: random.Random) -> N
     start(folder, "run", "a.toml", "-o", "damaged.nc", "-q", "--overwrite").finished()
     path = folder / "damaged.nc"
     content = bytearray(path.read_bytes())
-    if chance.random() < 0.5:
+    if chance.random() < 0.2:
+        content = bytearray(chance.randbytes(1000))
+    elif chance.random() < 0.5:
         content = content[: chance.randrange(len(content))]
     else:
         at = chance.randrange(min(len(content), 20_000))

@@ -39,13 +39,7 @@ def check_cluster(workers: int | None, scheduler: str | None) -> None:
 
 @contextmanager
 def connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]":
-    """Start so many processes on this machine, of one thread each, or connect to the scheduler at an address.
-
-    Raises
-    ------
-    RunError
-        No scheduler answers, it has no workers, or one of them has another version of slipsweep.
-    """
+    """Start so many processes on this machine, of one thread each, or connect to a scheduler (RunError)."""
     from distributed import Client, LocalCluster
     from distributed.utils import silence_logging_cmgr
 
@@ -87,11 +81,9 @@ def _check_versions(client: "Client", scheduler: str) -> None:
     """Refuse workers that would compute something else."""
 
     def version() -> str:  # defined here, it is sent as code: workers need not have this module
-        try:
-            from slipsweep._version import __version__
-        except ImportError:
-            return "no slipsweep"
-        return f"slipsweep {__version__}"
+        from slipsweep._version import __version__
+
+        return __version__
 
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
@@ -99,19 +91,13 @@ def _check_versions(client: "Client", scheduler: str) -> None:
         raise RunError(
             f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
         ) from None
-    for worker, found in client.run(version).items():
-        if found != f"slipsweep {__version__}":
-            raise RunError(f"the worker at {worker} has {found}, this process slipsweep {__version__}")
+    for worker, found in client.run(version, on_error="return").items():
+        if found != __version__:
+            raise RunError(f"slipsweep at the worker {worker}: {found}, in this process: {__version__}")
 
 
 def computed(client: "Client", chunks: Iterable[tuple[Any, Any]]) -> Iterator[tuple[Any, Any]]:
-    """Compute dask collections, given with what each is called, and yield each as it comes back, in any order.
-
-    Raises
-    ------
-    RunError
-        The scheduler or all workers have been lost, or a chunk has ended several workers in turn.
-    """
+    """Compute dask collections, each given with its name, and yield them as they come back (RunError: none does)."""
     from distributed import CancelledError, KilledWorker, wait
 
     names: dict[Any, Any] = {}

@@ -1,6 +1,5 @@
 """What a result holds, in words and counts: for `slipsweep info`, and the sheet "about" of a table."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -22,18 +21,18 @@ from slipsweep.model.variables import (
 #: All that a command of slipsweep writes, but for the samples of records.
 _RESULTS = {**RECORD_RESULTS, **LIMIT_RESULTS, **HISTORY, **STATISTICS, **RESULTS}
 
-#: Columns of the table of motions: what stands above, a coordinate, and how it is written.
-_MOTION_COLUMNS = (
-    ("samples", "motion_samples", ".0f"),
-    ("interval (s)", "motion_interval", ".4g"),
-    ("PGA (m/s2)", "motion_pga", ".4g"),
-    ("PGV (m/s)", "motion_pgv", ".4g"),
-    ("PGD (m)", "motion_pgd", ".4g"),
-    ("Arias (m/s)", "motion_arias_intensity", ".4g"),
-    ("CAV (m/s)", "motion_cav", ".4g"),
-    ("D5-95 (s)", "motion_significant_duration", ".4g"),
-    ("Tm (s)", "motion_mean_period", ".4g"),
-)
+#: Columns of the table of motions: what stands above, by its coordinate.
+_MOTION_COLUMNS = {
+    "motion_samples": "samples",
+    "motion_interval": "interval (s)",
+    "motion_pga": "PGA (m/s2)",
+    "motion_pgv": "PGV (m/s)",
+    "motion_pgd": "PGD (m)",
+    "motion_arias_intensity": "Arias (m/s)",
+    "motion_cav": "CAV (m/s)",
+    "motion_significant_duration": "D5-95 (s)",
+    "motion_mean_period": "Tm (s)",
+}
 
 
 def result_names(table: xr.Dataset) -> list[str]:
@@ -48,13 +47,7 @@ def result_names(table: xr.Dataset) -> list[str]:
 
 
 def tally_in(table: xr.Dataset) -> Tally:
-    """Count modes, flags and ratios of a result, read in chunks.
-
-    Raises
-    ------
-    InputError
-        Its modes and flags are not of the same cells.
-    """
+    """Count modes, flags and ratios of a result, read in chunks (InputError: not of the same cells)."""
     names = [name for name in ("sliding_mode", "validity") if name in table.data_vars]
     if len({table[name].size for name in names}) > 1:
         raise InputError("sliding_mode and validity are not of the same cells")
@@ -116,12 +109,6 @@ def motions_text(table: xr.Dataset) -> tuple[str, ...]:
     """The motions of a suite as a table, a header and a line each; empty without them."""
     if "motion" not in table.coords or table["motion"].dims != ("motion",) or table["motion"].dtype.kind not in "OUST":
         return ()
-    columns = [["motion", *map(str, table["motion"].values)]]
-    for header, name, form in _MOTION_COLUMNS:
-        if name in table.coords and table[name].dims == ("motion",):
-            columns.append([header, *("" if math.isnan(one) else format(one, form) for one in table[name].values)])
-    widths = [max(map(len, column)) for column in columns]
-    rows = (
-        [label.ljust(widths[0]), *map(str.rjust, cells, widths[1:])] for label, *cells in zip(*columns, strict=True)
-    )
-    return tuple("  ".join(row) for row in rows)
+    names = [name for name in _MOTION_COLUMNS if name in table.coords and table[name].dims == ("motion",)]
+    rows = table[names].to_dataframe()[names].rename(columns=_MOTION_COLUMNS).rename_axis(columns="motion", index=None)
+    return tuple(rows.to_string(float_format="{:.4g}".format, na_rep="").splitlines())

@@ -1,7 +1,4 @@
-"""Results as tables in files, by pandas: CSV, Parquet or a spreadsheet.
-
-A result is read and written in pieces of `CHUNK_CELLS`, so that memory stays small whatever its size.
-"""
+"""Results as tables in files, by pandas: CSV, Parquet or a spreadsheet, in pieces of `CHUNK_CELLS`."""
 
 import importlib
 import io
@@ -62,36 +59,12 @@ def export(
     chunk_cells: int = CHUNK_CELLS,
     progress: Progress | None = None,
 ) -> int:
-    """Write a result of slipsweep as a table, complete or not at all.
+    """Write a result of slipsweep as a table, complete or not at all; return the number of rows, of all sheets.
 
-    Parameters
-    ----------
-    source : str or Path
-        A netCDF file or a Zarr store that slipsweep wrote.
-    path : Path
-        The table: .csv, .parquet, or .xlsx, whose sheet "about" says what it is of.  Numbers have the digits that bring
-        them back.
-    variables : sequence of str, optional
-        Results to export, by default all.  Dimensions that none of them has are left out, with their rows.
-    words : bool
-        Sliding modes and flags as words instead of codes.
-    in_g : bool
-        Accelerations in g, that of the model, instead of m/s².
-    at : mapping of axis to text, optional
-        Values to keep of an axis, see `slipsweep.files.selection.places_at`.
-    rows, columns : sequence of str, str, optional
-        With `columns`, the axis along the columns of a pivoted table, `rows` are those along its rows.
-    overwrite : bool
-        Replace `path` if it exists.
-    chunk_cells : int
-        Cells read at a time, hence in memory.
-    progress : callable, optional
-        See `Progress`.
-
-    Returns
-    -------
-    int
-        The number of rows, of all sheets.
+    The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions that none of them
+    has are left out.  Sliding modes and flags are codes or `words`, accelerations in m/s² or `in_g`, that of the model.
+    `at` says which values to keep of an axis, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along
+    the columns of a pivoted table, `rows` are those along its rows.  So many cells are in memory at a time.
 
     Raises
     ------
@@ -154,26 +127,13 @@ def _in_g(table: xr.Dataset) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: results with one row a cell, or one result pivoted.
+    """A table: results with one row a cell, or one result pivoted."""
 
-    Attributes
-    ----------
-    part : Dataset
-        The results, cut to what is exported.
-    name : str
-    words : bool
-        Codes as words.
-    rows : list of str
-        Dimensions along the rows.
-    columns : str, optional
-        The dimension along the columns of a pivoted table.
-    """
-
-    part: xr.Dataset
+    part: xr.Dataset  # the results, cut to what is exported
     name: str
-    words: bool
-    rows: list[str]
-    columns: str | None = None
+    words: bool  # instead of codes
+    rows: list[str]  # dimensions along the rows
+    columns: str | None = None  # the dimension along the columns of a pivoted table
 
     @property
     def results(self) -> list[str]:
@@ -188,29 +148,21 @@ class Table:
     @cached_property
     def left(self) -> list[str]:
         """Coordinates along the rows; of a long table also those of one value."""
-        first = [name for name in PARAMETERS if name in self.part.coords]
-        names = dict.fromkeys((*first, *map(str, self.part.coords)))
-        return [
-            name
-            for name in names
-            if {*self.part[name].dims} <= {*self.rows}
-            and (self.part[name].dims or not self.columns)
-            and name not in MOTION_FILES
-        ]
+        along = {
+            str(name)
+            for name, one in self.part.coords.items()
+            if {*one.dims} <= {*self.rows} and (one.dims or not self.columns) and name not in MOTION_FILES
+        }
+        return [name for name in dict.fromkeys((*PARAMETERS, *map(str, self.part.coords))) if name in along]
 
     def check_size(self, source: object) -> None:
         """Refuse what a sheet cannot hold, and say what to cut."""
         width = len(self.left) + (self.part.sizes[self.columns] if self.columns else len(self.results))
-        if width > MOST_COLUMNS:
-            raise InputError(
-                f"{source}: the table has {width} columns, a sheet of .xlsx {MOST_COLUMNS}; give fewer values of "
-                f"{self.columns} with --at, another axis with --columns, or write .csv"
-            )
-        if self.count >= MOST_ROWS:
+        if width > MOST_COLUMNS or self.count >= MOST_ROWS:
             sizes = " x ".join(f"{self.part.sizes[dim]} {dim}" for dim in self.rows)
             raise InputError(
-                f"{source}: the table has {self.count} rows ({sizes}), a sheet of .xlsx {MOST_ROWS} with its header; "
-                "take fewer values with --at, or write .csv"
+                f"{source}: the table has {self.count} rows ({sizes}) and {width} columns, a sheet of .xlsx "
+                f"{MOST_ROWS} with its header and {MOST_COLUMNS}; take fewer values with --at, or write .csv"
             )
 
     def frames(self, cells: int) -> "Iterator[pd.DataFrame]":
@@ -223,35 +175,28 @@ class Table:
             shape = {dim: part.sizes[dim] for dim in self.rows}
             found = {header(part[name]): part[name].variable.set_dims(shape).values.ravel() for name in self.left}
             if self.columns is None:
-                found |= {
-                    header(part[name]): self._column(part[name], part[name].variable.set_dims(shape).values.ravel())
-                    for name in self.results
-                }
-                yield pd.DataFrame(found)
-                continue
-            one = part[self.results[0]]
-            values = one.variable.set_dims({**shape, self.columns: across}).values.reshape(-1, across)
-            last = header(part[self.left[-1]]) if self.left else ""
-            found[f"{last} \\ {self._corner}"] = found.pop(last, np.arange(1, len(values) + 1))
-            for place, value in enumerate(axis_values(self.part, self.columns)):
-                found[value] = self._column(one, values[:, place])
+                for name in self.results:
+                    values = part[name].variable.set_dims(shape).values.ravel()
+                    found[header(part[name])] = self._column(part[name], values)
+            else:
+                one = part[self.results[0]]
+                values = one.variable.set_dims({**shape, self.columns: across}).values.reshape(-1, across)
+                last = header(part[self.left[-1]]) if self.left else ""
+                found[f"{last} \\ {self._corner}"] = found.pop(last, np.arange(1, len(values) + 1))
+                for place, value in enumerate(axis_values(self.part, self.columns)):
+                    found[value] = self._column(one, values[:, place])
             yield pd.DataFrame(found)
 
     @property
     def _corner(self) -> str:
         """What a pivoted table is of, and what it has one value of."""
         assert self.columns is not None
-        fixed = {str(dim): axis_values(self.part, str(dim))[0] for dim, size in self.part.sizes.items() if size == 1}
-        fixed |= {str(name): one.values[()] for name, one in self.part.coords.items() if not one.dims}
-        texts = []
-        for name, value in fixed.items():
-            if name not in (*self.rows, self.columns):
-                units = self.part[name].attrs.get("units", "1") if name in self.part.coords else "1"
-                number = value if isinstance(value, str) else f"{value:.10g}"
-                texts.append(f"{name} = {number}" + ("" if units == "1" else f" {units}"))
+        one = [
+            name for name, one in self.part.coords.items() if one.size == 1 and name not in (*self.rows, self.columns)
+        ]
+        texts = ", ".join(f"{name} = {values_text(self.part[name])}" for name in one)
         across = header(self.part[self.columns]) if self.columns in self.part.coords else self.columns
-        at = f" at {', '.join(texts)}" if texts else ""
-        return f"{across}: {header(self.part[self.results[0]])}{at}"
+        return f"{across}: {header(self.part[self.results[0]])}" + (f" at {texts}" if texts else "")
 
     def _column(self, one: xr.DataArray, values: Any) -> Any:
         """Values of a result as a table has them: codes that stand for no value missing, or in words."""
@@ -296,8 +241,6 @@ def _tables(
     for name in chosen:
         if name not in known:
             raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, known)}')
-    if not chosen:
-        raise InputError(f"{source}: holds no results")
     widest = max((table[name].dims for name in chosen), key=len)
     dims = list(dict.fromkeys(str(dim) for name in chosen for dim in (*widest, *table[name].dims)))
     part = table[chosen].isel(places_at(table, source, at, dims))
@@ -330,9 +273,9 @@ def _csv(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
 
         def write(table: Table, frame: "pd.DataFrame", is_first: bool) -> None:
             for name in frame.select_dtypes(["object", "string"]):
-                texts = frame[name].astype(object)
-                risky = texts.map(lambda text: isinstance(text, str) and text.startswith(_FORMULAS))
-                frame[name] = texts.where(~risky, "'" + texts.astype(str))
+                frame[name] = frame[name].map(
+                    lambda text: f"'{text}" if isinstance(text, str) and text.startswith(_FORMULAS) else text
+                )
             frame.to_csv(file, index=False, header=is_first, lineterminator="\n")
 
         yield write
@@ -395,8 +338,6 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
             for flag, count in (tally.flags or {}).items():
                 share = f"{tally.share(count):.2%} of {tally.cells} cells"
                 rows.append((f"{int(flag)} {(flag.name or '').lower()}", f"{flag.kind}: {share}; {flag.text}"))
-    for name, text in part.attrs.items():
-        # line by line: a cell does not hold a long text
-        lines = str(text).splitlines()
-        rows += [(str(name) if at == 0 else "", line) for at, line in enumerate(lines)]
+    for name, text in part.attrs.items():  # line by line: a cell does not hold a long text
+        rows += [("" if at else str(name), line) for at, line in enumerate(str(text).splitlines())]
     return rows

@@ -11,11 +11,12 @@ import numpy as np
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.files.motions import samples_of
+from slipsweep.errors import InputError
+from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.model.variables import RESULT_DTYPES
+from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
 
 #: Attribute by which a run knows whether a file is its own.
 RUN = "slipsweep_run"
@@ -23,28 +24,14 @@ RUN = "slipsweep_run"
 
 @dataclass(frozen=True)
 class Job:
-    """A sweep file, the plan that a command makes of it, and what the command's output says of itself.
-
-    Attributes
-    ----------
-    spec : SweepSpec
-    make : callable
-        Makes the plan, when it is needed.
-    title : str
-    options : dict of str to object
-        What the results depend on further to the sweep file, by what users know it by.
-    floats : str
-        Data type of floating-point results in the file.
-    attrs : dict of str to str
-        Further attributes of the file.
-    """
+    """A sweep file, the plan that a command makes of it, and what the command's output says of itself."""
 
     spec: SweepSpec
-    make: Callable[[], AnyPlan]
+    make: Callable[[], AnyPlan]  # when it is needed
     title: str
-    options: Mapping[str, Any]
-    floats: str = "float64"
-    attrs: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, Any]  # what the results depend on further to the sweep file, by what users know it by
+    floats: str = "float64"  # data type of floating-point results in the file
+    attrs: Mapping[str, str] = field(default_factory=dict)  # further attributes of the file
 
     @cached_property
     def plan(self) -> AnyPlan:
@@ -66,10 +53,7 @@ class Job:
         """By what two runs know that they compute the same."""
         found = {"version of slipsweep": __version__, "data type": self.floats, "sweep file": self.spec.text}
         if self.spec.recorded is not None:
-            digest = hashlib.sha256()
-            for name, values in samples_of(self.spec.recorded).items():
-                digest.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values).tobytes())
-            found["recorded motion"] = digest.hexdigest()
+            found["recorded motion"] = digest_of(self.spec.recorded)
         return {**found, **self.options}
 
     @cached_property
@@ -100,24 +84,30 @@ class Job:
 
 def sweep_job(spec: SweepSpec) -> Job:
     """The job of `slipsweep run`: a sweep, or the statistics of samples."""
-    options, attrs = {"solver": repr(spec.solver)}, {"sweep": spec.text}
-    return Job(spec, spec.plan, spec.output.title, options, spec.output.dtype, attrs)
+    options = {"solver": repr(spec.solver)}
+    return Job(spec, spec.plan, spec.output.title, options, spec.output.dtype, {"sweep": spec.text})
 
 
 def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None) -> Job:
-    """The job of `slipsweep limit`: limit amplitudes over all axes of a sweep but the amplitude.
-
-    Parameters
-    ----------
-    spec : SweepSpec
-    displacement : float or list of float
-        m, increasing.
-    maximum_amplitude : float, optional
-        m/s².
-    """
+    """The job of `slipsweep limit`: amplitudes (m/s²) that displacements (m, increasing) allow, over all other axes."""
     return Job(
         spec,
-        lambda: spec.limits(displacement, maximum_amplitude),
+        lambda: _limits(spec, displacement, maximum_amplitude),
         "Amplitudes at which a tolerable displacement is reached",
         {"--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
     )
+
+
+def _limits(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None) -> AnyPlan:
+    from slipsweep.studies.limits import plan_limits  # imports numba
+
+    with spec.named():
+        if spec.sampling is not None:
+            raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
+        return plan_limits(
+            displacement,
+            spec.inputs.but(dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
+            excitation=spec.excitation,
+            model=spec.model,
+            maximum_amplitude=maximum_amplitude,
+        )

@@ -1,11 +1,10 @@
 """Recorded motions in files of results: written with them, and read back to repeat a run when their files are gone.
 
-One record lies along a dimension of its own, its samples; of a suite the samples of one record follow on those of the
-other, and what is said of each lies along a second dimension, how many samples it has among that.  It is all of the
-suite in every file, also where a file has a part of the results.
+A record lies along a dimension of its own, its samples; of a suite the samples of one record follow those of the other,
+and what is said of each, the number of its samples among that, lies along a second dimension.
 """
 
-from collections.abc import Mapping
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -68,20 +67,7 @@ def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
 
 
 def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
-    """The motion that a file of results holds, if it holds one.
-
-    Parameters
-    ----------
-    file : Dataset
-        As `slipsweep.files.opening.read_result` gives it.
-    path : Path
-        What the file is called in errors.
-
-    Raises
-    ------
-    InputError
-        What is there is no motion: another program has changed it.
-    """
+    """The motion that a result holds, if it holds one (InputError: it is none, another program has changed it)."""
     if any(name not in file for name in RECORD_SAMPLES):
         return None
     times, acceleration = (file[name].values.astype(np.float64) for name in RECORD_SAMPLES)
@@ -121,11 +107,9 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
     return Suite(pairs, tuple(labels[::2]), name)
 
 
-def samples_of(motion: Record | Suite) -> Mapping[str, NDArray[Any]]:
-    """The numbers, and the labels, by which two runs know that their motions are the same."""
-    if isinstance(motion, Record):
-        return {"times": motion.times, "acceleration": motion.acceleration}
+def digest_of(motion: Record | Suite) -> str:
+    """By what two runs know that their motions are the same: their samples and labels, not their files."""
     found = embedded(motion)
-    names = [name for name in (*RECORD_SAMPLES, _COUNT, _COMPONENT) if name in found]
-    labels = np.frombuffer("\0".join(motion.labels).encode(), np.uint8)
-    return {name: found[name].values for name in names} | {"labels": labels}
+    values = [found[name].values for name in (*RECORD_SAMPLES, _COUNT, _COMPONENT, _LABEL) if name in found]
+    parts = [one.tobytes() if one.dtype != object else "\0".join(one).encode() for one in values]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()

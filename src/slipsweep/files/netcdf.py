@@ -19,11 +19,6 @@ from slipsweep.motion.suites import Suite
 WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
 
-def history_of(command: str) -> str:
-    """The `history` of a file that `command` makes now."""
-    return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
-
-
 def described(
     table: xr.Dataset,
     *,
@@ -33,21 +28,7 @@ def described(
     recorded: Record | Suite | None = None,
     attrs: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Results as a file holds them: with labels of cases, the samples of records, and global attributes.
-
-    Parameters
-    ----------
-    table : Dataset
-    title : str
-    command : str
-        The command as typed, for the attribute `history`.
-    labels : tuple of str
-        Names of the cases.
-    recorded : Record or Suite, optional
-        The motion that the results are the response to.
-    attrs : mapping of str to str, optional
-        Further global attributes.
-    """
+    """Results as a file holds them: with labels of cases, the samples of the recorded motion, and global attributes."""
     found = table.copy()
     if labels:
         about = {"long_name": "name of the case"}
@@ -59,7 +40,8 @@ def described(
             found[name].attrs.pop("ancillary_variables", None)
     if recorded is not None:
         found = found.assign(embedded(recorded))
-    found.attrs |= {"title": title, "Conventions": "CF-1.11", "history": history_of(command), **(attrs or {})}
+    history = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
+    found.attrs |= {"title": title, "Conventions": "CF-1.11", "history": history, **(attrs or {})}
     return found
 
 
@@ -82,28 +64,19 @@ def opened(path: Path, mode: Literal["r", "r+"] = "r") -> Iterator[netCDF4.Datas
 def new_file(
     table: xr.Dataset, path: Path, lengths: Mapping[str, int] | None = None, compression: int = 0
 ) -> Iterator[netCDF4.Dataset]:
-    """Write a netCDF file; of variables that are dask arrays all but their values, which the caller writes into it.
+    """Write what `described` gives; of variables that are dask arrays all but their values, which the caller writes.
 
-    Parameters
-    ----------
-    table : Dataset
-        As `described` gives it.
-    path : Path
-    lengths : mapping of str to int, optional
-        Lengths of the chunks along each dimension, if the results are compressed; by default all of it.
-    compression : int
-        Level of zlib, which every build of the library has; 0 for none.
+    With a level of compression by zlib, which every build of the library has, results are in chunks of these lengths.
     """
     found = table.assign_attrs(_attributes(table.attrs))
     encoding: dict[Any, dict[str, Any]] = {}
     for name, one in table.variables.items():
         found[name].attrs = _attributes(one.attrs, one.dtype)
-        if one.dtype.kind in "OU":
-            encoding[name] = {"dtype": "S1"}  # characters, since few programs read netCDF strings
-            continue
         is_result = name in table.data_vars
         encoding[name] = {"_FillValue": fill_value(str(name), one.dtype) if is_result else None}
-        if compression and is_result and one.dims:
+        if one.dtype.kind in "OU":
+            encoding[name] = {"dtype": "S1"}  # characters, since few programs read netCDF strings
+        elif compression and is_result and one.dims:
             sizes = tuple((lengths or {}).get(str(dim), size) for dim, size in one.sizes.items())
             encoding[name] |= {"zlib": True, "complevel": compression, "shuffle": True, "chunksizes": sizes}
     file = netCDF4.Dataset(path, "w", format="NETCDF4")
@@ -141,9 +114,5 @@ def write_table(table: xr.Dataset, path: Path, compression: int = 0) -> None:
 
 
 def without_time_axis(table: xr.Dataset) -> xr.Dataset:
-    """Put a time history along `instant`, with `time` beside it as an auxiliary coordinate.
-
-    A dimension `time` is a time axis of the CF conventions (4.4), whose values are dates.  Seconds
-    since the shaking began are none, and given a made-up date they would be read back as dates.
-    """
+    """Put a time history along `instant`: a dimension `time` holds dates by the CF conventions (4.4), not seconds."""
     return table.swap_dims(time="instant").reset_coords("time").set_coords("time")

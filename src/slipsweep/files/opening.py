@@ -73,19 +73,13 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Open a result without dask: a variable is read when its values are asked for, or a part of them by `isel`.
-
-    Raises
-    ------
-    InputError
-        As `open_result`.
-    """
+    """Open a result without dask: values are read when they are asked for (InputError as `open_result`)."""
     table = _open(path)
     if not str(table.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in table.attrs:
         raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
     for name, one in dict(table.variables).items():
         for key in _ENCODINGS:
-            one.attrs.pop(key, None)
+            table[name].attrs.pop(key, None)
         if one.dtype.kind in "UST":
             table[name] = table[name].astype(object)
         kind = np.dtype(RESULT_DTYPES.get(str(name), "f8"))
@@ -125,12 +119,10 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def _in_order(table: xr.Dataset) -> xr.Dataset:
     """Variables and coordinates in the order of slipsweep's own: a store has none."""
-    order = [*PARAMETERS, *MOTION_COORDINATES, *RECORD_RESULTS, *LIMIT_RESULTS, *STATISTICS, *RESULTS]
-    ranks = {name: at for at, name in reversed([*enumerate(order)])}
-    names = sorted(map(str, table.data_vars), key=lambda name: ranks.get(name, len(order)))
-    coords = sorted(map(str, table.coords), key=lambda name: ranks.get(name, len(order)))
-    variables, axes = ({name: table[name].variable for name in own} for own in (names, coords))
-    return xr.Dataset(variables, axes, table.attrs)
+    order = dict.fromkeys((*PARAMETERS, *MOTION_COORDINATES, *RECORD_RESULTS, *LIMIT_RESULTS, *STATISTICS, *RESULTS))
+    names = [name for name in (*order, *table.variables) if name in table.variables]
+    found = xr.Dataset({name: table[name].variable for name in dict.fromkeys(names)}, attrs=table.attrs)
+    return found.set_coords([name for name in found.variables if name in table.coords])
 
 
 def check_zarr(path: object) -> None:

@@ -17,24 +17,15 @@ from slipsweep.grid.resources import size_text
 #: What a command reads: a file, or 0, standard input.
 Read = Path | int
 
+#: How an output that is there is refused.
+EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
+
 
 def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Read]) -> None:
-    """Refuse outputs of a command that cannot be written, may not be replaced, or are what it reads.
+    """Refuse outputs of a command that cannot be written, may not be replaced, or are what it `reads` (InputError).
 
-    Every command that writes comes here before it computes anything.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        All outputs of the command: files, or Zarr stores, which are folders.
-    overwrite : bool
-        Whether they may replace what exists.
-    reads : sequence of Path or int
-        All that the command reads.  Files are compared, not their names: a link is what it points to.
-
-    Raises
-    ------
-    InputError
+    Every command that writes comes here before it computes anything.  Files are compared, not their names: a link is
+    what it points to.
     """
     for path in paths:
         try:
@@ -51,7 +42,7 @@ def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Rea
             if path.exists() and not path.is_file() and not (path / "zarr.json").is_file():
                 raise InputError(f"{path}: exists and is neither a file nor a Zarr store")
             if os.path.lexists(path) and not overwrite:
-                raise InputError(f"{path}: exists already; give --overwrite to replace it, or another name with -o")
+                raise InputError(EXISTS.format(path=path))
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     for path, other in itertools.combinations(paths, 2):
@@ -63,12 +54,7 @@ def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Rea
 def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary name beside `path`; what is written there becomes `path` on success.
 
-    On any error or interruption the temporary file is removed and `path` stays as it was.
-
-    Raises
-    ------
-    RunError
-        The file cannot be written, or another process made `path` in the meantime.
+    On any error or interruption `path` stays as it was.  RunError: it cannot be written, or another process made it.
     """
     # not made of the output's name, which may be as long as the system allows
     temporary = path.with_name(f".slipsweep-{os.getpid()}-{secrets.token_hex(4)}.tmp")
@@ -95,12 +81,7 @@ def appear(temporary: Path, path: Path, overwrite: bool) -> None:
 
 @contextmanager
 def writing(path: Path | str) -> Iterator[None]:
-    """Turn what the system and the netCDF library raise while an output is written into one line with its name.
-
-    Raises
-    ------
-    RunError
-    """
+    """Turn what the system and the netCDF library raise while an output is written into one line (RunError)."""
     try:
         yield
     except (OSError, RuntimeError) as error:

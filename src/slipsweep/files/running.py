@@ -13,9 +13,9 @@ from slipsweep.files import cluster, netcdf
 from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
-from slipsweep.files.storing import Arrays, Chunks, NetcdfChunks, Place, ZarrChunks, tally_of
+from slipsweep.files.storing import Chunks, NetcdfChunks, Place, ZarrChunks
 from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
+from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths, grid_chunks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
 
@@ -49,21 +49,10 @@ def run(
 ) -> Report:
     """Solve a plan and write its results, complete or not at all.
 
-    Parameters
-    ----------
-    job : Job
-    path : Path or str
-        The netCDF file, or the Zarr store (a name that ends in .zarr), or the address of a store.
-    command : str
-        The command as typed, for the file's `history`.
-    overwrite, resume : bool
-        Replace `path` and the chunks of an interrupted run; or go on with these, and leave a complete output as it is.
-    memory : int, optional
-        Bytes that the run may take.
-    workers, scheduler : int or str, optional
-        Solve on so many processes of this machine, or on those of the scheduler at an address.
-    progress : callable, optional
-        Called with a number of cells just solved.
+    `path` is a netCDF file, a Zarr store (a name that ends in .zarr) or the address of one; `command`, as typed, goes
+    into its `history`.  `overwrite` replaces it and the chunks of an interrupted run, `resume` goes on with these, and
+    leaves a complete output as it is.  The run takes so many bytes of `memory`, on so many `workers` of this machine or
+    on those of a `scheduler`.  `progress` is called with a number of cells just solved.
 
     Raises
     ------
@@ -101,7 +90,18 @@ def run(
             _solve_elsewhere(chunks, workers, scheduler, tell)
         else:
             _solve_here(chunks, tell)
-        return Report(path, chunks.finish(overwrite))
+        chunks.finish(overwrite)
+        return Report(path, tally_of(read_result(path), plan))
+
+
+def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
+    """Count the results of a plan, read in chunks."""
+    tally = Tally()
+    for chunk in grid_chunks(plan.sizes, CHUNK_CELLS, plan.together):
+        part = table[list(plan.names)].isel(chunk, missing_dims="ignore")
+        tally.merge(plan.tally({name: part[name].values for name in plan.names}))
+    tally.cells = plan.cells
+    return tally
 
 
 def _complete(job: Job, path: Place) -> xr.Dataset | None:
@@ -116,8 +116,7 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
         return None  # nothing is at the address, or a store that is not finished
     if found.attrs.get(RUN) != job.digest:
         raise InputError(
-            f"{path}: exists already, and is of another sweep or version; give --overwrite to replace it, or another "
-            "name with -o"
+            f"{path}: is of another sweep or version; give --overwrite to replace it, or another name with -o"
         )
     return found
 
@@ -145,16 +144,14 @@ def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int
 
 def _solve_here(chunks: Chunks, progress: Callable[[int], None]) -> None:
     """Compute the chunks that are missing; one thread writes each while the next is computed."""
-    from slipsweep.grid.graph import solved_chunks
-
-    solved = solved_chunks(chunks.job.plan, chunks.cut)
+    solved = chunks.solved
     with ThreadPoolExecutor(1) as writer:
         waiting: Future[None] | None = None
         for number, index in chunks.missing():
             found = solved.blocks[index].compute(scheduler="synchronous").item()
             if waiting is not None:
                 waiting.result()
-            waiting = writer.submit(chunks.write, number, _stored(chunks.job, found))
+            waiting = writer.submit(chunks.write, number, found)
             progress(number)
         if waiting is not None:
             waiting.result()
@@ -164,18 +161,10 @@ def _solve_elsewhere(
     chunks: Chunks, workers: int | None, scheduler: str | None, progress: Callable[[int], None]
 ) -> None:
     """Have the chunks that are missing computed by workers, and written by them or here as they come back."""
-    from slipsweep.grid.graph import solved_chunks
-
-    solved = solved_chunks(chunks.job.plan, chunks.cut)
-    written = chunks.written(solved)
+    written = chunks.written
     with cluster.connected(workers, scheduler) as client:
-        blocks = ((number, (solved if written is None else written).blocks[at]) for number, at in chunks.missing())
+        blocks = ((number, written.blocks[index]) for number, index in chunks.missing())
         for number, found in cluster.computed(client, blocks):
-            if written is None:
-                chunks.write(number, _stored(chunks.job, found.item()))
+            if found.dtype == object:  # results, which a worker has not written
+                chunks.write(number, found.item())
             progress(number)
-
-
-def _stored(job: Job, arrays: Arrays) -> Arrays:
-    """The results of a chunk in the types of the file."""
-    return {name: arrays[name].astype(dtype, copy=False) for name, dtype in job.dtypes.items()}

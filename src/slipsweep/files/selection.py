@@ -52,26 +52,11 @@ def axis_values(data: xr.Dataset, dim: str) -> list[Any]:
 
 
 def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[str, list[Place]]:
-    """Find values on the axes of a result.
+    """Find values on the axes of a result, called `where` in errors.
 
-    A text stands for a value of the result that it is equal to in the digits that it has, in its own unit: what a
-    message or a caption prints can be typed.
-
-    Parameters
-    ----------
-    data : Dataset
-        A result of `sweep`, or a file of one.
-    at : mapping of axis to value or values
-        In the axis's own unit, or texts with another ("0.3g"); labels of cases and motions, or their numbers from 1.
-        A text may hold several values, with commas.  A parameter that is one number for the whole result may be named
-        too, with that number.
-    where : str
-        What the result is called in errors.
-
-    Returns
-    -------
-    dict of str to list of Place
-        In the order given, without those of parameters that are one number.
+    A text is equal to a value of the result in the digits that it has, in its own unit: what a message or a caption
+    prints can be typed.  It may hold several values, with commas; labels, or their numbers from 1.  A parameter that is
+    one number for the whole result may be named too, with that number; it is not among what is returned.
 
     Raises
     ------
@@ -108,17 +93,9 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
 def places_at(
     data: xr.Dataset, source: object, at: Mapping[str, At], dims: Collection[str]
 ) -> dict[str, NDArray[np.intp]]:
-    """Indices of values on some axes of a result, for `Dataset.isel`; as `find`.
+    """Indices of values on some axes of a result, of which `dims` may be cut, for `Dataset.isel`.
 
-    Parameters
-    ----------
-    dims : collection of str
-        The axes that may be cut.
-
-    Raises
-    ------
-    InputError
-        As `find`, or a value lies between those of the result: the message names its neighbours.
+    InputError: as `find`, or a value lies between those of the result; the message names its neighbours.
     """
     for name in at:
         if name in data.sizes and name not in dims:

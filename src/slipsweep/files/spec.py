@@ -1,8 +1,7 @@
 """Sweep files: TOML text in, the arguments of `slipsweep.sweep` out.
 
-Here keys are checked, axes become arrays in their own units, and what two tables say of one thing is refused.  What the
-values may be is known to those that take them: options (`slipsweep.model.choices`), parameters (`slipsweep.grid.plans`,
-`slipsweep.studies.sampling`).  Every refusal is an `InputError` of one line, ``FILE: key = VALUE: what is allowed``.
+Here keys are checked, axes become arrays in their own units, and what two tables say of one thing is refused.  Those
+that take the values know what they may be.  A refusal is an `InputError`, ``FILE: key = VALUE: what is allowed``.
 """
 
 import tomllib
@@ -17,25 +16,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
-from slipsweep.files.motions import read_embedded
-from slipsweep.files.opening import read_result
-from slipsweep.files.outputs import Read
+from slipsweep.files import motions, opening
 from slipsweep.grid.inputs import Inputs
-from slipsweep.model.choices import Family, declared
-from slipsweep.model.options import MODELS, SOLVERS, Model, Solver
-from slipsweep.model.parameters import (
-    check_choice,
-    check_finite,
-    check_numbers,
-    check_single,
-    check_values,
-    check_whole,
-)
-from slipsweep.model.units import conversion, show
-from slipsweep.model.variables import DEFAULT_RESULTS, DRAWN, PARAMETERS
-from slipsweep.motion.reading import Reading
-from slipsweep.motion.records import Record, read_record
-from slipsweep.motion.suites import Suite, suite_in
+from slipsweep.model import choices, options, parameters, units, variables
+from slipsweep.motion import reading, records, suites
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
@@ -43,7 +27,7 @@ if TYPE_CHECKING:
     from slipsweep.studies.sampling import Sampling
 
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
-_INPUTS = tuple(name for name in PARAMETERS if name != "polarity")
+_INPUTS = tuple(name for name in variables.PARAMETERS if name != "polarity")
 
 #: Parameters that [model] may give as one number for the whole sweep.
 _MODEL_PARAMETERS = (
@@ -51,24 +35,24 @@ _MODEL_PARAMETERS = (
 )  # fmt: skip
 
 #: Keys of [excitation] that go with recorded motions.
-_RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in declared(Reading)), "polarity")
+_RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in choices.declared(reading.Reading)), "polarity")
 
 #: The keys of each table, and their defaults where these are not declared elsewhere; None: there is none.
 KEYS: dict[str, dict[str, Any]] = {
     "axes": dict.fromkeys(_INPUTS),
     "axes.NAME": {"values": None, "start": None, "stop": None, "num": None, "spacing": "linear", "units": None},
     "cases": dict.fromkeys(("label", *_INPUTS)),
-    "model": {MODELS.key: MODELS.default}
-    | dict.fromkeys((*MODELS.options, *_MODEL_PARAMETERS))
+    "model": {options.MODELS.key: options.MODELS.default}
+    | dict.fromkeys((*options.MODELS.options, *_MODEL_PARAMETERS))
     | {"yield_acceleration": "coulomb"},
     "excitation": {WAVEFORMS.key: WAVEFORMS.default}
     | dict.fromkeys((*WAVEFORMS.options, *_RECORD_KEYS))
     | {"polarity": 1},
-    "solver": {SOLVERS.key: SOLVERS.default} | dict.fromkeys(SOLVERS.options),
+    "solver": {options.SOLVERS.key: options.SOLVERS.default} | dict.fromkeys(options.SOLVERS.options),
     "output": {
         "path": None,
         "title": "Permanent displacement of a rigid block on a shaken inclined plane",
-        "variables": list(DEFAULT_RESULTS),
+        "variables": list(variables.DEFAULT_RESULTS),
         "dtype": "float64",
         "compression": 0,
     },
@@ -82,14 +66,17 @@ KEYS: dict[str, dict[str, Any]] = {
         "sensitivity": False,
         "over": [],
     }
-    | dict.fromkeys(DRAWN),
+    | dict.fromkeys(variables.DRAWN),
 }
 
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
 
 #: How netCDF files begin: netCDF-4, and the classic formats.
-_NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
+_NETCDF = (b"\x89HDF", b"CDF")
+
+#: The motions of records, as [excitation] gives them.
+Recorded = records.Record | suites.Suite
 
 _Table = Mapping[str, Any]
 
@@ -107,41 +94,21 @@ class Output:
 
 @dataclass(frozen=True)
 class SweepSpec:
-    """A checked sweep: its grid, its options and the text it came from.
+    """A checked sweep: its grid, its options and the text it came from."""
 
-    Attributes
-    ----------
-    source : str
-        The file, as the user named it.
-    text : str
-        The sweep file, verbatim.
-    inputs : Inputs
-        The parameters.
-    labels : tuple of str
-        Names of the rows of [[cases]]; empty without them.
-    model : Mendez or Newmark
-    excitation : Waveform, Record or Suite
-    solver : Cycle or Step
-    output : Output
-    sampling : Sampling or None
-        What [uncertainty] says; such a sweep gives statistics of the displacement.
-    files : tuple of Path or int
-        The files that were read for it, by name or descriptor.
-    """
-
-    source: str
-    text: str
+    source: str  # the file, as the user named it
+    text: str  # of it, verbatim
     inputs: Inputs
-    labels: tuple[str, ...]
-    model: Model
-    excitation: Waveform | Record | Suite
-    solver: Solver
+    labels: tuple[str, ...]  # of the rows of [[cases]]
+    model: options.Model
+    excitation: Waveform | Recorded
+    solver: options.Solver
     output: Output
-    sampling: "Sampling | None" = None
-    files: tuple[Read, ...] = ()
+    sampling: "Sampling | None" = None  # what [uncertainty] says: the results are statistics
+    files: tuple[Path | int, ...] = ()  # that were read for it, by name or descriptor
 
     @property
-    def recorded(self) -> Record | Suite | None:
+    def recorded(self) -> Recorded | None:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
@@ -150,71 +117,29 @@ class SweepSpec:
         return _named(self.source)
 
     def plan(self) -> "AnyPlan":
-        """Return what the sweep file describes: a sweep, or the statistics of samples.
-
-        Raises
-        ------
-        InputError
-            What only the plan can know is not allowed.
-        """
-        options: dict[str, Any] = {"excitation": self.excitation, "model": self.model, "solver": self.solver}
+        """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
+        chosen: dict[str, Any] = {"excitation": self.excitation, "model": self.model, "solver": self.solver}
         # these import numba, and scipy: not for sweeps that are only looked at
         with self.named():
             if self.sampling is None:
                 from slipsweep.grid.plans import plan_sweep
 
-                return plan_sweep(self.inputs, variables=self.output.variables, **options)
+                return plan_sweep(self.inputs, variables=self.output.variables, **chosen)
             from slipsweep.studies.uncertainty import plan_samples
 
-            return plan_samples(self.sampling, self.inputs, **options)
-
-    def limits(self, displacement: float | list[float], maximum_amplitude: float | None = None) -> "AnyPlan":
-        """Return the plan of `slipsweep.limit_amplitude` over all axes but the amplitude, by the cycle solver.
-
-        Raises
-        ------
-        InputError
-            As `plan`; or it is no sweep of which there are limits.
-        """
-        from slipsweep.model.variables import STRENGTHS
-        from slipsweep.studies.limits import plan_limits
-
-        with self.named():
-            if self.sampling is not None:
-                raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
-            return plan_limits(
-                displacement,
-                self.inputs.but(dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
-                excitation=self.excitation,
-                model=self.model,
-                maximum_amplitude=maximum_amplitude,
-            )
+            return plan_samples(self.sampling, self.inputs, **chosen)
 
 
 def load(path: str | Path) -> SweepSpec:
-    """Read and check a sweep.
+    """Read and check a sweep file (TOML), or a result of `slipsweep run`: then the sweep it was made from.
 
-    Parameters
-    ----------
-    path : str or Path
-        A sweep file (TOML), or a netCDF file or Zarr store that `slipsweep run` wrote: then the sweep
-        it was made from.  A sweep file may be a pipe, or ``-`` for standard input; the record
-        that it names is then looked for in the folder that the command runs in.
-
-    Returns
-    -------
-    SweepSpec
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or something in it is not allowed: one line that names
-        the file, the key, its value and what is allowed.
+    A sweep file may be a pipe, or ``-`` for standard input; the record that it names is then looked for in the folder
+    that the command runs in.  InputError: the file cannot be read, or something in it is not allowed.
     """
     path = Path(path)
     if (path / "zarr.json").is_file():
         return replace(_load_result(path), files=(path,))
-    read: Read = 0 if path == Path("-") else path
+    read: Path | int = 0 if path == Path("-") else path
     try:
         with open(read, "rb", closefd=read != 0) as file:
             content = file.read(4)
@@ -235,29 +160,22 @@ def is_stream(path: Path) -> bool:
 
 
 def _load_result(path: Path) -> SweepSpec:
-    with read_result(path) as file:
+    with opening.read_result(path) as file:
         attributes = file.attrs
-        recorded = read_embedded(file, path)
+        recorded = motions.read_embedded(file, path)
     if "sweep" not in attributes:
         raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
     spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     with spec.named():
-        return replace(spec, solver=SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
+        return replace(spec, solver=options.SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
 
 
-def parse(text: str, source: str, folder: Path | None = None, recorded: Record | Suite | None = None) -> SweepSpec:
-    """Check the text of a sweep file. See `load`.
+def parse(text: str, source: str, folder: Path | None = None, recorded: Recorded | None = None) -> SweepSpec:
+    """Check the text of a sweep file, called `source` in errors; see `load`.
 
-    Parameters
-    ----------
-    text : str
-    source : str
-        What to call it in errors.
-    folder : Path, optional
-        Where its records are looked for; by default the folder that the command runs in.
-    recorded : Record or Suite, optional
-        These records, as a result has kept them: then no file is read.
+    Its records are looked for in `folder`, by default the one that the command runs in; or they are those that a result
+    has kept.
     """
     try:
         content = tomllib.loads(text)
@@ -269,18 +187,22 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Record |
         }
         _refuse_unknown("", content, (*tables, "cases"))
         numbers = {name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]}
-        model = _chosen(MODELS, tables["model"])
+        if numbers.get("yield_acceleration") == "coulomb":
+            del numbers["yield_acceleration"]
+        model = _chosen(options.MODELS, tables["model"])
         rows = _cases(content["cases"]) if "cases" in content else []
         given = _inputs(tables["axes"], rows, numbers, model.g)
         if key := next((one for one in ("record", "records") if one in tables["excitation"]), None):
             given["polarity"] = tables["excitation"].pop("polarity", 1)
             motion: Any = _recorded_motion(key, tables, folder or Path(), recorded)
+            read = () if recorded else motion.components if isinstance(motion, suites.Suite) else (motion,)
+            files = tuple(Path(one.name) for one in read)
         else:
+            files = ()
             for other in (one for one in tables["excitation"] if one in _RECORD_KEYS):
                 raise InputError(f"excitation.{other}: only beside excitation.record, the file of a recorded motion")
             motion = _chosen(WAVEFORMS, tables["excitation"])
         sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
-        components = motion.components if isinstance(motion, Suite) else (motion,) if isinstance(motion, Record) else ()
         return SweepSpec(
             source,
             text,
@@ -288,10 +210,10 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Record |
             tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1)),
             model,
             motion,
-            _chosen(SOLVERS, tables["solver"]),
+            _chosen(options.SOLVERS, tables["solver"]),
             _output(tables["output"], sampling is not None),
             sampling,
-            () if recorded else tuple(Path(one.name) for one in components),
+            files,
         )
 
 
@@ -307,7 +229,7 @@ def _named(source: str) -> Iterator[None]:
 def _known(key: str, table: Any, keys: str | None = None) -> _Table:
     """A table that has known keys only."""
     if not isinstance(table, dict):
-        raise InputError(f"{key} = {show(table)}: must be a table")
+        raise InputError(f"{key} = {units.show(table)}: must be a table")
     _refuse_unknown(f"{key}.", table, tuple(KEYS[keys or key]))
     return table
 
@@ -318,46 +240,36 @@ def _refuse_unknown(before: str, table: _Table, known: tuple[str, ...]) -> None:
             raise InputError(f"{before}{name}: unknown key; {did_you_mean(name, known)}")
 
 
-def _chosen(family: Family[Any], table: _Table) -> Any:
+def _chosen(family: choices.Family[Any], table: _Table) -> Any:
     """The choice that a table names, with its options."""
-    options = {name: value for name, value in table.items() if name != family.key}
-    return family.made(table.get(family.key, family.default), options, lambda text: f"{family.keyword}.{text}")
+    given = {name: value for name, value in table.items() if name != family.key}
+    return family.made(table.get(family.key, family.default), given, lambda text: f"{family.keyword}.{text}")
 
 
 def _sampling(table: _Table, g: float) -> "Sampling":
     from slipsweep.studies.sampling import check_sampling  # imports scipy: only for sweeps that need it
 
-    options = {name: table.get(name, default) for name, default in KEYS["uncertainty"].items() if name not in DRAWN}
-    drawn = {name: value for name, value in table.items() if name in DRAWN}
-    return check_sampling(drawn, **options, g=g, keys="uncertainty.")
+    settings = {
+        name: table.get(name, default) for name, default in KEYS["uncertainty"].items() if name not in variables.DRAWN
+    }
+    drawn = {name: value for name, value in table.items() if name in variables.DRAWN}
+    return check_sampling(drawn, **settings, g=g, keys="uncertainty.")
 
 
 def _inputs(axes: _Table, rows: list[dict[str, Any]], numbers: _Table, g: float) -> dict[str, Any]:
     """The parameters, each from one table: [axes], [[cases]] or [model]."""
     columns = [name for name in rows[0] if name != "label"] if rows else []
-    given: dict[str, Any] = {}
-    for table, values in (
-        ("axes", {name: _axis(name, axis, g) for name, axis in axes.items()}),
-        ("cases", {name: xr.DataArray([row[name] for row in rows], dims="case") for name in columns}),
-        (
-            "model",
-            {
-                name: check_single(name, value, f"model.{name}")
-                for name, value in numbers.items()
-                if (name, value) != ("yield_acceleration", "coulomb")
-            },
-        ),
-    ):
-        for name in values:
-            if name in given:
-                raise InputError(f"{table}.{name}: given twice: give it in one table")
+    given: dict[str, Any] = {name: _axis(name, axis, g) for name, axis in axes.items()}
+    cases = {name: xr.DataArray([row[name] for row in rows], dims="case") for name in columns}
+    model = {name: parameters.check_single(name, value, f"model.{name}") for name, value in numbers.items()}
+    for table, values in (("cases", cases), ("model", model)):
+        for name in given.keys() & values.keys():
+            raise InputError(f"{table}.{name}: given twice: give it in one table")
         given |= values
     return given
 
 
-def _recorded_motion(
-    key: str, tables: Mapping[str, _Table], folder: Path, recorded: Record | Suite | None
-) -> Record | Suite:
+def _recorded_motion(key: str, tables: Mapping[str, _Table], folder: Path, recorded: Recorded | None) -> Recorded:
     """The records in files that [excitation] names, or those that a result has kept."""
     table = tables["excitation"]
     others = [f"excitation.{one}" for one in table if one not in _RECORD_KEYS]
@@ -368,15 +280,15 @@ def _recorded_motion(
     if key == "record" and "pairs" in table:
         raise InputError("excitation.pairs: only beside excitation.records, the files of a suite")
     if key == "record" and not isinstance(table["record"], str):
-        raise InputError(f"excitation.record = {show(table['record'])}: must be the name of a file")
+        raise InputError(f"excitation.record = {units.show(table['record'])}: must be the name of a file")
     if recorded is not None:
         return recorded
-    options = {name: value for name, value in table.items() if name not in ("record", "records", "pairs")}
+    given = {name: value for name, value in table.items() if name not in ("record", "records", "pairs")}
     try:
-        reading = Reading(**options)
+        how = reading.Reading(**given)
         if key == "record":
-            return read_record(folder / table["record"], **reading.options)
-        return suite_in(folder, table["records"], table.get("pairs"), reading)
+            return records.read_record(folder / table["record"], **how.options)
+        return suites.suite_in(folder, table["records"], table.get("pairs"), how)
     except InputError as error:
         message = str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
         named = message.startswith((key, *_RECORD_KEYS))
@@ -387,7 +299,7 @@ def _recorded_motion(
 def _cases(rows: Any) -> list[dict[str, Any]]:
     """The rows of [[cases]], which all give the same parameters."""
     if not isinstance(rows, list) or not rows:
-        raise InputError(f"cases = {show(rows)}: must be one table [[cases]] at least")
+        raise InputError(f"cases = {units.show(rows)}: must be one table [[cases]] at least")
     columns = [name for name in _known("cases[row 1]", rows[0], "cases") if name != "label"]
     if not columns:
         raise InputError("cases[row 1]: must give at least one parameter")
@@ -396,7 +308,7 @@ def _cases(rows: Any) -> list[dict[str, Any]]:
         key = f"cases[row {number}]"
         for name in {*columns} ^ {*_known(key, row, "cases")} - {"label"}:
             raise InputError(f"{key}.{name}: every row must give what row 1 gives: {', '.join(columns)}")
-        values = {name: check_single(name, row[name], f"{key}.{name}") for name in columns}
+        values = {name: parameters.check_single(name, row[name], f"{key}.{name}") for name in columns}
         found.append(values | {name: row[name] for name in row if name == "label"})
     return found
 
@@ -410,17 +322,17 @@ def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
             if other not in ("values", "units"):
                 raise InputError(f"{key}.{other}: not allowed beside values")
         key = f"{key}.values"
-        numbers = check_numbers(key, table["values"])
+        numbers = parameters.check_numbers(key, table["values"])
         if numbers.ndim != 1 or not numbers.size:
-            raise InputError(f"{key} = {show(table['values'])}: must be a list of one number at least")
+            raise InputError(f"{key} = {units.show(table['values'])}: must be a list of one number at least")
     else:
         numbers = _spaced(key, table)
-    units = table.get("units")
-    if units is not None and not isinstance(units, str):
-        raise InputError(f"axes.{name}.units = {show(units)}: must be a text")
+    unit = table.get("units")
+    if unit is not None and not isinstance(unit, str):
+        raise InputError(f"axes.{name}.units = {units.show(unit)}: must be a text")
     with np.errstate(over="ignore"):
-        values = numbers * conversion(f"axes.{name}.units", PARAMETERS[name]["units"], units, g)
-    check_values(name, values, key)
+        values = numbers * units.conversion(f"axes.{name}.units", variables.PARAMETERS[name]["units"], unit, g)
+    parameters.check_values(name, values, key)
     for at in np.flatnonzero(np.diff(values) <= 0.0):
         raise InputError(f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the next")
     return values
@@ -430,9 +342,9 @@ def _spaced(key: str, table: _Table) -> NDArray[np.float64]:
     for part in ("start", "stop", "num"):
         if part not in table:
             raise InputError(f"{key}.{part}: missing: an axis is values = [...], or start, stop and num")
-    start, stop = (check_finite(f"{key}.{part}", table[part]) for part in ("start", "stop"))
-    num = check_whole(f"{key}.num", table["num"], 2, _MOST_POINTS)
-    spacing = check_choice(f"{key}.spacing", table.get("spacing", "linear"), ("linear", "log"))
+    start, stop = (parameters.check_finite(f"{key}.{part}", table[part]) for part in ("start", "stop"))
+    num = parameters.check_whole(f"{key}.num", table["num"], 2, _MOST_POINTS)
+    spacing = parameters.check_choice(f"{key}.spacing", table.get("spacing", "linear"), ("linear", "log"))
     if stop <= start:
         raise InputError(f"{key}.stop = {stop}: must be greater than start, {start}")
     if spacing == "log" and start <= 0.0:
@@ -447,8 +359,8 @@ def _output(table: _Table, has_statistics: bool) -> Output:
         raise InputError("output.variables: not allowed beside [uncertainty], which has statistics as its results")
     for name in ("path", "title"):
         if not isinstance(table.get(name, ""), str):
-            raise InputError(f"output.{name} = {show(table[name])}: must be a text")
+            raise InputError(f"output.{name} = {units.show(table[name])}: must be a text")
     found = {**KEYS["output"], "variables": None, **table}
-    check_choice("output.dtype", found["dtype"], ("float64", "float32"))
-    check_whole("output.compression", found["compression"], 0, 9)
+    parameters.check_choice("output.dtype", found["dtype"], ("float64", "float32"))
+    parameters.check_whole("output.compression", found["compression"], 0, 9)
     return Output(**found)

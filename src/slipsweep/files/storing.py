@@ -30,12 +30,10 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
-from slipsweep.files.opening import check_zarr, read_result
-from slipsweep.files.outputs import appear, writing
-from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.chunks import CHUNK_CELLS, Chunk, grid_chunks, places
+from slipsweep.files.opening import check_zarr
+from slipsweep.files.outputs import EXISTS, appear, writing
+from slipsweep.grid.chunks import Chunk, places
 from slipsweep.grid.resources import size_text
-from slipsweep.grid.tally import Tally
 
 #: A file or folder, or the address of a store.
 Place = Path | str
@@ -51,16 +49,6 @@ def nbytes_of(path: Place) -> int:
     """Bytes that a result takes."""
     files, root = url_to_fs(os.fspath(path))
     return int(files.du(root))
-
-
-def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
-    """Count the results of a plan, read in chunks."""
-    tally = Tally()
-    for chunk in grid_chunks(plan.sizes, CHUNK_CELLS, plan.together):
-        part = table[list(plan.names)].isel(chunk, missing_dims="ignore")
-        tally.merge(plan.tally({name: part[name].values for name in plan.names}))
-    tally.cells = plan.cells
-    return tally
 
 
 @dataclass
@@ -89,13 +77,20 @@ class Chunks:
         """How many chunks there are along each dimension."""
         return tuple(len(own) for own in self.cut.values())
 
+    @property
+    def solved(self) -> Any:
+        """The dask array of the results of all chunks."""
+        from slipsweep.grid.graph import solved_chunks  # imports dask: only for runs in chunks
+
+        return solved_chunks(self.job.plan, self.cut)
+
     def missing(self) -> Iterator[tuple[int, tuple[int, ...]]]:
         """Number and index of every chunk to compute; one after the other: there may be more than memory holds."""
         return ((number, index) for number, index in enumerate(np.ndindex(*self.shape)) if number not in self.done)
 
     def chunk(self, number: int) -> Chunk:
         """Where a chunk lies in the grid."""
-        from slipsweep.grid.graph import chunk_at  # imports dask: only for runs in chunks
+        from slipsweep.grid.graph import chunk_at
 
         return chunk_at(self.cut, tuple(map(int, np.unravel_index(number, self.shape))))
 
@@ -103,12 +98,8 @@ class Chunks:
     def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
         """Take over the chunks of an interrupted run, or begin anew, while no other run writes this output.
 
-        Raises
-        ------
-        InputError
-            Neither may be done.
-        RunError
-            Another run is writing the output, or writing failed; a note says how many chunks are kept.
+        InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A note to any error
+        says how many chunks are kept.
         """
         with self._locked():
             self._begin(command, resume, overwrite)
@@ -116,14 +107,12 @@ class Chunks:
                 with writing(self.path):
                     yield
             except BaseException as error:
-                kept = len(self._finished())
-                error.add_note(
-                    f"{kept} of {math.prod(self.shape)} chunks are kept in {self.place}: --resume goes on"
-                    if kept
-                    else "nothing written"
-                )
-                if not kept:
+                if kept := len(self._finished()):
+                    note = f"{kept} of {math.prod(self.shape)} chunks are kept in {self.place}: --resume goes on"
+                else:
+                    note = "nothing written"
                     self._clear()
+                error.add_note(note)
                 raise
 
     @contextmanager
@@ -158,31 +147,23 @@ class Chunks:
             self._clear()
             self._check_space()
             if isinstance(self.path, str) and not overwrite and files.exists(f"{self.path.rstrip('/')}/zarr.json"):
-                raise InputError(
-                    f"{self.path}: exists already; give --overwrite to replace it, or another name with -o"
-                )
+                raise InputError(EXISTS.format(path=self.path))
             with writing(self.path):
                 files.makedirs(folder, exist_ok=True)
                 self.make(command)
                 state = {"identity": self.job.identity, "lengths": self.lengths}
                 files.pipe_file(f"{folder}/identity.json", json.dumps(state).encode())
             return
+        others = [name for name, value in self.job.identity.items() if state["identity"].get(name) != value]
+        fault = ""
         if not resume:
-            raise InputError(
-                f"{self.path}: an interrupted run has left chunks in {self.place}; give --resume to go on with them, "
-                "or --overwrite to start again"
-            )
-        for name, value in self.job.identity.items():
-            if state["identity"].get(name) != value:
-                raise InputError(
-                    f"{self.place}: has chunks of another {name}; go on with that one, or give --overwrite to start "
-                    "again"
-                )
-        if math.prod(state["lengths"].values()) > math.prod(self.lengths.values()):
-            raise InputError(
-                f"{self.place}: has larger chunks than fit into the memory asked for; give more --memory, or "
-                "--overwrite to start again"
-            )
+            fault = "has chunks of an interrupted run; give --resume to go on with them"
+        elif others:
+            fault = f"has chunks of another {others[0]}; go on with that one"
+        elif math.prod(state["lengths"].values()) > math.prod(self.lengths.values()):
+            fault = "has larger chunks than fit into the memory asked for; give more --memory"
+        if fault:
+            raise InputError(f"{self.place}: {fault}, or --overwrite to start again")
         self.lengths = state["lengths"]
         self.done = self._finished()
 
@@ -201,30 +182,25 @@ class Chunks:
 
     def _check_space(self) -> None:
         """Refuse what the disk has no room for."""
-        if isinstance(self.path, str):
-            return
-        template = self.job.plan.template()
-        needed = sum(math.prod(template[name].shape) * dtype.itemsize for name, dtype in self.job.dtypes.items())
-        free = shutil.disk_usage(self.path.parent).free
-        # a store is compressed, nobody knows how much
-        if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
-            raise InputError(f"{self.path}: takes {size_text(needed)}, but {size_text(free)} are free on the disk")
+        if isinstance(self.path, Path):
+            needed, free = self.job.outline("").nbytes, shutil.disk_usage(self.path.parent).free
+            # a store is compressed, nobody knows how much
+            if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
+                raise InputError(f"{self.path}: takes {size_text(needed)}, but {size_text(free)} are free on the disk")
 
     def make(self, command: str) -> None:
         """Make the file or store that chunks are written to."""
-        raise NotImplementedError
 
-    def written(self, solved: Any) -> Any:
-        """A dask array of chunks that are written where they are computed; None if this process writes them."""
-        return None
+    @property
+    def written(self) -> Any:
+        """As `solved`, or with a dask array that writes chunks where they are computed."""
+        return self.solved
 
     def write(self, number: int, arrays: Arrays) -> None:
         """Write a chunk, then its mark."""
-        raise NotImplementedError
 
-    def finish(self, overwrite: bool) -> Tally:
-        """Give the output its name, and count its modes and flags."""
-        raise NotImplementedError
+    def finish(self, overwrite: bool) -> None:
+        """Give the output its name."""
 
 
 @dataclass
@@ -245,8 +221,8 @@ class NetcdfChunks(Chunks):
 
     def write(self, number: int, arrays: Arrays) -> None:
         with netcdf.opened(self.result, "r+") as file:
-            for name, values in arrays.items():
-                file[name][self._region(number, file[name])] = values
+            for name in self.job.dtypes:
+                file[name][self._region(number, file[name])] = arrays[name]
         wait(self.marks[-1:])  # the disk may be slower than all else
         self.marks.append(self.marker.submit(self._mark, number))
 
@@ -260,7 +236,7 @@ class NetcdfChunks(Chunks):
         sizes = dict(zip(result.dimensions, result.shape, strict=True))
         return tuple(places(self.chunk(number), sizes).values()) or ...
 
-    def finish(self, overwrite: bool) -> Tally:
+    def finish(self, overwrite: bool) -> None:
         for mark in self.marks:
             mark.result()
         complete = self.result
@@ -275,7 +251,6 @@ class NetcdfChunks(Chunks):
                             file[name][region] = source[name][region]
         appear(complete, Path(self.path), overwrite)
         shutil.rmtree(self.place)
-        return tally_of(read_result(self.path), self.job.plan)
 
 
 class ZarrChunks(Chunks):
@@ -315,16 +290,17 @@ class ZarrChunks(Chunks):
         results = {name: (template[name].dims, dtype) for name, dtype in self.job.dtypes.items()}
         return {"store": self.store, "place": self.place, "cut": self.cut, "results": results}
 
-    def written(self, solved: Any) -> Any:
+    @property
+    def written(self) -> Any:
         import dask.array as da
 
-        meta = np.empty((0,) * solved.ndim, bool)
-        return da.map_blocks(_write_region, solved, **self._about, dtype=bool, meta=meta)
+        meta = np.empty((0,) * len(self.shape), bool)
+        return da.map_blocks(_write_region, self.solved, **self._about, dtype=bool, meta=meta)
 
     def write(self, number: int, arrays: Arrays) -> None:
         _write_region(arrays, **self._about, block_id=tuple(map(int, np.unravel_index(number, self.shape))))
 
-    def finish(self, overwrite: bool) -> Tally:
+    def finish(self, overwrite: bool) -> None:
         import zarr
 
         group = zarr.open_group(self.store, mode="r+")
@@ -333,7 +309,6 @@ class ZarrChunks(Chunks):
             appear(Path(self.store), self.path, overwrite)
         files, folder = url_to_fs(self.place)
         files.rm(folder, recursive=True)
-        return tally_of(read_result(self.path), self.job.plan)
 
 
 def _write_region(
