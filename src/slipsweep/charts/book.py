@@ -5,16 +5,15 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
 from slipsweep.charts import style
 from slipsweep.charts.maps import HATCHES
-from slipsweep.charts.slices import NAMED, Result
+from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import is_recorded
-from slipsweep.files.selection import axis_labels
+from slipsweep.files.contents import values_text
 from slipsweep.model.variables import PARAMETERS, REFERENCE
 
 #: Characters in a line.
@@ -37,9 +36,16 @@ def title_page(result: Result) -> Figure:
         f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in style.LEFT_OUT else ''}"
         for flag in HATCHES
     ]
+    coords = result.data.coords
+    inputs = [
+        style.plain(f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}: {values_text(coords[name])}")
+        for name in PARAMETERS
+        if name in coords
+    ]
+    inputs += [style.plain(f"{name}: {values_text(coords[name])}") for name in ("label", "motion") if name in coords]
     sections: dict[str, list[str]] = {
         "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
-        "Inputs": [*_inputs(result), *filter(None, [style.drawn_text(attributes)])],
+        "Inputs": [*inputs, *filter(None, [style.drawn_text(attributes)])],
         "Model and estimates": style.model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": [
             "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz",
@@ -64,18 +70,3 @@ def title_page(result: Result) -> Figure:
             lines += textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="    ")
     figure.text(0.08, 0.86, "\n".join(lines), fontsize="small", va="top", linespacing=1.4)
     return figure
-
-
-def _inputs(result: Result) -> list[str]:
-    """A line an input: its range, or its value."""
-    texts = []
-    for name in PARAMETERS:
-        if name not in result.data.coords:
-            continue
-        values, units = np.unique(result.data[name].values), style.unit(name)
-        text = style.with_unit(f"{values[0]:.4g}", units)
-        if len(values) > 1:
-            text = f"{values[0]:.4g} to {style.with_unit(f'{values[-1]:.4g}', units)}, {len(values)} values"
-        texts.append(f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}: {text}")
-    labels = {dim: axis_labels(result.data, dim) for dim in NAMED if dim in result.dims}
-    return texts + [f"{dim}s: {style.plain(', '.join(names))}" for dim, names in labels.items() if names]

@@ -8,9 +8,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, over, plot_curve
 from slipsweep.charts.slices import NAMED, Result
-from slipsweep.charts.style import SYMBOLS, Options, model_text, plain
 from slipsweep.charts.suites import draw_suite, kept_motions, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
@@ -30,7 +30,7 @@ _MOST_CURVES, _MOST_MARKS, _POINTS = 8, 20, 121
 # --------------------------------------------------------------------- of `limit_amplitude`
 
 
-def limit(result: Result, options: Options) -> Figure:
+def limit(result: Result, options: style.Options) -> Figure:
     """Limit amplitudes, in g, over one axis: a curve for each value of another, or a thin line for each motion.
 
     Curves end where no limit exists; circles mark limits set by a discontinuity of the model.  Of a suite with the
@@ -51,7 +51,7 @@ def limit(result: Result, options: Options) -> Figure:
             _draw_curves(sheet, panel)
     if sheet.x in NAMED:
         for panel in sheet.panels:
-            names = [plain(name) for name in axis_labels(sheet.data, sheet.x)]
+            names = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
             panel.axes.set_xticks(panel.values(sheet.x), names, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
     else:
@@ -64,7 +64,7 @@ def limit(result: Result, options: Options) -> Figure:
         sheet.notes.append(_suite_text(sheet.data))
     drawn = sheet.data["limit_amplitude"].sizes
     shown = {str(dim): (n, result.data.sizes[dim]) for dim, n in drawn.items()}
-    thinned = [f"{n} of {size} {SYMBOLS.get(dim, dim)}" for dim, (n, size) in shown.items() if n < size]
+    thinned = [f"{n} of {size} {style.SYMBOLS.get(dim, dim)}" for dim, (n, size) in shown.items() if n < size]
     if thinned:
         sheet.notes.append(f"Shown: {', '.join(thinned)}.")
     return sheet.done()
@@ -133,7 +133,7 @@ def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
     return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], requested)
 
 
-def hazard(result: Result, options: Options) -> Figure:
+def hazard(result: Result, options: style.Options) -> Figure:
     """The mean annual rate of exceedance over the displacement, a curve for each grid point.
 
     The displacements that the attribute ``marked`` has, by default all if they are few, have a marker.  Curves are
@@ -155,18 +155,18 @@ def hazard(result: Result, options: Options) -> Figure:
     panel.set(xscale="log", yscale="log", xlabel="permanent displacement d (mm)",
               ylabel="mean annual rate of u > d (1/year)")  # fmt: skip
     panel.grid(color="0.9", which="both")
-    for style, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
+    for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
         shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
         above = part > 0.5 * line
         joined = above | np.append(False, above[:-1]) | np.append(above[1:], False)  # no gaps between the two
-        dashed = {"color": style["color"], "linestyle": style["linestyle"]}
+        dashed = {"color": look["color"], "linestyle": look["linestyle"]}
         panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
-        panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=style["color"], linestyle=":")
-        handle = {**style, "linestyle": "none"} if marks.any() else dashed
-        (drawing.legend[plain(name)],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+        panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":")
+        handle = {**look, "linestyle": "none"} if marks.any() else dashed
+        (drawing.legend[style.plain(name)],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
     if names == [""]:
         drawing.legend.clear()
-    texts = [model_text(rates.attrs), f"hazard curve: {plain(rates.attrs['hazard_curve'])}"]
+    texts = [style.model_text(rates.attrs), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
     if (held > 0.5 * lines).any():
         texts.append("Dotted: more than half of the rate comes from above the largest amplitude of the sweep, "
                      "where P is held constant.")  # fmt: skip

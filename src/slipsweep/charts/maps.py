@@ -6,6 +6,7 @@ over a logarithmic frequency axis.
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -73,9 +74,7 @@ def contours(result: Result, options: Options) -> Figure:
     name, levels = result.quantity(options.variable), options.heights
     if len(levels) == 1:
         raise InputError(f"levels: {levels[0]:g}: must be two different values or more")
-    sheet = result.sheet(options, result.compared(name), ("frequency", "theta", "mu_s"), y=DRIVES)
-    sheet.show(name, f"Hatched {UNSOUND_HATCH}")
-    _prepare(sheet)
+    sheet = _sheet(result, options, result.compared(name), ("frequency", "theta", "mu_s"), [])
     drawn = sheet.data["drawn"]
     levels = levels or _levels(name, drawn.values)
     if not levels or not np.isfinite(drawn).any():
@@ -95,10 +94,8 @@ def newmark(result: Result, options: Options) -> Figure:
     """The ratio of the permanent displacement to that of Newmark's block."""
     if is_newmark(result.data):
         raise InputError(f"{result.name}: the result is of Newmark's block itself: the ratio is 1 everywhere")
-    names = result.compared(DISPLACEMENT)
-    sheet = result.sheet(options, names, ("theta", "mu_s", "frequency"), y=DRIVES, same=_same(result))
-    sheet.show(DISPLACEMENT, f"Hatched {UNSOUND_HATCH}")
-    _prepare(sheet)
+    across = ("theta", "mu_s", "frequency")
+    sheet = _sheet(result, options, result.compared(DISPLACEMENT), across, _same(result))
     sheet.data["drawn"] = (sheet.data["drawn"] / sheet.data["newmark"]).where(sheet.data["newmark"] > 0)
     ratio = sheet.data["drawn"].values
     there = ratio[np.isfinite(ratio) & (ratio > 0)]
@@ -118,9 +115,7 @@ def newmark(result: Result, options: Options) -> Figure:
 def modes(result: Result, options: Options) -> Figure:
     """The sliding mode of every cell, by colour and hatch."""
     across = ("theta", "yield_coefficient", "mu_s", "frequency")
-    sheet = result.sheet(options, ["sliding_mode", "validity"], across, y=DRIVES, same=_same(result))
-    sheet.show("sliding_mode", "")
-    _prepare(sheet)
+    sheet = _sheet(result, options, ["sliding_mode", "validity"], across, _same(result))
     for panel, (mode, (colour, hatch)) in itertools.product(sheet.panels, MODES.items()):
         look = {"facecolor": colour, "edgecolor": "white", "hatch": hatch}
         border = {"edgecolor": "0.6"} if mode is SlidingMode.STUCK else {}
@@ -136,8 +131,10 @@ def _same(result: Result) -> list[str]:
     return ["frequency"] if "displacement_amplitude" not in result.data.coords else []
 
 
-def _prepare(sheet: Sheet) -> None:
-    """Set the axes, and draw the lines of yield and of the mode limit."""
+def _sheet(result: Result, options: Options, names: list[str], across: Sequence[str], same: list[str]) -> Sheet:
+    """The slice of a map of the first of some results, with its axes and the lines of yield and of the mode limit."""
+    sheet = result.sheet(options, names, across, y=DRIVES, same=same)
+    sheet.show(names[0], f"Hatched {UNSOUND_HATCH}")
     for side, name in (("x", sheet.x), ("y", str(sheet.y))):
         sheet.set_axis(side, name)
     for panel, (name, (text, look)) in itertools.product(sheet.panels, style.LINES.items()):
@@ -149,6 +146,7 @@ def _prepare(sheet: Sheet) -> None:
             lines = panel.axes.contour(panel.values(panel.x), panel.values(str(panel.y)), excess, [0.0], **drawing)
             lines.set_gid(name)
             sheet.remarks[text] = Line2D([], [], **look)
+    return sheet
 
 
 # ------------------------------------------------------------------------- filled contours

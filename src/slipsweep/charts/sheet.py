@@ -27,6 +27,7 @@ from slipsweep.charts.solved import DISPLACEMENT
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
+from slipsweep.model.variables import Validity
 
 Floats = NDArray[np.float64]
 
@@ -213,10 +214,21 @@ class Sheet(Drawing):
                 _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
-        """Say which values of a result are left out: by the slice's flags and others."""
+        """Say which unreliable values of a result are left out, and which are drawn on request: by flags.
+
+        No logarithmic scale shows what is below zero: displacements upslope are left out in any case.
+        """
         flags = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
-        raised = [flag for flag in style.LEFT_OUT_TEXT if any(has_flags(one, flag).any() for one in flags)]
-        self.notes += style.left_out_text(raised, self.options.show_cautions, name == DISPLACEMENT)
+        groups: dict[str, list[str]] = {}
+        for flag, text in style.LEFT_OUT_TEXT.items():
+            if not any(has_flags(one, flag).any() for one in flags):
+                continue
+            heading = "Left out"
+            if self.options.show_cautions:
+                below_zero = name == DISPLACEMENT and flag == Validity.UPSLOPE
+                heading = "Left out, below zero on a logarithmic scale" if below_zero else "Drawn on request"
+            groups.setdefault(heading, []).append(text)
+        self.notes += [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
         """Add to the slice what charts of a result draw.
@@ -231,11 +243,23 @@ class Sheet(Drawing):
         theirs = solved.newmark(self.data)
         if theirs is not None:
             self.data["newmark"] = theirs.reset_coords(drop=True)
-            self.notes += style.ratio_text((drawn / theirs).values)
+            ratio = (drawn / theirs).where(lambda one: np.isfinite(one) & (one > 0))
+            if ratio.notnull().any():
+                low, middle, high = np.nanquantile(ratio, (0.05, 0.5, 0.95))
+                self.notes.append(
+                    f"Ratio to the displacement of Newmark's block with the same Üy: median {middle:.3g}; "
+                    f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
+                )
         falls, below = ((drawn > 0) & one for one in solved.unsound(self.data, theirs))
         self.data["unsound"] = (falls | below).transpose(*drawn.dims)
-        counts = (int(one.sum()) for one in (falls, below, self.data["unsound"], drawn > 0))
-        self.notes += style.unsound_text(marked, *counts)
+        if self.data["unsound"].any():
+            slides = int((drawn > 0).sum())
+            parts = [("falls with A", falls), ("lies below half of Newmark's", below)]
+            shares = [f"{text} in {100 * int(one.sum()) / slides:.2g} %" for text, one in parts if one.any()]
+            self.notes.append(
+                f"{marked}: {100 * int(self.data['unsound'].sum()) / slides:.2g} % of the sliding cells shown. "
+                f"The displacement {' and '.join(shares)}, a trend of the model that no block has."
+            )
 
     def done(self, beside: bool = True) -> Figure:
         """Draw legend and caption."""

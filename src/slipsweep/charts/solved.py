@@ -18,12 +18,6 @@ from slipsweep.studies.datasets import friction_parameters, sweep
 #: Amplitudes of a motion.
 DRIVES = ("amplitude", "displacement_amplitude")
 
-#: Friction decay that the paper measured on its shaking table: 2.30 and 2.70 (Table 2).
-MEASURED_DECAY = (2.0, 3.0)
-
-#: The dimension of the two sides of the mode limit.
-SIDE = "side"
-
 DISPLACEMENT = "permanent_displacement"
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
@@ -108,16 +102,6 @@ def newmark(data: xr.Dataset) -> xr.DataArray | None:
     return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])))[DISPLACEMENT]
 
 
-def sides_of(limit: xr.DataArray) -> dict[str, Any]:
-    """The amplitude on the mode limit, where the block still sticks and slips, and the next number above it.
-
-    What to give to `solve` for the results on either side, along a dimension ``side``.
-    """
-    there = np.where(np.isfinite(limit.values), limit.values, 1.0)
-    both = np.stack([there, np.nextafter(there, np.inf)], axis=-1)
-    return {"amplitude": xr.DataArray(both, dims=(*limit.dims, SIDE)), "displacement_amplitude": None}
-
-
 def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray]:
     """Where the displacement of a slice has a trend that no block has, two arrays.
 
@@ -133,21 +117,3 @@ def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray
         before = before.assign_coords({drive: ours[drive]} if drive in before.dims else {}).reset_coords(drop=True)
     below = xr.zeros_like(ours, bool) if theirs is None else ours < 0.5 * theirs
     return (ours < before * (1 - _ROUNDING)) & (ours > 0), below & (ours > 0)
-
-
-def alternatives(data: xr.Dataset) -> dict[str, tuple[Model, dict[str, Any]]]:
-    """The options that an engineer has to choose from on a slice: what to change for `solve`, by what it is called.
-
-    Newmark's block; the friction decay λ by Eq. 6, or as the paper measured it; the end of sliding by
-    Eq. 12, or by integration.  All with the slice's own yield acceleration.
-    """
-    g = float(data.attrs["g"])
-    own = MODELS.from_attributes(data.attrs)
-    ours = own if isinstance(own, Mendez) else Mendez(g=g)
-    found: dict[str, tuple[Model, dict[str, Any]]] = {"Newmark's block": (Newmark(g=g), {})}
-    for recoupling, text in (("eq12", "stop by Eq. 12"), ("integrate", "stop by integration")):
-        model = ours.but(recoupling=recoupling)
-        found[f"λ by Eq. 6, {text}"] = (model, {"decay_rate": None})
-        for rate in MEASURED_DECAY:
-            found[f"λ = {rate:g}, {text}"] = (model, {"decay_rate": rate, "minimum_friction": None})
-    return found

@@ -1,7 +1,7 @@
 """How charts look and what they say: options, colours, symbols, units, labels, captions, cautions."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -274,43 +274,3 @@ def drawn_text(attributes: Mapping[Any, Any]) -> str:
         texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
     pooled = f"{plain(attributes['pooled'])} x " if "pooled" in attributes else ""
     return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"
-
-
-def left_out_text(raised: Iterable[Validity], show_cautions: bool, of_displacement: bool) -> list[str]:
-    """Which unreliable values are left out, and which are drawn on request.
-
-    No logarithmic scale shows what is below zero: displacements upslope are left out in any case.
-    """
-    always = Validity.UPSLOPE if of_displacement else Validity(0)
-    groups: dict[str, list[str]] = {}
-    for flag in raised:
-        if show_cautions and flag not in always:
-            heading = "Drawn on request"
-        else:
-            heading = "Left out, below zero on a logarithmic scale" if show_cautions else "Left out"
-        groups.setdefault(heading, []).append(LEFT_OUT_TEXT[flag])
-    return [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
-
-
-def ratio_text(ratio: np.ndarray) -> list[str]:
-    """How the displacements drawn compare with those of Newmark's block: a sentence, or none."""
-    there = ratio[np.isfinite(ratio) & (ratio > 0)]
-    if not there.size:
-        return []
-    low, middle, high = np.quantile(there, (0.05, 0.5, 0.95))
-    return [
-        f"Ratio to the displacement of Newmark's block with the same Üy: median {middle:.3g}; "
-        f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
-    ]
-
-
-def unsound_text(marked: str, falls: int, below: int, either: int, total: int) -> list[str]:
-    """What share of a picture no block would show: a sentence, or none."""
-    if not either or not total:
-        return []
-    parts = [("falls with A", falls), ("lies below half of Newmark's", below)]
-    shares = [f"{text} in {100 * count / total:.2g} %" for text, count in parts if count]
-    return [
-        f"{marked}: {100 * either / total:.2g} % of the sliding cells shown. The displacement {' and '.join(shares)}, "
-        "a trend of the model that no block has."
-    ]

@@ -18,7 +18,6 @@ from slipsweep.charts import statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, has_flags, log_axis, log_ticks, over, plot_curve, reliable
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DISPLACEMENT
-from slipsweep.charts.style import BLUE, Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
 from slipsweep.studies.suite_statistics import QUANTILES, SUITE, suite_statistics
@@ -46,8 +45,8 @@ _LABEL = "permanent displacement (mm)"
 
 _THIN: dict[str, Any] = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
 _BAND: dict[str, Any] = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
-_EDGE: dict[str, Any] = {"color": BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
-_MEDIAN: dict[str, Any] = {"color": BLUE, "linewidth": 2.4, "zorder": 2.3}
+_EDGE: dict[str, Any] = {"color": style.BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
+_MEDIAN: dict[str, Any] = {"color": style.BLUE, "linewidth": 2.4, "zorder": 2.3}
 _NEWMARK: dict[str, Any] = {"color": "black", "linewidth": 1.2, "linestyle": ":", "zorder": 2.4}
 _BARS: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
 
@@ -55,7 +54,7 @@ _BARS: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "black", "linewidth":
 # ------------------------------------------------------------------------------- the kinds
 
 
-def motions(result: Result, options: Options) -> Figure:
+def motions(result: Result, options: style.Options) -> Figure:
     """Displacements over one axis: a thin line for each motion, the suite's median and its 16 to 84 % band.
 
     With the median of Newmark's block where the file has it.
@@ -82,7 +81,7 @@ def motions(result: Result, options: Options) -> Figure:
     return sheet.done()
 
 
-def intensity(result: Result, options: Options) -> Figure:
+def intensity(result: Result, options: style.Options) -> Figure:
     """The displacement of each motion against an intensity measure, and the regression of ln u on its logarithm.
 
     The measure is that of the motion as it shakes the block.
@@ -107,7 +106,7 @@ def intensity(result: Result, options: Options) -> Figure:
         panel.axes.set_xlabel(f"{text} ({style.unit_text(INTENSITY_MEASURES[measure]['units'])})")
         low = panel.axes.get_ylim()[0]
         groups: list[tuple[str, NDArray[np.bool_], dict[str, Any]]] = [
-            ("polarity 1" if negative.any() else "a motion", ~negative, {"marker": "o", "color": BLUE}),
+            ("polarity 1" if negative.any() else "a motion", ~negative, {"marker": "o", "color": style.BLUE}),
             ("polarity −1", negative, {"marker": "s", "color": style.VERMILION, "markerfacecolor": "white"}),
         ]
         for name, which, look in groups:
@@ -131,7 +130,7 @@ def intensity(result: Result, options: Options) -> Figure:
     return sheet.done()
 
 
-def histogram(result: Result, options: Options) -> Figure:
+def histogram(result: Result, options: style.Options) -> Figure:
     """How many motions of a suite have which displacement, with the share of zeros."""
     sheet = _sheet(result, options, "motion")
     everything = _millimetres(sheet.data)
@@ -161,7 +160,7 @@ def histogram(result: Result, options: Options) -> Figure:
     return sheet.done()
 
 
-def fragility(result: Result, options: Options) -> Figure:
+def fragility(result: Result, options: style.Options) -> Figure:
     """The share of the motions of a suite that exceed a displacement, over one axis."""
     sheet = _sheet(result, options, _axes(result))
     found = suite_statistics(sheet.data, thresholds=options.heights or _THRESHOLDS, quantiles=QUANTILES)
@@ -185,7 +184,7 @@ def _axes(result: Result) -> list[str]:
     return [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
 
 
-def _sheet(result: Result, options: Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
+def _sheet(result: Result, options: style.Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
     return result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
 
 
@@ -204,7 +203,7 @@ def draw_suite(
         axes.plot(xs, edge, gid="edge", **_EDGE)
     plot_curve(axes, xs, quantiles[1], gid="median", **_MEDIAN)
     legend["median"] = Line2D([], [], **_MEDIAN)
-    legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=BLUE, linestyle="--")
+    legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--")
     if len(lines):
         legend["a motion"] = Line2D([], [], **_THIN)
 
