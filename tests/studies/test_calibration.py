@@ -11,7 +11,7 @@ import xarray as xr
 import slipsweep
 from benchmarks.calibration import drawn, sensed
 from slipsweep import InputError, cli
-from slipsweep.studies.confidence import SQUARE, Search
+from slipsweep.studies.estimate import SQUARE, Search
 from slipsweep.studies.findings import sweep_file_text
 from tests.support.shaking import CALIBRATED, SOUGHT, coulomb, exact, measured
 
@@ -72,9 +72,9 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
 
 @pytest.mark.parametrize("kind", ["eq4", "yield", "continuous"])
 def test_coverage(kind: str) -> None:
-    """Of 3 x 6 intervals at 95 % three or more miss in 6 % of all such draws; these seeds are fixed."""
+    """Of 3 x 4 intervals at 95 % three or more miss in 2 % of all such draws; these seeds are fixed."""
     missed = 0
-    for seed in range(6):
+    for seed in range(4):
         case, test = drawn(kind, seed)
         found = slipsweep.calibrate(
             sensed(test, ("white", "12 bits")[seed % 2], seed), case["theta"], case["mu_s"], cycles=False
@@ -82,7 +82,7 @@ def test_coverage(kind: str) -> None:
         for name in SOUGHT:
             low, high = found[f"{name}_interval"].values
             missed += not low <= case[name] <= high
-    assert missed <= 3
+    assert missed <= 2
 
 
 def test_two_branches_are_united_and_a_second_test_tells_them_apart(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_two_branches_are_united_and_a_second_test_tells_them_apart(tmp_path: Pa
     assert all(line.startswith("#") for line in found.attrs["model_table"].splitlines())
     assert "# WARNING: not ready for use.\n# Üy, λ and Δμ are not determined" in found.attrs["model_table"]
     assert found.attrs["uncertainty_table"] == ""
-    strong = measured(exact({**BRANCHES, "amplitude": 5.0}), seed=1, noise=0.01)
+    strong = measured(exact({**BRANCHES, "amplitude": 7.0}), seed=1, noise=0.01)
     both = slipsweep.calibrate([weak, strong], 5.0, 0.38, cycles=False)
     check_intervals(both, BRANCHES, 1.0)
     assert both.sizes["test"] == 2
@@ -116,14 +116,13 @@ def test_a_branch_is_compared_with_its_own_least() -> None:
             return np.array([(point[0] - 0.4) / 0.01, 2.0])
         return np.array([(point[0] - 0.8) / 0.01, (point[1] - 1.0) / 0.1])
 
-    def branch(point: np.ndarray) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        name = ("low" if point[0] < 0.5 else "high",)
-        return name, name
+    def branch(point: np.ndarray) -> tuple[str, ...]:
+        return ("low" if point[0] < 0.5 else "high",)
 
     search = Search(residuals, branch)
     for start in (0.41, 0.79):
         search.polish(np.array([start, 0.9, 0.1]))
-    low, high = (search.end(0, side, 0.02)[0] for side in (-1, 1))
+    low, high = (search.end(0, side, 0.02) for side in (-1, 1))
     assert low == pytest.approx(0.4 - 0.01 * SQUARE**0.5, abs=1e-3)
     assert high == pytest.approx(0.8 + 0.01 * SQUARE**0.5, abs=1e-3)
 
@@ -179,7 +178,7 @@ def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
 
 
 def test_unequal_sampling_gaps_and_an_early_end(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"], seed=7).isel(time=slice(0, 700))
+    test = measured(clean["stick_slip"], seed=7).isel(time=slice(0, 520))
     kept = np.sort(np.random.default_rng(1).permutation(test.time.size)[: test.time.size * 3 // 4])
     test.relative_velocity.values[300:400] = np.nan
     check_intervals(calibrated(test.isel(time=kept)), CALIBRATED["stick_slip"])

@@ -24,11 +24,11 @@ CONTINUOUS: dict[str, Any] = {
 CALIBRATED: dict[str, dict[str, Any]] = {
     "stick_slip": {
         "theta": 5.0, "mu_s": 0.38, "amplitude": 5.0, "frequency": 2.0,
-        "yield_acceleration": 1.8, "decay_rate": 2.0, "delta_mu": 0.1, "excitation": slipsweep.Sine(cycles=8),
+        "yield_acceleration": 1.8, "decay_rate": 2.0, "delta_mu": 0.1, "excitation": slipsweep.Sine(cycles=5),
     },
     "continuous": {
         "theta": 6.0, "mu_s": 0.38, "amplitude": 7.0, "frequency": 2.5,
-        "yield_acceleration": 2.0, "decay_rate": 2.3, "delta_mu": 0.05, "excitation": slipsweep.Sine(cycles=8),
+        "yield_acceleration": 2.0, "decay_rate": 2.3, "delta_mu": 0.05, "excitation": slipsweep.Sine(cycles=5),
     },
 }  # fmt: skip
 

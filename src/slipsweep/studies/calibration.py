@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
@@ -106,27 +107,45 @@ def calibrate(
     if not isinstance(chosen, options.Mendez):
         raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
     drifts = [drift] if isinstance(drift, str) else list(drift)
+    _check_noise(noise)
 
     def observed(*more: str) -> list[Observation]:
-        return [_observation(one, theta, mu_s, chosen, offset, [*drifts, *more], noise) for one in tests]
+        return [_observation(one, theta, mu_s, chosen, offset, [*drifts, *more], noise or {}) for one in tests]
 
     observations = observed()
     found = estimate(observations)
-    episodes = [[] if "continuous" in found.readings else _upslope(one) for one in tests]
-    if any(episodes):
-        for one, times in zip(observations, episodes, strict=True):
-            _leave_out(one, times)
+    slips = [[] if "continuous" in found.readings else _upslope_slips(one) for one in tests]
+    if any(slips):
+        for one, episodes in zip(observations, slips, strict=True):
+            _leave_out(one, episodes)
         found = estimate(observations)
-    coefficients = [_coefficients(one) for one in observations]
+    coefficients = [findings.coefficients(one) for one in observations]
     drifting: list[str] = []
-    if findings.misfits_of(found) and not any(one.attrs["constant_friction"] for one in coefficients):
+    if findings.misfits(found) and not any(one.attrs["constant_friction"] for one in coefficients):
         # of which channels an offset and a drift, that were not given, would explain a misfit
         measured = [name for name in RESPONSES if all(name in one.responses for one in tests) and name not in drifts]
-        drifting = [name for name in measured if not findings.misfits_of(estimate(observed(name)))]
-    said = findings.report(found, episodes, coefficients, drifting)
-    parts = [_test_dataset(one, linear, found, cycles) for one, linear in zip(observations, found.linears, strict=True)]
+        drifting = [name for name in measured if not findings.misfits(estimate(observed(name)))]
+    parts = [_of_test(one, linear, found, cycles) for one, linear in zip(observations, found.linears, strict=True)]
     whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
-    return _with_estimates(whole, found, said, coefficients[0], tests)
+    removed = "; ".join(dict.fromkeys(np.atleast_1d(whole["removed"].values).tolist()))
+    whole = whole.drop_vars("removed").merge(_of_all(found)).assign(coefficients[0].variables)
+    whole.attrs = {
+        "title": "Calibration of a sliding block from tests on a shaking table",
+        **friction.SOURCE,
+        **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(one.name for one in tests)}),
+        **options.MODELS.attributes(chosen),
+        "removed": removed,
+        **findings.report(found, slips, coefficients, drifting),
+    }
+    return whole
+
+
+def _check_noise(noise: Any) -> None:
+    if noise is not None and not isinstance(noise, Mapping):
+        raise InputError(f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations")
+    for name, value in (noise or {}).items():
+        if not parameters.check_finite(f"noise.{name}", value) > 0.0:
+            raise InputError(f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0")
 
 
 def _observation(
@@ -136,118 +155,76 @@ def _observation(
     model: options.Mendez,
     offset: Any,
     drift: Any,
-    noise: Mapping[str, float] | None,
+    noise: Mapping[str, float],
 ) -> Observation:
     """A test with what is given of its sensors, checked."""
     if not test.responses:
         raise InputError(
             f"{test.name}: nothing of the block was measured: must have one at least of {', '.join(RESPONSES)}"
         )
-    if noise is not None and not isinstance(noise, Mapping):
-        raise InputError(f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations")
-    known = dict(noise or {})
-    check_channels("noise", list(known), test.responses)
-    for name, value in known.items():
-        if not parameters.check_finite(f"noise.{name}", value) > 0.0:
-            raise InputError(f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0")
+    check_channels("noise", list(noise), test.responses)
     friction.check_contact(test, theta, model.g)
     if not float(test.channels[TABLE].max()) > 0.0:
         raise InputError(f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope")
     offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
-    return Observation(test, theta, mu_s, model, offsets, drifts, known)
+    return Observation(test, theta, mu_s, model, offsets, drifts, noise)
 
 
 # ------------------------------------------------------------------------------ upslope slips
 
 
-def _upslope(test: ShakingTest) -> list[tuple[float, float]]:
+def _upslope_slips(test: ShakingTest) -> list[tuple[float, float]]:
     """From when to when the block slips upslope, which stick-slip does not have."""
-    times = test.times
     velocity = test.channels.get("relative_velocity")
-    if velocity is None and "relative_displacement" in test.channels:
-        velocity = np.gradient(test.channels["relative_displacement"], times)
     if velocity is None:
-        return []
+        if "relative_displacement" not in test.channels:
+            return []
+        velocity = np.gradient(test.channels["relative_displacement"], test.times)
     noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
-    wrong = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(int)))
-    episodes: list[tuple[float, float]] = []
-    for first, after in zip(edges[::2], edges[1::2], strict=True):
-        if after - first < _UPSLOPE_SAMPLES:
-            continue
-        begin, end = float(times[max(first - 4, 0)]), float(times[min(after + 3, times.size - 1)])
-        if episodes and begin <= episodes[-1][1]:
-            episodes[-1] = episodes[-1][0], end
-        else:
-            episodes.append((begin, end))
-    return episodes
+    upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
+    several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
+    slips = ndimage.find_objects(ndimage.label(ndimage.binary_dilation(several, iterations=3))[0])
+    return [(float(test.times[part.start]), float(test.times[part.stop - 1])) for (part,) in slips]
 
 
-def _leave_out(observation: Observation, episodes: Sequence[tuple[float, float]]) -> None:
+def _leave_out(one: Observation, slips: Sequence[tuple[float, float]]) -> None:
     """Leave out the samples of upslope slips, after each of which the displacement may have stepped."""
-    times = observation.test.times
-    for begin, end in episodes:
-        for name, use in observation.use.items():
-            observation.use[name] = use & ~((times >= begin) & (times <= end))
-        if "relative_displacement" in observation.use:
-            size = 3.0 * float(np.nanmax(np.abs(observation.test.channels["relative_displacement"])))
+    times = one.test.times
+    for begin, end in slips:
+        for name, use in one.use.items():
+            one.use[name] = use & ~((times >= begin) & (times <= end))
+        if "relative_displacement" in one.use:
+            size = 3.0 * float(np.nanmax(np.abs(one.test.channels["relative_displacement"])))
             step = {"relative_displacement": size * (times > end).astype(np.float64)}
-            observation.lines.append(Line(f"upslope slip at {begin:.4g} s of relative_displacement", step, size))
+            one.lines.append(Line(f"upslope slip at {begin:.4g} s of relative_displacement", step, size))
 
 
 # ------------------------------------------------------------------------------------ results
 
 
-def _block_acceleration(test: ShakingTest) -> Floats | None:
-    """The block's acceleration, measured or from the relative velocity."""
-    if "block_acceleration" in test.channels:
-        return test.channels["block_acceleration"]
-    if "relative_velocity" in test.channels:
-        return np.asarray(test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times))
-    return None
-
-
-def _coefficients(one: Observation) -> xr.Dataset:
-    """Friction by statics; nothing where neither the block's acceleration nor its velocity is measured."""
-    test, block = one.test, _block_acceleration(one.test)
-    if block is None:
-        return xr.Dataset(attrs={"constant_friction": ""})
-    smooth = np.interp(test.times, one.motion.times, one.motion.acceleration)
-    slides = friction.slides_of(test.times, smooth, block, friction.threshold_of(smooth, block)[0])
-    return friction.coefficients_of(smooth, block, slides, one.mu_s, one.theta, one.model.g)
-
-
-def _test_dataset(one: Observation, linear: Linear, found: Estimate, cycles: bool) -> xr.Dataset:
+def _of_test(one: Observation, linear: Linear, found: Estimate, cycles: bool) -> xr.Dataset:
     """What belongs to one test: measured and computed series, misfits, cycles, what was removed."""
-    test = one.test
-    history = linear.forward(found.parameters, test.times)
+    test, history = one.test, linear.forward(found.parameters, one.test.times)
     added, removed = _removed(one, linear, found.parameters)
-    data: dict[str, Any] = {}
     about = variables.CALIBRATION_SERIES | variables.MEASURED_FRICTION
-    for name, values in test.channels.items():
-        data[f"measured_{name}"] = (("time",), values - added[name], about[f"measured_{name}"])
-    for name in HISTORY:
-        data[f"computed_{name}"] = (
-            ("time",),
-            history[:, COLUMN[name]],
-            variables.CALIBRATION_SERIES[f"computed_{name}"],
-        )
-    block = _block_acceleration(test)
+    series = {f"measured_{name}": values - added[name] for name, values in test.channels.items()}
+    series |= {f"computed_{name}": history[:, at] for name, at in COLUMN.items()}
+    block = findings.block_acceleration(test)
     if block is not None:
-        free = friction.free_body_friction(block - added.get("block_acceleration", 0.0), one.theta, one.model.g)
-        eq1 = friction.eq1_friction(data[f"measured_{TABLE}"][1], block, one.theta, one.mu_s, one.model.g)
-        data["friction_coefficient"] = (("time",), eq1, about["friction_coefficient"])
-        data["free_body_friction"] = (("time",), free, about["free_body_friction"])
+        block = block - added.get("block_acceleration", 0.0)
+        table = series[f"measured_{TABLE}"]
+        series["friction_coefficient"] = friction.eq1_friction(table, block, one.theta, one.mu_s, one.model.g)
+        series["free_body_friction"] = friction.free_body_friction(block, one.theta, one.model.g)
+    data: dict[str, Any] = {name: ("time", values, about[name]) for name, values in series.items()}
     for name, rest in linear.unexplained(found.parameters).items():
         misfit = float(np.sqrt(np.mean(rest**2)))
         span = max(float(np.nanmax(np.abs(history[:, COLUMN[name]]))), 1e-300)
         long_name = f"root mean square of measured less computed {HISTORY[name]['long_name']}"
         data[f"misfit_{name}"] = ((), misfit, {**HISTORY[name], "long_name": long_name})
         data[f"relative_misfit_{name}"] = ((), misfit / span, {"units": "1", "long_name": f"{long_name}, over largest"})
-    for name in ("permanent_displacement", "validity"):
-        data[name] = found.summary(one)[name].variable
-    data["removed"] = ((), "; ".join(removed) or "nothing", {"long_name": "offsets, drifts and steps taken off"})
-    dataset = xr.Dataset(data, {"time": ("time", test.times, {"units": "s", "long_name": "time"})}, dict(test.attrs))
+    data |= {name: found.summary(one)[name].variable for name in ("permanent_displacement", "validity")}
+    data["removed"] = ((), "; ".join(removed) or "nothing")
+    dataset = xr.Dataset(data, {"time": ("time", test.times, {"units": "s", "long_name": "time"})})
     return dataset.merge(_cycles(one, linear, found)) if cycles else dataset
 
 
@@ -260,90 +237,67 @@ def _removed(one: Observation, linear: Linear, parameters: Floats) -> tuple[dict
     for at, line in enumerate([*one.table_lines, *one.lines], first):
         for name, part in line.parts.items():
             added[name] = added[name] + values[at] * part
+            value, error = (line.deviation * number[at] for number in (values, spread))
             over = " over the whole test" if line.name.startswith("drift") else ""
-            texts.append(
-                f"{line.name}: {values[at] * line.deviation:.4g} ± {spread[at] * line.deviation:.2g} "
-                f"{HISTORY[name]['units']}{over}"
-            )
+            texts.append(f"{line.name}: {value:.4g} ± {error:.2g} {HISTORY[name]['units']}{over}")
     return added, texts
 
 
 def _cycles(one: Observation, linear: Linear, found: Estimate) -> xr.Dataset:
     """Each cycle by itself: estimates, standard errors and Kd."""
-    peak, onset = one.peak, float(found.parameters[0])
-    above = np.concatenate([[False], one.motion.acceleration > 0.0, [False]])
-    edges = np.flatnonzero(np.diff(above.astype(int)))
+    motion, continuous = one.motion, "continuous" in found.readings
     pulses = [
-        (float(one.motion.times[first]), float(one.motion.acceleration[first:after].max()))
-        for first, after in zip(edges[::2], edges[1::2], strict=True)
+        (float(motion.times[part.start]), float(motion.acceleration[part].max()))
+        for (part,) in ndimage.find_objects(ndimage.label(motion.acceleration > 0.0)[0])
     ]
-    pulses = [(begin, top) for begin, top in pulses if top > max(onset, _A_CYCLE * peak)]
-    ends = [begin for begin, _ in pulses[1:]] + [float(one.motion.times[-1])]
-    continuous = "continuous" in found.readings
-    data: dict[str, Any] = {
-        name: np.full(len(pulses), np.nan) for name in variables.CALIBRATION if name.startswith("cycle_")
-    }
+    pulses = [(begin, top) for begin, top in pulses if top > max(found.parameters[0], _A_CYCLE * one.peak)]
+    data = {name: np.full(len(pulses), np.nan) for name in variables.CALIBRATION if name.startswith("cycle_")}
     data["cycle_start"], data["cycle_peak_acceleration"] = np.array(pulses).reshape(-1, 2).T
-    data["cycle_sliding_mode"] = np.full(len(pulses), 2 if continuous else 1, np.int8)
+    ends = [*data["cycle_start"][1:], motion.times[-1]]
+    speed = max(
+        float(np.abs(linear.forward(found.parameters, one.test.times)[:, COLUMN["relative_velocity"]]).max()), 1e-6
+    )
     for row, ((begin, _), end) in enumerate(zip(pulses, ends, strict=True)):
         inside = (one.test.times >= begin) & (one.test.times < end)
         if inside.sum() < _FEWEST_IN_A_CYCLE:
             continue
-        values, errors = cycle_estimate(linear, found, begin, end, free=(1, 2) if continuous else (0, 1, 2))
+        part = linear.between(begin, end, speed)
+        values, errors = cycle_estimate(part, found, free=(1, 2) if continuous else (0, 1, 2))
         for name, value, error in zip(SOUGHT, values, errors, strict=True):
             data[f"cycle_{name}"][row], data[f"cycle_{name}_error"][row] = value, error
         history = linear.forward(np.where(np.isfinite(values), values, found.parameters), one.test.times)
         slides = inside & (history[:, COLUMN[TABLE]] > 0.0)
         if slides.any() and not continuous:
-            held = float(history[slides, COLUMN["block_acceleration"]].max())
-            data["cycle_attenuation_coefficient"][row] = held / one.model.g
+            data["cycle_attenuation_coefficient"][row] = (
+                history[slides, COLUMN["block_acceleration"]].max() / one.model.g
+            )
+    mode = variables.SlidingMode.CONTINUOUS if continuous else variables.SlidingMode.STICK_SLIP
+    data["cycle_sliding_mode"] = np.full(len(pulses), mode, np.int8)
     number = ("cycle", np.arange(1, len(pulses) + 1), {"units": "1", "long_name": "number of the cycle"})
     return xr.Dataset(
-        {name: (("cycle",), values, variables.CALIBRATION[name]) for name, values in data.items()}, {"cycle": number}
+        {name: ("cycle", values, variables.CALIBRATION[name]) for name, values in data.items()}, {"cycle": number}
     )
 
 
-def _with_estimates(
-    dataset: xr.Dataset,
-    found: Estimate,
-    said: Mapping[str, str],
-    coefficients: xr.Dataset,
-    tests: Sequence[ShakingTest],
-) -> xr.Dataset:
-    """What belongs to all tests together: parameters, intervals, correlation, sentences and tables."""
-    first = found.observations[0]
-    data: dict[str, Any] = {}
+def _of_all(found: Estimate) -> xr.Dataset:
+    """What belongs to all tests together: parameters, errors, intervals, correlation."""
+    data: dict[str, Any] = {
+        "correlation": (("parameter", "other_parameter"), found.correlation, variables.CALIBRATION["correlation"])
+    }
     for at, name in enumerate(SOUGHT):
         about = variables.PARAMETERS[name]
-        data[name] = ((), found.parameters[at], about)
-        data[f"{name}_error"] = (
-            (),
-            found.errors[at],
-            {**about, "long_name": f"standard error of the {about['long_name']}"},
-        )
+        error = {**about, "long_name": f"standard error of the {about['long_name']}"}
         interval = {**about, "long_name": f"95 % interval of the {about['long_name']}"}
-        data[f"{name}_interval"] = (("bound",), found.intervals[at], interval)
-    data["correlation"] = (("parameter", "other_parameter"), found.correlation, variables.CALIBRATION["correlation"])
-    place = np.arange(3, dtype=np.int8)
-    names = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
+        data[name] = ((), found.parameters[at], about)
+        data[f"{name}_error"] = ((), found.errors[at], error)
+        data[f"{name}_interval"] = ("bound", found.intervals[at], interval)
+    codes = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
+    first = found.observations[0]
     coords = {
-        "parameter": (("parameter",), place, {"long_name": "parameter", **names}),
-        "other_parameter": (("other_parameter",), place, {"long_name": "other parameter", **names}),
+        "parameter": ("parameter", np.arange(3, dtype=np.int8), {"long_name": "parameter", **codes}),
+        "other_parameter": ("other_parameter", np.arange(3, dtype=np.int8), {"long_name": "other parameter", **codes}),
         "bound": friction.BOUND,
         "theta": ((), first.theta, variables.PARAMETERS["theta"]),
         "mu_s": ((), first.mu_s, variables.PARAMETERS["mu_s"]),
     }
-    dataset = dataset.assign(data | {str(name): one.variable for name, one in coefficients.items()}).assign_coords(
-        coords
-    )
-    removed = dict.fromkeys(np.atleast_1d(dataset["removed"].values).tolist())
-    dataset = dataset.drop_vars("removed")
-    dataset.attrs = {
-        "title": "Calibration of a sliding block from tests on a shaking table",
-        **friction.SOURCE,
-        **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(test.name for test in tests)}),
-        **options.MODELS.attributes(first.model),
-        "removed": "; ".join(removed),
-        **said,
-    }
-    return dataset
+    return xr.Dataset(data, coords)

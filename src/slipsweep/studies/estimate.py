@@ -1,34 +1,55 @@
-"""Üy, λ and Δμ from one or several tests: where to look, the best, and the intervals."""
+"""Üy, λ and Δμ from one or several tests: the best, and all that the data allow.
 
+Where the yield acceleration governs, λ and Δμ may be nearly anything; where Eq. 4 crosses the table's acceleration,
+Üy may.  A standard error describes neither, so an interval is the profile likelihood's: all values of a parameter
+for which some values of the others raise the sum of squares by less than the quantile of χ².
+
+These branches have different numbers of parameters that matter, and the one with most always fits best.  So a sum of
+squares is compared with the least of its own branch, for every branch that a much better one does not refute, and the
+interval is the union over these branches.
+"""
+
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import brentq, least_squares
 
-from slipsweep.studies.confidence import LEAST, MOST, SQUARE, Search
 from slipsweep.studies.datasets import sweep
-from slipsweep.studies.likelihood import COLUMN, SOUGHT, Linear, Observation
+from slipsweep.studies.likelihood import SOUGHT, Linear, Observation
 
 Floats = NDArray[np.float64]
 
-#: Where the search begins: Üy in parts of the table's peak A, λA/g, ln(1 + Δμ/μs).
+#: What decides the block's acceleration, of each test.
+Readings = tuple[str, ...]
+
+#: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which it is refuted.
+SQUARE, REFUTED = 3.841, 9.0
+
+#: Bounds of the search: Üy over the table's peak A, λA/g, ln(1 + Δμ/μs).
+LEAST, MOST = np.array([1e-4, 0.0, 0.0]), np.array([1.0, 20.0, 3.0])
+
+#: Where the search begins.
 _ONSETS = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 _DECAYS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _EXCESS = (0.02, 0.1, 0.25)
 
 #: Starts that are followed roughly, and those of them that are followed to the end.
-_ROUGH, _FINE = 10, 4
+_ROUGH, _FINE = 8, 4
+
+#: Most rounds in which the table's motion, the noise and the samples next to jumps settle.
+_ROUNDS = 5
+
+#: Accelerations of the table, in parts of its peak, at which friction is kept as λ and Δμ change together.
+_KEPT = (0.3, 0.6, 1.0)
 
 #: A parameter is not determined if half its interval is more than this part of it; of Δμ, of μs + Δμ.
 _UNDETERMINED = (0.5, 0.5, 0.3)
-
-#: Most rounds in which the table's motion, the noise and the samples beside jumps settle.
-_ROUNDS = 5
 
 
 class Scale:
@@ -48,45 +69,203 @@ class Scale:
         """Derivatives of Üy, λ and Δμ by the scaled ones."""
         return np.array([self.peak, self.g / self.peak, self.mu_s * math.exp(point[2])])
 
-    def branch(self, point: Floats) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """The branch of each test, and its reading: what decides the block's acceleration.
+    def readings(self, point: Floats) -> Readings:
+        """What decides the block's acceleration in each test."""
+        return tuple(self._reading(point, peak) for peak in self.peaks)
+
+    def _reading(self, point: Floats, peak: float) -> str:
+        """What decides the block's acceleration in a test of this peak.
 
         "continuous": Eq. 4 throughout.  "all": first Üy, later Eq. 4.  "crossing": Eq. 4, from where it crosses the
-        table's acceleration on; Üy plays no part.  "constant": one value, either Üy ("held"), or that at the crossing
-        ("crossed").
+        table's acceleration on; Üy plays no part.  One value throughout: "held", Üy; "crossed", that at the crossing.
         """
         onset, decay, excess = point
-        branches, readings = [], []
-        for peak in self.peaks:
-            table = np.linspace(0.0, 1.0, 65)[1:] * peak
-            coupled = self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
-            response = table - (self.g + table * self.tan_theta) * coupled - self.g * self.tan_theta
-            limit = (onset * self.peak + self.g * self.mu_s) / (1.0 - self.tan_theta * (self.mu_s - self.tan_theta))
-            above = table > onset * self.peak
-            slides = above & (response < table)
-            first = int(np.argmax(slides))
-            crossed = bool(above[:first].any()) or not slides.any()
-            begins = max(onset * self.peak, float(response[first]))
-            if peak > limit:
-                branch = reading = "continuous"
-            elif not slides.any() or float(response[first:].max()) <= begins:
-                branch, reading = "constant", "crossed" if crossed else "held"
-            else:
-                branch = reading = "crossing" if crossed else "all"
-            branches.append(branch)
-            readings.append(reading)
-        return tuple(branches), tuple(readings)
+        table = np.linspace(0.0, 1.0, 65)[1:] * peak
+        coupled = self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
+        response = table - (self.g + table * self.tan_theta) * coupled - self.g * self.tan_theta
+        if peak > (onset * self.peak + self.g * self.mu_s) / (1.0 - self.tan_theta * (self.mu_s - self.tan_theta)):
+            return "continuous"
+        above = table > onset * self.peak
+        slides = above & (response < table)
+        first = int(np.argmax(slides))
+        crosses = bool(above[:first].any()) or not slides.any()
+        if not slides.any() or float(response[first:].max()) <= max(onset * self.peak, float(response[first])):
+            return "crossed" if crosses else "held"
+        return "crossing" if crosses else "all"
 
-    def crossing(self, onset: float, decay: float) -> float:
-        """ln(1 + Δμ/μs) with which Eq. 4 crosses the table's acceleration at the part `onset` of its peak."""
-        return self.following(onset, onset, decay)
-
-    def following(self, table: float, block: float, decay: float) -> float:
+    def excess(self, table: float, block: float, decay: float) -> float:
         """ln(1 + Δμ/μs) with which Eq. 4 gives the block's acceleration for one of the table, in parts of the peak."""
         normal = self.g + table * self.peak * self.tan_theta
         behind = (table - block) * self.peak - self.g * self.tan_theta
-        friction = self.mu_s - self.tan_theta - behind / normal
-        return math.log(max(friction, 1e-3) / self.mu_s) + decay * table
+        return math.log(max(self.mu_s - self.tan_theta - behind / normal, 1e-3) / self.mu_s) + decay * table
+
+
+class Search:
+    """All points tried, with their sums of squares and readings.
+
+    Parameters
+    ----------
+    residuals : callable
+        Independent residuals of scaled parameters (`LEAST`, `MOST`).
+    readings : callable
+        The reading of each test for scaled parameters (`Scale.readings`).
+    """
+
+    def __init__(self, residuals: Callable[[Floats], Floats], readings: Callable[[Floats], Readings]) -> None:
+        self._residuals, self._readings = residuals, readings
+        self.points: list[Floats] = []
+        self.squares: list[float] = []
+        self.readings: list[Readings] = []
+        self._least: dict[Readings, float] = {}
+
+    @staticmethod
+    def _branch(readings: Readings) -> Readings:
+        """Readings of one branch: whether Üy or a crossing decides a constant acceleration, the least is the same."""
+        return tuple("held" if one == "crossed" else one for one in readings)
+
+    def residuals(self, point: Floats) -> Floats:
+        """Residuals; the point is kept."""
+        rest, readings = self._residuals(point), self._readings(point)
+        self.points.append(np.array(point))
+        self.squares.append(float(rest @ rest))
+        self.readings.append(readings)
+        branch = self._branch(readings)
+        self._least[branch] = min(self.squares[-1], self._least.get(branch, math.inf))
+        return rest
+
+    def square(self, point: Floats) -> float:
+        """Sum of squares; the point is kept."""
+        self.residuals(point)
+        return self.squares[-1]
+
+    @property
+    def least(self) -> float:
+        """The least sum of squares."""
+        return min(self._least.values())
+
+    @property
+    def best(self) -> Floats:
+        """The best of all points."""
+        return self.points[int(np.argmin(self.squares))]
+
+    def above(self, number: int) -> float:
+        """Sum of squares of a point above the least of its branch; infinite if the branch is refuted."""
+        least = self._least[self._branch(self.readings[number])]
+        return self.squares[number] - least if least - self.least <= REFUTED else math.inf
+
+    def allowed(self) -> list[int]:
+        """The points that the data allow."""
+        return [number for number in range(len(self.points)) if self.above(number) <= SQUARE]
+
+    def leaders(self) -> list[Floats]:
+        """The best point of each reading, the best of all first."""
+        found: dict[tuple[str, ...], int] = {}
+        for number in np.argsort(self.squares):
+            found.setdefault(self.readings[number], int(number))
+        return [self.points[number] for number in found.values()]
+
+    def polish(self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear") -> Floats:
+        """Least squares over some parameters, from a start; the point found."""
+        free = list(free)
+
+        def whole(part: Floats) -> Floats:
+            point = np.array(start)
+            point[free] = part
+            return point
+
+        low, high = LEAST[free], MOST[free]
+        found = least_squares(
+            lambda part: self.residuals(whole(part)), np.clip(start[free], low + 1e-9, high - 1e-9),
+            bounds=(low, high), diff_step=1e-6, max_nfev=most, loss=loss, f_scale=3.0, ftol=1e-6, xtol=1e-7,
+        )  # fmt: skip
+        return whole(found.x)
+
+    def slopes(self, point: Floats) -> Floats:
+        """Derivatives of the residuals by the parameters, a column each."""
+        columns = []
+        for at in range(point.size):
+            step = 1e-5 * np.eye(point.size)[at]
+            low, high = np.clip(point - step, LEAST, MOST), np.clip(point + step, LEAST, MOST)
+            columns.append((self.residuals(high) - self.residuals(low)) / (high - low)[at])
+        return np.column_stack(columns)
+
+    def intervals(self, widths: Floats) -> Floats:
+        """95 % intervals, (parameters, 2); a bound of the search where the data set none.
+
+        `widths` are first guesses of the ends' distances from the best values.
+        """
+        for _ in range(3):
+            least = self.least
+            found = np.array([[self.end(at, side, float(widths[at])) for side in (-1, 1)] for at in range(3)])
+            if self.least > least - 0.02:
+                break
+            self.polish(self.best)
+        # what the profile of one parameter passed through may lie beyond the end of another's
+        passed = np.array([self.points[number] for number in self.allowed()])
+        return np.column_stack(
+            [np.minimum(found[:, 0], passed.min(axis=0)), np.maximum(found[:, 1], passed.max(axis=0))]
+        )
+
+    def end(self, at: int, side: int, width: float) -> float:
+        """The lower (`side` −1) or upper (1) end of the interval of one parameter; the bound where the data set none.
+
+        The profile of each reading is followed from the outermost point known.  `width` is a first guess of the end's
+        distance from the best value.
+        """
+        outermost: dict[tuple[str, ...], Floats] = {}
+        for number in self.allowed():
+            known = outermost.setdefault(self.readings[number], self.points[number])
+            if side * self.points[number][at] > side * known[at]:
+                outermost[self.readings[number]] = self.points[number]
+        return max((self._followed(at, side, width, point) for point in outermost.values()), key=lambda end: side * end)
+
+    def _followed(self, at: int, side: int, width: float, start: Floats) -> float:
+        """The end of a profile, from a point that the data allow."""
+        slopes, others = self.slopes(start), [one for one in range(start.size) if one != at]
+        direction = np.eye(start.size)[at]
+        direction[others] = -np.linalg.lstsq(slopes[:, others], slopes[:, at], rcond=1e-8)[0]
+        path = {float(start[at]): start}
+
+        @functools.cache
+        def beyond(value: float) -> float:
+            """Root of the least rise of the sum of squares at this value, less that of the end."""
+            near, *further = sorted(path.values(), key=lambda point: abs(point[at] - value))[:2]
+            along = (near - further[0]) / (near - further[0])[at] if further else direction
+            point, above = self._profiled(at, value, near, along)
+            if above <= SQUARE:
+                path[value] = point
+            return math.sqrt(min(max(above, 0.0), 30.0)) - math.sqrt(SQUARE)
+
+        limit, inside, step = float((LEAST, MOST)[side > 0][at]), float(start[at]), width
+        if inside == limit:
+            return limit
+        while beyond(value := side * min(side * (inside + side * step), side * limit)) <= 0.0:
+            if value == limit:
+                return limit
+            inside, step = value, 2.0 * step
+        if inside == start[at] and beyond(inside) >= 0.0:
+            return inside
+        return float(brentq(beyond, inside, value, xtol=max(0.01 * abs(value - start[at]), 1e-9), rtol=1e-6))
+
+    def _profiled(self, at: int, value: float, near: Floats, along: Floats) -> tuple[Floats, float]:
+        """The least rise of the sum of squares with one parameter held, and where: `along` leads from a point near."""
+        change = value - near[at]
+        # and with the same friction at these accelerations of the table
+        kept = [[0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0] for table in _KEPT if at > 0]
+        starts = [near, near + change * along, *(near + change * np.array(one) for one in kept)]
+        first = len(self.points)
+        for start in starts:
+            start = np.clip(start, LEAST, MOST)
+            start[at] = value
+            self.square(start)
+        tried = sorted(range(first, len(self.points)), key=lambda number: self.squares[number])
+        if min(map(self.above, tried)) > SQUARE:
+            others = [one for one in range(near.size) if one != at]
+            for number in tried[:2]:
+                self.square(self.polish(self.points[number], others, most=6))
+        held = [number for number in range(first, len(self.points)) if self.points[number][at] == value]
+        best = min(held, key=self.above)
+        return self.points[best], self.above(best)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +283,7 @@ class Estimate:
     allowed : ndarray
         Parameters tried that the data allow, one set a row.
     readings : set of str
-        What decides the block's acceleration for parameters that the data allow (`Scale.branch`), in any test.
+        What decides the block's acceleration for parameters that the data allow (`Scale.reading`), in any test.
     linears : list of Linear
         The likelihood of each test.
     observations : sequence of Observation
@@ -115,7 +294,7 @@ class Estimate:
     intervals: Floats
     allowed: Floats
     readings: set[str]
-    linears: list[Linear]
+    linears: Sequence[Linear]
     observations: Sequence[Observation]
 
     @property
@@ -146,144 +325,84 @@ class Estimate:
 def estimate(observations: Sequence[Observation]) -> Estimate:
     """Calibrate one or several tests of one interface."""
     scale = Scale(observations)
-    best, others = _rough(observations, scale)
+    starts = _rough(observations, scale)
     for turn in range(_ROUNDS):
-        linears = [one.linear(scale.parameters(best)) for one in observations]
-        if turn == 0:
-            for one, linear in zip(observations, linears, strict=True):
-                one.take_noise(linear, scale.parameters(best))
-                one.move(linear, scale.parameters(best))
-            linears = [one.linear(scale.parameters(best)) for one in observations]
-        search = _search(linears, scale)
-        for start in (best, *others) if turn < 2 else (best,):
+        linears = [one.linear(scale.parameters(starts[0])) for one in observations]
+        search = _search(scale, linears)
+        for start in starts:
             search.polish(start)
-        found = search.polish(search.best)
-        settled = turn > 0 and search.square(best) - search.least < 0.1
-        best, others = search.best, [*_branches(search, scale, found), *others] if turn == 0 else others
-        for one, linear in zip(observations, linears, strict=True):
-            one.take_noise(linear, scale.parameters(best))
-            one.move(linear, scale.parameters(best))
-        if settled:
+        if turn == 0:
+            _try_branches(search, scale)
+        elif search.square(starts[0]) - search.least < 0.1:
             break
-    linears = [one.linear(scale.parameters(best)) for one in observations]
-    search = _search(linears, scale)
-    for start in (best, *_branches(search, scale, best), *others):
-        search.polish(start)
-    return _with_intervals(search, scale, linears, observations)
+        starts, best = search.leaders(), scale.parameters(search.best)
+        for one, linear in zip(observations, linears, strict=True):
+            one.take_noise(linear, best)
+            one.move(linear, best)
+    width = 1.96 * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
+    intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
+    allowed, slopes = search.allowed(), scale.slopes(search.best)
+    low, high = (np.diag([scale.parameters(end * row) for row in np.eye(3)]) for end in intervals.T)
+    return Estimate(
+        scale.parameters(search.best),
+        _covariance(search.slopes(search.best)) * np.outer(slopes, slopes),
+        np.column_stack([np.where(intervals[:, 0] == LEAST, 0, low), np.where(intervals[:, 1] == MOST, np.inf, high)]),
+        np.array([scale.parameters(search.points[number]) for number in allowed]),
+        {name for number in allowed for name in search.readings[number]},
+        linears,
+        observations,
+    )
 
 
-def _search(linears: Sequence[Linear], scale: Scale) -> Search:
-    return Search(lambda point: np.concatenate([one(scale.parameters(point)) for one in linears]), scale.branch)
+def _search(scale: Scale, linears: Sequence[Linear]) -> Search:
+    return Search(lambda point: np.concatenate([one(scale.parameters(point)) for one in linears]), scale.readings)
 
 
-def _rough(observations: Sequence[Observation], scale: Scale) -> tuple[Floats, list[Floats]]:
-    """The best start, and others, by fits in which no sample counts for much and the table's record has no noise."""
-    forwards = [one.forward() for one in observations]
+def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
+    """Starts, the best first, by fits in which no sample counts for much."""
     starts = [np.array([onset, decay, excess]) for onset in _ONSETS for decay in _DECAYS for excess in _EXCESS]
     for onset in _ONSETS:  # Eq. 4 crosses there
         for decay in _DECAYS:
-            excess = scale.crossing(onset, decay)
+            excess = scale.excess(onset, onset, decay)
             starts += [np.array([part * onset, decay, excess]) for part in (0.1, 0.6)]
         starts.append(np.array([onset, MOST[1], 0.0]))  # the yield value governs
+    search = _search(scale, [one.linear(scale.parameters(starts[0]), rough=True) for one in observations])
 
     def far(point: Floats) -> float:
-        parameters = scale.parameters(np.clip(point, LEAST, MOST))
-        return sum(one.rough(forward, parameters) for one, forward in zip(observations, forwards, strict=True))
+        return float(np.sum(np.log1p(search.residuals(np.clip(point, LEAST, MOST)) ** 2)))
 
     starts = sorted((np.clip(one, LEAST, MOST) for one in starts), key=far)[:_ROUGH]
-    search = _search([one.linear(scale.parameters(starts[0]), noisy=False) for one in observations], scale)
-    found = sorted((search.polish(start, loss="soft_l1") for start in starts), key=far)
-    return found[0], found[1:_FINE]
+    return sorted((search.polish(start, loss="cauchy") for start in starts), key=far)[:_FINE]
 
 
-def _branches(search: Search, scale: Scale, best: Floats) -> list[Floats]:
-    """Starts in which Üy holds the block, and in which Eq. 4 crosses the table's acceleration at the same value."""
-    held = search.polish(np.array([best[0], MOST[1], 0.0]), free=(0,))
-    held = min((held, search.polish(np.array([0.7, MOST[1], 0.0]), free=(0,))), key=search.square)
-    starts = [held]
+def _try_branches(search: Search, scale: Scale) -> None:
+    """Try what Üy alone explains, and Eq. 4 that crosses the table's acceleration at the same value."""
+    starts = [np.array([onset, MOST[1], 0.0]) for onset in (search.best[0], 0.7)]
+    held = min((search.polish(start, free=(0,)) for start in starts), key=search.square)[0]
     for decay in _DECAYS:
-        top = scale.following(1.0, min(1.05 * held[0], 0.99), decay)
-        starts += [np.array([held[0], decay, top]), np.array([0.5 * held[0], decay, top])]
-        starts += [np.array([part * held[0], decay, scale.crossing(held[0], decay)]) for part in (0.3, 0.9)]
-    for start in starts:
-        search.square(np.clip(start, LEAST, MOST))
-    readings: dict[object, int] = {}
-    for i in sorted(range(len(search.points)), key=lambda i: search.squares[i]):
-        readings.setdefault(search.readings[i], i)
-    return [search.points[i] for i in readings.values()]
+        top, crossing = scale.excess(1.0, min(1.05 * held, 0.99), decay), scale.excess(held, held, decay)
+        for onset, excess in ((held, top), (0.5 * held, top), (0.3 * held, crossing), (0.9 * held, crossing)):
+            search.square(np.clip([onset, decay, excess], LEAST, MOST))
+    for start in search.leaders():
+        search.polish(start)
 
 
-def _with_intervals(
-    search: Search, scale: Scale, linears: list[Linear], observations: Sequence[Observation]
-) -> Estimate:
-    """Follow the profiles; twice, so that what one parameter's profile found widens that of another."""
-    best = search.best
-    covariance = _covariance(search.slopes(best))
-    width = 1.96 * np.sqrt(np.diag(covariance))
-    width = np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1)
-    ends: dict[tuple[int, int], tuple[float, bool]] = {}
-    for _ in range(3):
-        least = search.least
-        for at in range(3):
-            for side in (-1, 1):
-                reached = search.allowed()[:, at]
-                now = ends.get((at, side))
-                if now is None or side * (reached.min() if side < 0 else reached.max()) > side * now[0] + 1e-9:
-                    ends[at, side] = search.end(at, side, float(width[at]))
-        if search.least > least - 0.02:
-            break
-        search.polish(search.best)
-        ends.clear()
-    intervals = np.empty((3, 2))
-    for (at, side), (end, unbounded) in ends.items():
-        point = np.zeros(3)
-        point[at] = end
-        value = scale.parameters(point)[at]
-        intervals[at, (side + 1) // 2] = value if not unbounded else 0.0 if side < 0 else math.inf
-    best = search.best
-    slopes = scale.slopes(best)
-    covariance = _covariance(search.slopes(best)) * np.outer(slopes, slopes)
-    allowed = np.array([scale.parameters(one) for one in search.allowed()])
-    readings = {name for i, names in enumerate(search.readings) if search.above(i) <= SQUARE for name in names}
-    return Estimate(scale.parameters(best), covariance, intervals, allowed, readings, linears, observations)
-
-
-def cycle_estimate(
-    linear: Linear, found: Estimate, begin: float, end: float, free: Sequence[int]
-) -> tuple[Floats, Floats]:
-    """Parameters and standard errors from the samples between two times; NaN of what these do not determine.
-
-    The block's displacement and velocity at the beginning are unknown.
-    """
-    times = np.concatenate([linear.times[use] for use, _ in linear.weights.values()])
-    rows = (times >= begin) & (times < end)
-    # what a displacement, and a velocity, at the beginning add to each channel
-    starts = np.zeros((times.size, 2))
-    for name, part in linear.by_channel(np.arange(times.size)).items():
-        weight = linear.weights[name][1]
-        if name == "relative_displacement":
-            starts[part] = np.column_stack([weight, weight * (times[part] - begin)])
-        elif name == "relative_velocity":
-            starts[part, 1] = weight
-    size = float(np.abs(linear.forward(found.parameters, linear.times)[:, COLUMN["relative_velocity"]]).max())
-    effects = np.column_stack([(linear.left * linear.sizes) @ linear.right, starts * max(size, 1e-6)])[rows]
-    left, sizes, _ = np.linalg.svd(effects, full_matrices=False)
+def cycle_estimate(linear: Linear, found: Estimate, free: Sequence[int]) -> tuple[Floats, Floats]:
+    """Parameters and standard errors from the samples of one cycle; NaN of what these do not determine."""
     free = list(free)
 
     def residuals(part: Floats) -> Floats:
         values = found.parameters.copy()
         values[free] = part
-        rest = linear.raw(values)[rows]
-        return np.asarray(rest - left @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (left.T @ rest)))
+        return linear(values)
 
     start = found.parameters[free]
     fit = least_squares(residuals, start, bounds=(-1e-9, 10.0 * start + 1.0), x_scale="jac", diff_step=1e-4, max_nfev=6)
-    values, errors = found.parameters.copy(), np.full(3, np.nan)
+    values, errors = np.full(3, np.nan), np.full(3, np.nan)
     covariance = _covariance(fit.jac)
-    if not np.isfinite(covariance).all():
-        return np.full(3, np.nan), errors
-    values[free], errors[free] = fit.x, np.sqrt(np.diag(covariance))
-    return np.where(np.isfinite(errors), values, np.nan), errors
+    if np.isfinite(covariance).all():
+        values[free], errors[free] = fit.x, np.sqrt(np.diag(covariance))
+    return values, errors
 
 
 def _covariance(slopes: Floats) -> Floats:

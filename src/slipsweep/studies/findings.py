@@ -1,4 +1,4 @@
-"""What a calibration says in words: what the test does not determine and what would, and tables for sweep files."""
+"""What a calibration says in words: what the tests do not determine and what would, and tables for sweep files."""
 
 import math
 from collections.abc import Sequence
@@ -8,9 +8,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.model.variables import PARAMETERS, Validity
-from slipsweep.motion.shaking import TABLE
+from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies.estimate import Estimate
-from slipsweep.studies.friction import onset_acceleration, slides_of, threshold_of
+from slipsweep.studies.friction import coefficients_of, onset_acceleration, slides_of, threshold_of
 from slipsweep.studies.likelihood import SOUGHT, Observation
 from slipsweep.studies.table_motion import noise_of
 
@@ -30,10 +30,12 @@ _WORSE, _MISSES = 1.5, 0.01
 #: Factors on the motion at which the displacements of allowed parameters are compared, and how many parameters.
 _FACTORS, _COMPARED = (0.6, 0.8, 1.25, 1.5, 2.0), 24
 
+_ANOTHER = "Test at another amplitude and give calibrate all tests together"
+
 
 def report(
     found: Estimate,
-    episodes: Sequence[Sequence[tuple[float, float]]],
+    slips: Sequence[Sequence[tuple[float, float]]],
     coefficients: Sequence[xr.Dataset],
     drifting: Sequence[str],
 ) -> dict[str, str]:
@@ -42,7 +44,7 @@ def report(
     Parameters
     ----------
     found : Estimate
-    episodes : sequence of (float, float), of each test
+    slips : sequence of (float, float), of each test
         Times of slips upslope.
     coefficients : sequence of Dataset, of each test
         As `friction.coefficients_of`.
@@ -56,32 +58,31 @@ def report(
         each.  `model_table` and `uncertainty_table`: tables of a sweep file, commented out where the calibration has
         failed or determines too little.
     """
-    known, misfits, contradiction = found.determined, misfits_of(found), _contradiction(found)
     constant = next((one for one in coefficients if one.attrs["constant_friction"]), None)
-    slides = any(float(found.summary(one)["permanent_displacement"].item()) != 0.0 for one in found.observations)
-    said = [] if constant is not None else _misfit_sentences(found, misfits)
-    said += _upslope_sentences(episodes)
+    results = [found.summary(one) for one in found.observations]
+    slides = any(float(one["permanent_displacement"]) != 0.0 for one in results)
+    failures = [] if constant is not None else [*_misfit(found), *(_drift(name) for name in drifting)]
+    contradictions = [text for one in found.observations for text in _contradiction(found, one)]
+    said = [*failures, *(text for one in found.observations for text in _begins_in_motion(one))]
+    said += [_upslope(times) for times in slips if times]
     if not slides:
         said.append("The computed block does not slide: no parameter is determined. Test with a larger amplitude.")
-    elif not known.all():
+    elif not found.determined.all():
         said += _undetermined(found)
-    said += contradiction
-    if any(int(found.summary(one)["validity"].item()) & Validity.NOT_RECOUPLED for one in found.observations):
+    said += contradictions
+    if any(int(one["validity"]) & Validity.NOT_RECOUPLED for one in results):
         said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
+    sentence = "" if constant is None else constant.attrs["constant_friction"]
     if constant is not None:
-        tables = _newmark_tables(found, constant)
-        said.insert(0, constant.attrs["constant_friction"])
-    elif known.all() and slides and not misfits and not contradiction:
+        said.insert(0, sentence)
+        tables = _newmark_tables(found.observations[0], constant)
+    elif found.determined.all() and slides and not failures and not contradictions:
         tables = _model_table(found), _uncertainty_table(found)
     else:
-        tables = _as_comments(said, _model_table(found)), ""
-    said[1:1] = [
-        f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
-        f"drift = {name!r}."
-        for name in drifting
-    ]
+        comments = ["WARNING: not ready for use.", *said, "", *_model_table(found).splitlines()]
+        tables = "".join(f"# {line}".rstrip() + "\n" for line in comments), ""
     return {
-        "constant_friction": "" if constant is None else constant.attrs["constant_friction"],
+        "constant_friction": sentence,
         "findings": "\n".join(said),
         "model_table": tables[0],
         "uncertainty_table": tables[1],
@@ -91,29 +92,26 @@ def report(
 # ---------------------------------------------------------------------------------- reliability
 
 
-def _moves(one: Observation) -> bool:
-    """Whether the table moves already as the record begins."""
-    smooth = one.motion.acceleration
-    return abs(float(smooth[0])) > max(_MOVES * float(np.abs(smooth).max()), 3.0 * one.motion.noise)
+def block_acceleration(test: ShakingTest) -> Floats | None:
+    """The block's acceleration, measured or from the relative velocity."""
+    if "block_acceleration" in test.channels:
+        return test.channels["block_acceleration"]
+    if "relative_velocity" in test.channels:
+        return np.asarray(test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times))
+    return None
 
 
-def _misfit_sentences(found: Estimate, misfits: dict[str, float]) -> list[str]:
-    said = []
-    if misfits:
-        said.append(
-            f"The misfit is larger than the noise of the sensors: "
-            f"{', '.join(f'{name} {times:.2g} times' for name, times in misfits.items())}. The block did not move as "
-            "in the model, or a sensor drifts: do not use the parameters before you know why (see the figure)."
-        )
-    return said + [
-        f"The table moves as the record begins, at {float(one.motion.acceleration[0]):.3g} m/s2. The block is taken to "
-        "be at rest there. If it slides, the results are wrong: let the record begin where both are at rest."
-        for one in found.observations
-        if _moves(one)
-    ]
+def coefficients(one: Observation) -> xr.Dataset:
+    """Friction by statics; nothing where neither the block's acceleration nor its velocity is measured."""
+    block = block_acceleration(one.test)
+    if block is None:
+        return xr.Dataset(attrs={"constant_friction": ""})
+    table = np.interp(one.test.times, one.motion.times, one.motion.acceleration)
+    slides = slides_of(one.test.times, table, block, threshold_of(table, block)[0])
+    return coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
 
 
-def misfits_of(found: Estimate) -> dict[str, float]:
+def misfits(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is larger than their noise, as neighbouring samples scatter, and how many times."""
     worse: dict[str, float] = {}
     for one, linear in zip(found.observations, found.linears, strict=True):
@@ -125,36 +123,56 @@ def misfits_of(found: Estimate) -> dict[str, float]:
     return worse
 
 
-def _contradiction(found: Estimate) -> list[str]:
+def _misfit(found: Estimate) -> list[str]:
+    listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits(found).items())
+    text = (
+        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, or a "
+        "sensor drifts: do not use the parameters before you know why (see the figure)."
+    )
+    return [text] if listed else []
+
+
+def _drift(name: str) -> str:
+    return (
+        f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
+        f"drift = {name!r}."
+    )
+
+
+def _begins_in_motion(one: Observation) -> list[str]:
+    first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
+    text = (
+        f"The table moves as the record begins, at {first:.3g} m/s2. The block is taken to be at rest there. If it "
+        "slides, the results are wrong: let the record begin where both are at rest."
+    )
+    return [text] if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise) else []
+
+
+def _contradiction(found: Estimate, one: Observation) -> list[str]:
     """A lower bound of Üy that is larger than the accelerations at which the block was seen to begin to slide."""
-    said = []
-    for one in found.observations:
-        if "block_acceleration" not in one.test.channels:
-            continue
-        times, block = one.test.times, one.test.channels["block_acceleration"]
-        table = np.interp(times, one.motion.times, one.motion.acceleration)
-        threshold = threshold_of(one.test.channels[TABLE], block)[0]
-        slides = slides_of(times, table, block, threshold)
-        if "continuous" in found.readings or not slides:
-            continue
-        onsets = np.array([onset_acceleration(times, table, block, slide, threshold) for slide in slides])
-        step = float(np.abs(np.diff(table)).max())
-        most = float(np.median(onsets)) + step + threshold + 3.0 * float(np.std(onsets)) / len(onsets) ** 0.5
-        if found.intervals[0][0] > most:
-            said.append(
-                f"Üy is at least {found.intervals[0][0]:.3g} m/s2 by the fit, but the block was seen to begin to slide "
-                f"at {float(np.median(onsets)):.3g} m/s2: the fit contradicts the test."
-            )
-    return said
+    if "block_acceleration" not in one.test.channels or "continuous" in found.readings:
+        return []
+    times, block = one.test.times, one.test.channels["block_acceleration"]
+    table = np.interp(times, one.motion.times, one.motion.acceleration)
+    threshold = threshold_of(one.test.channels[TABLE], block)[0]
+    slides = slides_of(times, table, block, threshold)
+    onsets = np.array([onset_acceleration(times, table, block, slide, threshold) for slide in slides])
+    if not slides:
+        return []
+    step = float(np.abs(np.diff(table)).max())
+    least, seen = float(found.intervals[0][0]), float(np.median(onsets))
+    text = (
+        f"Üy is at least {least:.3g} m/s2 by the fit, but the block was seen to begin to slide at {seen:.3g} m/s2: the "
+        "fit contradicts the test."
+    )
+    return [text] if least > seen + step + threshold + 3.0 * float(np.std(onsets)) / len(onsets) ** 0.5 else []
 
 
-def _upslope_sentences(episodes: Sequence[Sequence[tuple[float, float]]]) -> list[str]:
-    return [
+def _upslope(times: Sequence[tuple[float, float]]) -> str:
+    return (
         f"The block slipped upslope {len(times)} time{'s' if len(times) > 1 else ''} (first at {times[0][0]:.3g} s). "
         "In stick-slip the model has no upslope slip: these samples are left out, and the displacement may step there."
-        for times in episodes
-        if times
-    ]
+    )
 
 
 # ------------------------------------------------------------------------------- determination
@@ -162,11 +180,11 @@ def _upslope_sentences(episodes: Sequence[Sequence[tuple[float, float]]]) -> lis
 
 def _undetermined(found: Estimate) -> list[str]:
     """Which parameters the tests do not determine, why, and which measurement would."""
-    known = found.determined
     tests = "these tests" if len(found.observations) > 1 else "this test"
-    names = [SYMBOL[at] for at in range(3) if not known[at]]
+    missing = [at for at in range(3) if not found.determined[at]]
+    names = [SYMBOL[at] for at in missing]
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    ranges = "; ".join(f"{SYMBOL[at]} {_range(found.intervals[at], at)}" for at in range(3) if not known[at])
+    ranges = "; ".join(f"{SYMBOL[at]} {_range(found.intervals[at], at)}" for at in missing)
     said = [f"{listed} {'is' if len(names) == 1 else 'are'} not determined by {tests}: {ranges}."]
     yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
     crosses = bool({"crossed", "crossing"} & found.readings)
@@ -203,25 +221,20 @@ def _remedy(found: Estimate) -> str:
     """The measurement that would tell allowed parameters apart: the amplitude at which displacements differ most."""
     one = found.observations[0]
     if all("block_acceleration" not in each.test.channels for each in found.observations):
-        return (
-            "Measure the acceleration of the block, or test at another amplitude and give calibrate all tests together."
-        )
-    every = found.allowed[np.unique(np.linspace(0, len(found.allowed) - 1, _COMPARED).astype(int))]
-    ends = [found.allowed[number] for at in range(3) for number in np.argsort(found.allowed[:, at])[[0, -1]]]
-    cases = {
-        name: xr.DataArray(column, dims="case")
-        for name, column in zip(SOUGHT, np.vstack([every, *ends]).T, strict=True)
-    }
+        return f"Measure the acceleration of the block, or t{_ANOTHER[1:]}."
+    some = np.unique(np.linspace(0, len(found.allowed) - 1, _COMPARED).astype(int))
+    ends = np.argsort(found.allowed, axis=0)[[0, -1]].ravel()
+    columns = found.allowed[[*some, *ends]].T
+    cases = {name: xr.DataArray(column, dims="case") for name, column in zip(SOUGHT, columns, strict=True)}
     moved = abs(found.summary(one, scale=list(_FACTORS), **cases)["permanent_displacement"])
     span = float(np.abs(found.summary(one)["permanent_displacement"]))
     low, high = moved.min(dim="case").values, moved.max(dim="case").values
     if not np.isfinite(high).any():
-        return "Test at another amplitude and give calibrate all tests together."
+        return f"{_ANOTHER}."
     best = int(np.nanargmax((high - low) / (np.sqrt(low * high) + 0.05 * span)))
     return (
-        f"Test at another amplitude and give calibrate all tests together: at {_FACTORS[best]:g} times this one "
-        f"({_FACTORS[best] * one.peak:.3g} m/s2) the parameters that fit give displacements from {low[best]:.2g} to "
-        f"{high[best]:.2g} m."
+        f"{_ANOTHER}: at {_FACTORS[best]:g} times this one ({_FACTORS[best] * one.peak:.3g} m/s2) the parameters that "
+        f"fit give displacements from {low[best]:.2g} to {high[best]:.2g} m."
     )
 
 
@@ -241,17 +254,15 @@ def _model_table(found: Estimate) -> str:
 
 def _uncertainty_table(found: Estimate) -> str:
     """[uncertainty] tables of a sweep file from the covariance: normal, cut where nothing physical lies; "" if none."""
-    errors = found.errors
-    if not np.isfinite(errors).all():
+    if not np.isfinite(found.errors).all():
         return ""
     lines = ["[uncertainty]"]
     # a hair less than 1, so that with rounding a matrix of correlations stays positive
     rounded = np.round(np.clip(found.correlation, -_MOST_CORRELATION, _MOST_CORRELATION), 4)
-    whole = rounded + np.diag([1.0 - _MOST_CORRELATION] * 3)
-    if np.linalg.eigvalsh(whole).min() > 1e-6:
+    if np.linalg.eigvalsh(rounded + np.diag([1.0 - _MOST_CORRELATION] * 3)).min() > 1e-6:
         pairs = [f'["{SOUGHT[i]}", "{SOUGHT[j]}", {rounded[i, j]:.4f}]' for i, j in ((0, 1), (0, 2), (1, 2))]
         lines.append(f"correlation = [{', '.join(pairs)}]")
-    for name, value, error in zip(SOUGHT, found.parameters, errors, strict=True):
+    for name, value, error in zip(SOUGHT, found.parameters, found.errors, strict=True):
         lines += ["", f"[uncertainty.{name}]", *_normal(value, error)]
     return "\n".join(lines) + "\n"
 
@@ -262,9 +273,8 @@ def _normal(value: float, error: float) -> list[str]:
     return [*(cut if low > -6.0 else ['distribution = "norm"']), f"loc = {_number(value)}", f"scale = {error:.4g}"]
 
 
-def _newmark_tables(found: Estimate, coefficients: xr.Dataset) -> tuple[str, str]:
+def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, str]:
     """Newmark's block with the kinetic coefficient, for a block of constant friction."""
-    one = found.observations[0]
     kinetic = coefficients["kinetic_friction"].item()
     low, high = coefficients["kinetic_friction_interval"].values
     low, value, high = one.model.g * np.tan(np.arctan([low, kinetic, high]) - math.radians(one.theta))
@@ -278,20 +288,13 @@ def _newmark_tables(found: Estimate, coefficients: xr.Dataset) -> tuple[str, str
     return model, "\n".join(["[uncertainty]", "", "[uncertainty.yield_acceleration]", *lines]) + "\n"
 
 
-def _as_comments(said: Sequence[str], table: str) -> str:
-    """A table that must not be used as it is: the reasons, and each line commented out."""
-    lines = ["WARNING: not ready for use.", *said, "", *table.splitlines()]
-    return "\n".join(f"# {line}".rstrip() for line in lines) + "\n"
-
-
 def sweep_file_text(model_table: str, uncertainty_table: str) -> str:
     """Both tables for one file: what [uncertainty] draws is a comment in [model]."""
     if not uncertainty_table:
         return model_table
-    drawn = [f"{name} = " for name in SOUGHT if f"[uncertainty.{name}]" in uncertainty_table]
+    drawn = tuple(f"{name} = " for name in SOUGHT if f"[uncertainty.{name}]" in uncertainty_table)
     lines = [
-        f"# {line}; without [uncertainty]" if line.startswith(tuple(drawn)) else line
-        for line in model_table.splitlines()
+        f"# {line}; without [uncertainty]" if line.startswith(drawn) else line for line in model_table.splitlines()
     ]
     return "\n".join(lines) + "\n\n" + uncertainty_table
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.stats import t as student
 
 from slipsweep._version import __version__
@@ -31,15 +32,12 @@ Floats = NDArray[np.float64]
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
-#: Standard deviations of the noise that the threshold is: one sample in 16 000 exceeds it by chance.
-NOISE_IN_THRESHOLD = 4.0
-
-#: The least threshold, in parts of the table's largest acceleration: what differs by less is no slide, but two
-#: sensors that do not agree.
-LEAST_THRESHOLD = 0.005
+#: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000 exceeds 4 by chance,
+#: and at least a part of the table's largest acceleration, by which two sensors may disagree.
+NOISE_IN_THRESHOLD, LEAST_THRESHOLD = 4.0, 0.005
 
 #: Samples in turn that begin a slide by exceeding the threshold; that end one by staying below it while the integral
-#: of r is back at zero; and that end one whatever the integral, which an offset of a sensor takes along.
+#: of r is back at zero; and that end one whatever the integral, which a sensor with an offset falsifies.
 _BEGINS, _ENDS, _ENDS_ANYWAY = 2, 4, 20
 
 #: Samples at either end of a slide that are not taken for its friction, and those that show how it begins.
@@ -48,7 +46,6 @@ _AT_ENDS, _FIRST = 3, 6
 #: Friction is level if it scatters by this part of itself at most beyond the noise, and Eq. 1 falls if this part of its
 #: samples lies below that part of the static coefficient.
 _LEVEL, _LOW_SHARE, _LOW = 0.05, 0.05, 0.8
-
 
 #: Attributes by which results are known as ours.
 SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
@@ -71,64 +68,56 @@ class Slide:
         return slice(self.onset, None if self.stop is None else self.stop + 1)
 
 
-def threshold_of(table: Floats, block: Floats, threshold: Any = None) -> tuple[float, str]:
+def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
     """The relative acceleration beyond which the block slides, m/s², and why that much."""
-    if threshold is not None:
-        value = check_finite("threshold", threshold)
-        if value <= 0.0:
-            raise InputError(f"threshold = {shown(threshold)}: must be a finite number > 0, m/s²")
-        return value, "given"
     noise = noise_of(table - block)
     least = LEAST_THRESHOLD * float(np.abs(table).max())
-    if NOISE_IN_THRESHOLD * noise >= least:
-        return NOISE_IN_THRESHOLD * noise, (
-            f"{NOISE_IN_THRESHOLD:g} standard deviations of the noise of the relative acceleration, {noise:.3g} m s-2"
-        )
-    return least, f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is smaller)"
+    if NOISE_IN_THRESHOLD * noise < least:
+        return least, f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is smaller)"
+    why = f"{NOISE_IN_THRESHOLD:g} standard deviations of the noise of the relative acceleration, {noise:.3g} m s-2"
+    return NOISE_IN_THRESHOLD * noise, why
 
 
 def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> list[Slide]:
     """The slides in recorded accelerations of the table and of the block."""
     relative = np.nan_to_num(table - block)
     beyond = np.abs(relative) > threshold
-    quiet, long = _turns(~beyond, _ENDS), _turns(~beyond, _ENDS_ANYWAY)
+    begins = np.flatnonzero(_in_turn(beyond, _BEGINS))
+    quiet, long_quiet = _in_turn(~beyond, _ENDS), _in_turn(~beyond, _ENDS_ANYWAY)
     slides: list[Slide] = []
-    begins = np.flatnonzero(_turns(beyond, _BEGINS))
     at = 0
-    while (after := begins[begins >= at]).size:
+    while at < times.size and (after := begins[begins >= at]).size:
         onset = int(after[0])
         # back to where r left zero
         while onset > at and relative[onset - 1] * relative[onset] > 0.0 and abs(relative[onset - 1]) > threshold / 4:
             onset -= 1
-        stop = _stop(times[onset:], relative[onset:], quiet[onset:], long[onset:], threshold)
-        last = times.size - 1 if stop is None else onset + stop
-        peak = onset + int(np.argmax(table[onset : last + 1]))
-        slides.append(Slide(onset, peak, None if stop is None else last))
-        if stop is None:
-            break
-        at = last + 1
+        signed = cumulative_trapezoid(relative[onset:], times[onset:], initial=0.0)
+        # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise adds up to
+        noise = threshold * (times[min(onset + 1, times.size - 1)] - times[onset])
+        slow = np.abs(signed) <= 0.1 * np.maximum.accumulate(np.abs(signed)) + noise
+        turned = signed * np.sign(signed[min(_BEGINS, signed.size - 1)]) < 0.0  # as a slide the other way begins
+        stops = np.flatnonzero(((quiet[onset:] & slow) | long_quiet[onset:] | turned)[1:])
+        stop = onset + 1 + int(stops[0]) if stops.size else None
+        at = times.size if stop is None else stop + 1
+        slides.append(Slide(onset, onset + int(np.argmax(table[onset:at])), stop))
     return slides
 
 
-def _turns(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+def _in_turn(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
     """Where something holds at a sample and at those after it, `count` in all."""
     padded = np.concatenate([holds, np.zeros(count - 1, bool)])
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, count).all(axis=1))
 
 
-def _stop(
-    times: Floats, relative: Floats, quiet: NDArray[np.bool_], long: NDArray[np.bool_], threshold: float
-) -> int | None:
-    """Where a slide that begins at the first sample stops; None if the record ends before."""
-    steps = 0.5 * (relative[1:] + relative[:-1]) * np.diff(times)
-    signed = np.concatenate([[0.0], np.cumsum(steps)])
-    velocity = np.abs(signed)
-    # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise adds up to
-    slow = velocity <= 0.1 * np.maximum.accumulate(velocity) + threshold * (times[1] - times[0])
-    turned = signed * np.sign(signed[min(_BEGINS, signed.size - 1)]) < 0.0  # as a slide the other way begins
-    stops = np.flatnonzero((quiet & slow) | long | turned)
-    stops = stops[stops > 0]
-    return int(stops[0]) if stops.size else None
+def onset_acceleration(times: Floats, table: Floats, block: Floats, slide: Slide, threshold: float) -> float:
+    """The table's acceleration where r left zero: a straight line through the first samples of the slide, back to 0."""
+    relative = (table - block)[slide.onset : slide.peak + 1]
+    rising = np.flatnonzero(np.nan_to_num(np.abs(relative)) > threshold)[:_FIRST] + slide.onset
+    if rising.size < 3:
+        return float(table[slide.onset])
+    start = np.polynomial.Polynomial.fit((table - block)[rising], table[rising], 1)(0.0)
+    # r need not grow in a straight line: no further back than the samples before
+    return float(np.clip(start, *sorted((table[max(slide.onset - 2, 0)], table[rising[0]]))))
 
 
 def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
@@ -139,6 +128,12 @@ def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
     return np.asarray(np.tan(np.radians(theta) + np.arctan(block / g)))
 
 
+def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: float) -> Floats:
+    """μ(t) = tan φs − tan θ − (|Üg| − |Ü| − g tan θ) / (g + Üg tan θ)   (1)"""
+    tan_theta = np.tan(np.radians(theta))
+    return np.asarray(mu_s - tan_theta - (np.abs(table) - np.abs(block) - g * tan_theta) / (g + table * tan_theta))
+
+
 def coefficients_of(
     table: Floats, block: Floats, slides: Sequence[Slide], mu_s: float, theta: float, g: float
 ) -> xr.Dataset:
@@ -146,57 +141,50 @@ def coefficients_of(
 
     The attribute `constant_friction` is a sentence if friction is level while the block slides, where Eq. 1 falls.
     """
-    threshold = threshold_of(table, block)[0]
-    eq1 = eq1_friction(table, block, theta, mu_s, g)
-    free = free_body_friction(block, theta, g)
-    levels, inside, starts, between = [], [], [], []
+    threshold, relative = threshold_of(table, block)[0], table - block
+    eq1, free = eq1_friction(table, block, theta, mu_s, g), free_body_friction(block, theta, g)
+    inside, starts, between = [], [], []
     for one in slides:
         part = slice(one.onset + _AT_ENDS, (table.size if one.stop is None else one.stop + 1) - _AT_ENDS)
-        values = free[part]
-        if np.isfinite(values).sum() < 3 or not np.nanmean((table - block)[one.onset : one.onset + _AT_ENDS]) > 0.0:
+        downslope = np.nanmean(relative[one.onset : one.onset + _AT_ENDS]) > 0.0
+        if np.isfinite(free[part]).sum() < 3 or not downslope:
             continue
-        levels.append(float(np.nanmean(values)))
-        inside.append(np.column_stack([values, eq1[part]]))
-        first = one.onset + int(np.argmax(np.nan_to_num(table - block)[one.part] > threshold))
+        inside.append(np.column_stack([free[part], eq1[part]]))
+        first = one.onset + int(np.argmax(np.nan_to_num(relative)[one.part] > threshold))
         begin, before = float(np.nanmean(block[first : first + _FIRST])), float(table[max(first - 1, 0)])
         jumps = before - begin > threshold  # else it would have been seen to slide at the sample before
         starts.append(0.5 * (before + float(table[first])) if jumps else begin)
         between.append(0.5 * (float(table[first]) - before) if jumps else 0.0)
-    if not levels:
-        return _coefficients((np.nan, [np.nan, np.nan]), (np.nan, [np.nan, np.nan]), False)
-    slope = 1.0 / g / np.cos(np.radians(theta)) ** 2  # of friction by the block's acceleration, near enough
-    noise = noise_of(block) * slope
-    every = np.concatenate(inside)
-    kinetic = _mean(np.array(levels), noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
-    static = _mean(free_body_friction(np.array(starts), theta, g), noise, float(np.mean(between)) * slope)
-    scatter = float(np.nanmean((every[:, 0] - kinetic[0]) ** 2)) - noise**2
-    level = kinetic[0] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[0]
-    falls = float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
-    return _coefficients(static, kinetic, level and falls)
-
-
-def _coefficients(static: tuple[float, list[float]], kinetic: tuple[float, list[float]], constant: bool) -> xr.Dataset:
-    """Coefficients and their intervals as a Dataset."""
+    static = kinetic = np.full(3, np.nan)
+    constant = False
+    if inside:
+        slope = 1.0 / g / np.cos(np.radians(theta)) ** 2  # of friction by the block's acceleration, near enough
+        noise, every = noise_of(block) * slope, np.concatenate(inside)
+        levels = np.array([np.nanmean(one[:, 0]) for one in inside])
+        kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
+        static = _mean(free_body_friction(np.array(starts), theta, g), noise, float(np.mean(between)) * slope)
+        scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
+        level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
+        constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
     found = {}
-    for kind, (value, ends) in (("static", static), ("kinetic", kinetic)):
+    for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
         about = {"units": "1", "long_name": f"{kind} friction coefficient by statics"}
-        found[f"{kind}_friction"] = xr.Variable((), value, about)
         interval = {"units": "1", "long_name": f"95 % interval of the {about['long_name']}"}
-        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), np.array(ends), interval)
+        found[f"{kind}_friction"] = xr.Variable((), value, about)
+        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), [low, high], interval)
     sentence = (
-        f"This is a block of constant friction: by statics {kinetic[0]:.3g} while it slides, though Eq. 1 falls. "
+        f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, though Eq. 1 falls. "
         "Newmark's model is the right one for it."
     )
     return xr.Dataset(found, attrs={"constant_friction": sentence if constant else ""})
 
 
-def _mean(values: Floats, noise: float, systematic: float) -> tuple[float, list[float]]:
-    """Mean of a value a slide and its 95 % interval: their scatter, or the noise, and what does not average out."""
+def _mean(values: Floats, noise: float, systematic: float) -> Floats:
+    """Mean of a value a slide within its 95 % interval: their scatter, or the noise, and what does not average out."""
     number = values.size
     scatter = float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
     half = max(scatter, 1.96 * noise) / number**0.5 + systematic
-    mean = float(np.mean(values))
-    return mean, [mean - half, mean + half]
+    return float(np.mean(values)) + np.array([-half, 0.0, half])
 
 
 def measured_friction(
@@ -274,10 +262,13 @@ def measured_friction(
     corrected, removed = given.corrected(offset, drift, rest)
     check_contact(corrected, theta, g)
     times, table, block = corrected.times, corrected.channels[TABLE], corrected.channels["block_acceleration"]
-    friction = eq1_friction(table, block, theta, mu_s, g)
-    limit, why = threshold_of(table, block, threshold)
+    eq1, free = eq1_friction(table, block, theta, mu_s, g), free_body_friction(block, theta, g)
+    limit, why = threshold_of(table, block)
+    if threshold is not None:
+        limit, why = check_finite("threshold", threshold), "given"
+        if limit <= 0.0:
+            raise InputError(f"threshold = {shown(threshold)}: must be a finite number > 0, m/s²")
     slides = slides_of(times, table, block, limit)
-    free = free_body_friction(block, theta, g)
     coefficients = coefficients_of(table, block, slides, mu_s, theta, g)
     found = {
         "slide_onset": [times[one.onset] for one in slides],
@@ -286,25 +277,25 @@ def measured_friction(
         "onset_acceleration": [onset_acceleration(times, table, block, one, limit) for one in slides],
         "peak_acceleration": [table[one.peak] for one in slides],
         "peak_block_acceleration": [np.nanmax(block[one.part]) for one in slides],
-        "least_friction": [np.nanmin(friction[one.part]) for one in slides],
+        "least_friction": [np.nanmin(eq1[one.part]) for one in slides],
         "slide_free_body_friction": [np.nanmedian(free[one.part]) for one in slides],
     }
     series = {
         TABLE: table,
         "block_acceleration": block,
-        "friction_coefficient": friction,
-        "friction_ratio": friction / mu_s,
+        "friction_coefficient": eq1,
+        "friction_ratio": eq1 / mu_s,
         "free_body_friction": free,
     }
     about = HISTORY | MEASURED_FRICTION
     return xr.Dataset(
         {name: (("time",), values, about[name]) for name, values in series.items()}
         | {name: (("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()}
-        | {str(name): one.variable for name, one in coefficients.items()},
+        | dict(coefficients.variables),
         {
             "time": ("time", times, {"units": "s", "long_name": "time"}),
-            "theta": ((), np.array(theta), PARAMETERS["theta"]),
-            "mu_s": ((), np.array(mu_s), PARAMETERS["mu_s"]),
+            "theta": ((), theta, PARAMETERS["theta"]),
+            "mu_s": ((), mu_s, PARAMETERS["mu_s"]),
             "bound": BOUND,
         },
         {
@@ -326,33 +317,17 @@ def test_of(given: Any) -> ShakingTest:
         return given
     if not isinstance(given, (xr.Dataset, Mapping)):
         return read_test(given)
-    known = [name for name in CHANNELS if name in given]
-    if TABLE not in known:
-        raise InputError(f"test: {TABLE}: missing: must be given, along time; there are {shown(list(given))}")
-    for name in known:
-        if not isinstance(given[name], (xr.DataArray, xr.Variable)):
-            raise InputError(f"test: {name} = {shown(given[name])}: must be a DataArray along time")
-    arrays = {name: xr.as_variable(given[name]) for name in known}
-    times: Any = given["time"] if "time" in given else getattr(given[TABLE], "coords", {}).get("time")
-    if times is None:
+    known = {name: given[name] for name in ("time", *CHANNELS) if name in given}
+    for name, one in known.items():
+        if not isinstance(one, (xr.DataArray, xr.Variable)) or one.dims != ("time",):
+            raise InputError(f"test: {name} = {shown(one)}: must be a DataArray along time")
+    if "time" not in (data := xr.Dataset(known)):
         raise InputError("test: time: missing: must be a coordinate, s")
-    for name, array in arrays.items():
-        if array.dims != ("time",):
-            raise InputError(f"test: {name}: dimensions {array.dims}: must be ('time',)")
-    values = {name: check_numbers(f"test: {name}", array) for name, array in arrays.items()}
-    factors = {
-        name: unit_factor(f"test: {name}: units", name, str(array.attrs["units"]))
-        for name, array in {**arrays, "time": xr.as_variable(times)}.items()
-        if "units" in array.attrs
-    }
-    scaled = {name: factors.get(name, 1.0) * one for name, one in values.items()}
-    return ShakingTest(factors.get("time", 1.0) * check_numbers("test: time", times), scaled)
-
-
-def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: float) -> Floats:
-    """μ(t) = tan φs − tan θ − (|Üg| − |Ü| − g tan θ) / (g + Üg tan θ)   (1)"""
-    tan_theta = np.tan(np.radians(theta))
-    return np.asarray(mu_s - tan_theta - (np.abs(table) - np.abs(block) - g * tan_theta) / (g + table * tan_theta))
+    channels = {str(name): check_numbers(f"test: {name}", one) for name, one in data.variables.items()}
+    for name in channels:
+        if "units" in data[name].attrs:
+            channels[name] = channels[name] * unit_factor(f"test: {name}: units", name, str(data[name].attrs["units"]))
+    return ShakingTest(channels.pop("time"), channels)
 
 
 def check_contact(test: ShakingTest, theta: float, g: float) -> None:
@@ -364,17 +339,3 @@ def check_contact(test: ShakingTest, theta: float, g: float) -> None:
             f"{test.name}: {TABLE} = {table[lowest]:.4g} m/s2 at {test.times[lowest]:.6g} s: the block would lift off "
             "(g + Üg tan θ must be > 0); are its units right?"
         )
-
-
-def onset_acceleration(times: Floats, table: Floats, block: Floats, slide: Slide, threshold: float) -> float:
-    """The table's acceleration where r left zero: a straight line through the first samples of the slide, back to 0."""
-    relative = table - block
-    part = slice(slide.onset, slide.peak + 1)
-    rising = np.flatnonzero(np.isfinite(relative[part]) & (np.abs(relative[part]) > threshold))[:6] + slide.onset
-    if rising.size < 3:
-        return float(table[slide.onset])
-    line = np.polynomial.Polynomial.fit(relative[rising], table[rising], 1)
-    start = float(line(0.0))
-    # r need not grow in a straight line: no further back than the samples before
-    low, high = sorted((table[max(slide.onset - 2, 0)], table[rising[0]]))
-    return float(np.clip(start, low, high))

@@ -10,6 +10,7 @@ tells only on which side of it the jump lies: it is left out.  Readings of a con
 reading: n of them have the weight of one.
 """
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,6 +46,9 @@ _BESIDE_A_JUMP = 1.6
 #: Standard deviation of an offset or drift, in parts of a channel's largest value: no bound, in effect.
 _LARGE = 3.0
 
+#: Noise of the channels, in parts of their largest values, of a rough likelihood.
+_ROUGH_NOISE = 0.1
+
 #: Steps of the derivatives by errors of the table's motion and by its offset, in standard deviations.
 _SHAPE_STEP, _LINE_STEP = 0.3, 1e-3
 
@@ -59,7 +63,7 @@ class Forward:
     def __init__(self, theta: float, mu_s: float, model: Mendez, record: Record) -> None:
         self.theta, self.mu_s, self.model = theta, mu_s, model
         self._options = options_of(Problem(model, record, Cycle()), wants_peak=True)
-        self._wave = wave_of_record(record, 1.0)
+        self._wave = wave_of_record.__wrapped__(record, 1.0)  # tried once: not kept in its cache
         self._workspace = workspace_of(self._wave, keeps_log=True)
 
     def __call__(self, parameters: Floats, times: Floats) -> Floats:
@@ -107,8 +111,11 @@ class Linear:
     def __call__(self, parameters: Floats) -> Floats:
         """Independent residuals of unit variance, if the model and the noise are right."""
         rest = self.raw(parameters)
-        shrunk = 1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2)
-        return np.asarray(rest - self.left @ (shrunk * (self.left.T @ rest)))
+        return np.asarray(rest - self._shrunk @ (self.left.T @ rest))
+
+    @functools.cached_property
+    def _shrunk(self) -> Floats:
+        return self.left * (1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2))
 
     def raw(self, parameters: Floats) -> Floats:
         """Measured less computed, in standard deviations, if the table's motion had no error."""
@@ -132,6 +139,22 @@ class Linear:
         """What the most likely nuisance parameters leave of each channel, in its own unit."""
         rest = self.raw(parameters) - (self.left * self.sizes) @ (self.right @ self.nuisances(parameters)[0])
         return {name: part / self.weights[name][1] for name, part in self.by_channel(rest).items()}
+
+    def between(self, begin: float, end: float, speed: float) -> "Linear":
+        """The samples between two times; the motion at the beginning is unknown, velocities of the order of `speed`."""
+        inside = (self.times >= begin) & (self.times < end)
+        rows = np.concatenate([inside[use] for use, _ in self.weights.values()])
+        weights = {name: (use & inside, weight[inside[use]]) for name, (use, weight) in self.weights.items()}
+        starts = []
+        for name, (use, weight) in weights.items():
+            moved = np.column_stack([np.ones(weight.size), self.times[use] - begin])
+            still = np.column_stack([np.zeros(weight.size), np.ones(weight.size)])
+            shape = {"relative_displacement": moved, "relative_velocity": still}.get(name, 0.0 * still)
+            starts.append(speed * shape * weight[:, np.newaxis])
+        effects = np.column_stack([((self.left * self.sizes) @ self.right)[rows], np.concatenate(starts)])
+        return Linear(
+            self.forward, self.times, weights, self.measured[rows], *np.linalg.svd(effects, full_matrices=False)
+        )
 
 
 @dataclass(eq=False)
@@ -208,28 +231,14 @@ class Observation:
         """The block on the table's motion as last estimated, or with other errors of it."""
         return Forward(self.theta, self.mu_s, self.model, self.record(self.wrong if wrong is None else wrong))
 
-    def rough(self, forward: Forward, parameters: Floats) -> float:
-        """How far parameters are from what was measured; no sample counts for more than a few.
-
-        Offsets and drifts are taken as they fit best: a drift much larger than the motion would rank by itself.
-        """
-        history = forward(parameters, self.test.times)
-        total = 0.0
-        for name, use in self.use.items():
-            values = self.test.channels[name]
-            spread = max(self.noise[name], 0.1 * float(np.nanmax(np.abs(values))))
-            rest = (values - history[:, COLUMN[name]])[use] / spread
-            lines = [line.parts[name][use] / line.deviation for line in self.lines if name in line.parts]
-            if lines and np.isfinite(rest).all():
-                rest = rest - (design := np.column_stack(lines)) @ np.linalg.lstsq(design, rest)[0]
-            total += float(np.mean(np.log1p(rest**2))) if np.isfinite(rest).all() else 1e6
-        return total
-
-    def linear(self, parameters: Floats, noisy: bool = True) -> Linear:
-        """The likelihood near a solution; without `noisy`, as if the record of the table had no noise."""
+    def linear(self, parameters: Floats, rough: bool = False) -> Linear:
+        """The likelihood near a solution; `rough` as if the table's record had no noise, and the channels had much."""
         test, forward = self.test, self.forward()
-        counted = {name: self._counted(name) for name in self.use}
-        weights = {name: (use, self.weights[name][use] / self.noise[name]) for name, use in counted.items()}
+        weights = {}
+        for name, use in self.use.items():
+            counted = use & ~self.jumps_left_out if name == "block_acceleration" else use
+            noise = max(self.noise[name], _ROUGH_NOISE * float(np.nanmax(np.abs(test.channels[name]))) * rough)
+            weights[name] = counted, self.weights[name][counted] / noise
 
         def weighted(parts: Mapping[str, Floats]) -> Floats:
             none = np.zeros(test.times.size)
@@ -243,7 +252,7 @@ class Observation:
         effects = np.zeros((measured.size, self.wrong.size + len(self.lines)))
         kinds = self.wrong.size - len(self.table_lines)
         base = computed(forward)
-        for at in range(0 if noisy else kinds, self.wrong.size):
+        for at in range(kinds if rough else 0, self.wrong.size):
             moved = self.wrong.copy()
             moved[at] += _SHAPE_STEP if at < kinds else _LINE_STEP
             change = computed(self.forward(moved)) - base
@@ -252,10 +261,6 @@ class Observation:
             effects[:, at] = weighted(line.parts)
         measured = measured + effects[:, : self.wrong.size] @ self.wrong
         return Linear(forward, test.times, weights, measured, *np.linalg.svd(effects, full_matrices=False))
-
-    def _counted(self, name: str) -> Mask:
-        """The samples of a channel that count: `use`, but for those beside jumps of the block's acceleration."""
-        return self.use[name] & ~self.jumps_left_out if name == "block_acceleration" else self.use[name]
 
     def take_noise(self, linear: Linear, parameters: Floats) -> None:
         """Estimate the noise of each channel from the residuals, where it is not given."""
@@ -291,7 +296,14 @@ class Observation:
 
 
 def weights_of(values: Floats) -> Floats:
-    """Square roots of the samples' weights: n equal readings in turn have the weight of one."""
-    same = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    lengths = np.diff(np.append(same, values.size))
-    return np.asarray(1.0 / np.sqrt(np.repeat(lengths, lengths)))
+    """Square roots of the samples' weights: readings at one level, several in turn, have the weight of one.
+
+    A converter's error is the same in all of them, also where the block holds one acceleration in each cycle.
+    """
+    begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    lengths = np.diff(np.append(begins, values.size))
+    runs = np.repeat(lengths, lengths) > 1
+    weights = np.ones(values.size)
+    _, level, counts = np.unique(values[runs], return_inverse=True, return_counts=True)
+    weights[runs] = 1.0 / np.sqrt(counts[level])
+    return weights

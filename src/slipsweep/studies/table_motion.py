@@ -31,7 +31,7 @@ _MOST_SHAPES = 150
 _MOVES, _KINK_SAMPLES = 5.0, 12
 
 #: Linear interpolation of the spline is wrong by this part of the noise at most, between these numbers of points.
-_INTERPOLATION, _FEWEST_POINTS, _MOST_POINTS = 0.05, 4, 32
+_INTERPOLATION, _FEWEST_POINTS, _MOST_POINTS = 0.1, 4, 32
 
 #: Multiple of the standard deviation of a converter's errors that is taken for their noise.
 _CONVERTER = 1.6
@@ -113,7 +113,7 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
     shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
     noise = max(best.noise, converter_noise(acceleration))
-    smooth, places = _averaged(best, alternatives, fine)
+    smooth, places = _averaged(alternatives, np.asarray(best.spline(fine)), fine, (best.noise / noise) ** 2)
     # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right; beside a kink
     # the curve bends only over the shorter of two intervals, which may be much the shorter
     width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
@@ -152,11 +152,14 @@ def _with_kinks(times: Floats, values: Floats, best: _Fitted) -> tuple[_Fitted, 
     return best, tried
 
 
-def _averaged(best: _Fitted, alternatives: list[list[_Fitted]], fine: Floats) -> tuple[Floats, Floats]:
-    """The motion averaged over the places where a kink may lie, by their likelihood, and its errors from these."""
-    smooth, ways = np.asarray(best.spline(fine)), [np.zeros((fine.size, 0))]
+def _averaged(alternatives: list[list[_Fitted]], smooth: Floats, fine: Floats, part: float) -> tuple[Floats, Floats]:
+    """The motion averaged over the places where a kink may lie, by their likelihood, and its errors from these.
+
+    Of a converter's noise only a `part` is seen as scatter.
+    """
+    ways = [np.zeros((fine.size, 0))]
     for fits in alternatives:
-        likely = np.exp([0.5 * (min(one.score for one in fits) - one.score) for one in fits])
+        likely = np.exp([0.5 * part * (min(one.score for one in fits) - one.score) for one in fits])
         likely /= likely.sum()
         top = min(fits, key=lambda one: one.score).spline(fine)
         apart = np.column_stack([one.spline(fine) - top for one in fits])
