@@ -45,7 +45,7 @@ def test_eq1_is_that_of_the_equations() -> None:
 
 
 @pytest.mark.parametrize("kinetic", [0.38, 0.25])
-@pytest.mark.parametrize("noise", [0.0, 0.01, 0.02])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_coulombs_friction_is_level_by_statics_where_eq1_falls(kinetic: float, noise: float) -> None:
     found = slipsweep.measured_friction(coulomb(kinetic, noise), 6.0, 0.38)
     assert found.sizes["slide"] == 6

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.optimize import brentq, least_squares
 
 from slipsweep.studies.datasets import sweep
@@ -341,6 +342,7 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
             one.move(linear, best)
     width = 1.96 * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
+    intervals[0] = _beyond_mode_limit(intervals[0], observations, scale)
     allowed, slopes = search.allowed(), scale.slopes(search.best)
     low, high = (np.diag([scale.parameters(end * row) for row in np.eye(3)]) for end in intervals.T)
     return Estimate(
@@ -385,6 +387,22 @@ def _try_branches(search: Search, scale: Scale) -> None:
             search.square(np.clip([onset, decay, excess], LEAST, MOST))
     for start in search.leaders():
         search.polish(start)
+
+
+def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale: Scale) -> Floats:
+    """Ends of Üy's interval; where one lies at the mode limit (Eq. 7) of a pulse, the error of its peak moves it."""
+    found, slope = ends.copy(), 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
+    for one in observations:
+        motion, spread = one.record(one.wrong).acceleration, np.sqrt(np.sum(one.motion.shapes**2, axis=1))
+        for (part,) in ndimage.find_objects(ndimage.label(motion > 0.0)[0]):
+            top = part.start + int(np.argmax(motion[part]))
+            limit = (slope * motion[top] - scale.g * scale.mu_s) / scale.peak
+            error = 1.96 * slope * spread[top] / scale.peak
+            for side in (0, 1):
+                if abs(ends[side] - limit) < error:
+                    outermost = max if side else min
+                    found[side] = np.clip(outermost(found[side], limit + (2 * side - 1) * error), LEAST[0], MOST[0])
+    return found
 
 
 def cycle_estimate(linear: Linear, found: Estimate, free: Sequence[int]) -> tuple[Floats, Floats]:

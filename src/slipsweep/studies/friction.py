@@ -323,10 +323,12 @@ def test_of(given: Any) -> ShakingTest:
             raise InputError(f"test: {name} = {shown(one)}: must be a DataArray along time")
     if "time" not in (data := xr.Dataset(known)):
         raise InputError("test: time: missing: must be a coordinate, s")
-    channels = {str(name): check_numbers(f"test: {name}", one) for name, one in data.variables.items()}
-    for name in channels:
-        if "units" in data[name].attrs:
-            channels[name] = channels[name] * unit_factor(f"test: {name}: units", name, str(data[name].attrs["units"]))
+    channels = {}
+    for name in ("time", *known):
+        factor, units = 1.0, data[name].attrs.get("units")
+        if units is not None:
+            factor = unit_factor(f"test: {name}: units", name, str(units))
+        channels[name] = factor * check_numbers(f"test: {name}", data[name])
     return ShakingTest(channels.pop("time"), channels)
 
 
