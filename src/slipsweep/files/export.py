@@ -322,7 +322,7 @@ def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Writ
         about = pd.DataFrame(_about(tables, source))
         about.to_excel(book, sheet_name="about", header=False, index=False)
         book.sheets["about"].set_column(0, 1, 40)
-    path.write_bytes(whole.getbuffer())
+    path.write_bytes(whole.getvalue())
 
 
 def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
