@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from slipsweep.studies.datasets import friction_parameters, sweep
     from slipsweep.studies.decoding import flags
     from slipsweep.studies.friction import measured_friction
-    from slipsweep.studies.hazard import displacement_hazard
-    from slipsweep.studies.hazard_curves import HazardCurve
+    from slipsweep.studies.hazard import HazardCurve, displacement_hazard
     from slipsweep.studies.history import simulate
     from slipsweep.studies.limits import limit_amplitude
     from slipsweep.studies.suite_statistics import suite_statistics
@@ -83,8 +82,7 @@ _LAZY = {
     "simulate": "slipsweep.studies.history",
     "flags": "slipsweep.studies.decoding",
     "open_result": "slipsweep.files.opening",
-    "HazardCurve": "slipsweep.studies.hazard_curves",
-    "displacement_hazard": "slipsweep.studies.hazard",
+    **dict.fromkeys(("HazardCurve", "displacement_hazard"), "slipsweep.studies.hazard"),
     "suite_statistics": "slipsweep.studies.suite_statistics",
     "calibrate": "slipsweep.studies.calibration",
     "measured_friction": "slipsweep.studies.friction",

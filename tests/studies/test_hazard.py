@@ -12,8 +12,7 @@ from scipy.stats import norm
 import slipsweep
 from slipsweep import HazardCurve, InputError, Newmark, Record, RunError, Suite, Validity, displacement_hazard
 from slipsweep.model.options import MODELS
-from slipsweep.studies.hazard import exceedance_rates, fragility, openquake_fragility
-from slipsweep.studies.hazard_curves import read_hazard_curve
+from slipsweep.studies.hazard import exceedance_rates, fragility, openquake_fragility, read_hazard_curve
 from tests.studies.test_suite_statistics import suite_result
 from tests.support.commands import command
 

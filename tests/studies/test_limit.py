@@ -198,7 +198,7 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
         "mu_s": [0.3, 0.5, 0.4],
         "frequency": [1.0, 2.0, 0.7],
     }
-    monkeypatch.setattr("slipsweep.studies.limit_scans.SCANNED", 1024)
+    monkeypatch.setattr("slipsweep.studies.limits.SCANNED", 1024)
     zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
     together = slipsweep.limit_amplitude(**choices(**zipped))
     assert together.limit_amplitude.dims == ("case",)

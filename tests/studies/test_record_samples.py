@@ -30,7 +30,7 @@ def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
     sampling = check_sampling(
         uncertain, samples=SAMPLES, method="sobol", seed=0, quantiles=[0.5], thresholds=[0.1], correlation=(), g=9.81
     )
-    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws()[0].items()}
+    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws().items()}
 
 
 NORMAL = {"distribution": "norm", "loc": 0.45, "scale": 0.04}

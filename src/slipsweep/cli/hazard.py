@@ -44,8 +44,7 @@ def hazard(
 
     From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
     """
-    from slipsweep.studies.hazard import displacement_hazard
-    from slipsweep.studies.hazard_curves import read_hazard_curve
+    from slipsweep.studies.hazard import displacement_hazard, read_hazard_curve
 
     paths = common.check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
     result = _read(file, at)

@@ -71,8 +71,8 @@ def run(
         if sampling is None:
             echo(f"{cells} cells ({grid}) in {took}")
         else:
-            runs, points = sampling.sensitivity_runs, math.prod(job.plan.sizes.values())
-            more = f", among {runs} runs each for Sobol indices" if runs else ""
+            runs, points = sampling.runs, math.prod(job.plan.sizes.values())
+            more = f", among {runs} runs each for Sobol indices" if sampling.sensitivity else ""
             pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
             echo(f"{points} grid points ({grid}), {pooled}{sampling.samples} samples each{more}")
             echo(f"{cells} samples solved in {took}")

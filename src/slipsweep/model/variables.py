@@ -350,6 +350,8 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "omitted_rate": _cf(
         "year-1", "upper bound of the part below the smallest amplitude, where the probability is taken as 0"
     ),
+    "lower_rate": _cf("year-1", "annual rate with the lower probability of each two amplitudes"),
+    "upper_rate": _cf("year-1", "annual rate with the higher probability of each two amplitudes"),
     "valueless_share": _cf("1", "largest share of the motions without a value at any amplitude"),
 }
 

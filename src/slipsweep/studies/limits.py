@@ -2,16 +2,17 @@
 
 The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall after a jump, and has
 gaps where the model gives no value.  So every block is first scanned from its yield acceleration upwards, including
-both sides of the amplitudes at which its mode changes, and what the steps of the scan may hide is looked for
-(`limit_scans`).  The first step that reaches the target is halved until two neighbouring double-precision numbers
-are left.  All cells are solved together, by the cycle solver.
+both sides of the amplitudes at which its mode changes.  Steps of the scan that may hide a peak are cut into parts, and
+where u jumps or grows beyond all bounds the place is located; docs/limit.md says what is missed all the same.  The
+first step that reaches the target is halved until two neighbouring double-precision numbers are left.  All cells are
+solved together, by the cycle solver.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,16 +24,19 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_sweep
+from slipsweep.grid.problem import Problem
 from slipsweep.model import parameters, variables
 from slipsweep.model.options import Model, Newmark
-from slipsweep.model.variables import LimitStatus, SlidingMode
+from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies import datasets, limit_scans
+from slipsweep.studies import datasets
 from slipsweep.studies.datasets import Values
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+TITLE = "Amplitudes at which a tolerable displacement is reached"
 
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 256
@@ -40,10 +44,18 @@ AMPLITUDE_STEPS = 256
 #: Cost of a limit in addition to the scan of its block, in cells of the cycle solver.
 _COST = 100.0
 
-TITLE = "Amplitudes at which a tolerable displacement is reached"
+#: Displacements scanned together: 16 MB, and as much again to compare them.
+SCANNED = 2_000_000
 
 #: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
 JUMP = 1e-6
+
+#: A maximum of the scan from this part of the target on may lie next to a higher peak.
+_MAXIMUM = 0.9
+
+#: Where the number of slips changes under a record, u jumps: the place is located where u on either side of the step is
+#: at least this part of the target, to this part of the step.
+_SLIPS_LEAST, _SLIPS_PART = 0.25, 1e-5
 
 #: Rounding of the amplitude at which a mode changes by a formula, relative.
 _ROUNDING = 1e-15
@@ -182,16 +194,15 @@ def plan_limits(
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
     arrays = dict(task.inputs)
     arrays["displacement"] = arrays.pop("amplitude")
-    blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in (*_SCALES, "displacement")))
+    blocks = np.broadcast_shapes(*(one.shape for one in _block_inputs(arrays).values()))
     scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
     # in which mode a block slides, or in how many pulses of a record
-    is_wave = isinstance(task.problem.excitation, Waveform)
-    codes = ("sliding_mode",) if is_wave else tuple(variables.RECORD_COUNTS)
+    codes = variables.RECORD_COUNTS if "time_scale" in arrays else ("sliding_mode",)
     names = (*variables.LIMIT_RESULTS, *codes, "validity")
     return Plan(
         plan.sizes,
         {name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
-        (replace(task, solver=partial(solve, highest, steps), names=names, inputs=arrays),),
+        (replace(task, solver=partial(_solve, highest, steps), names=names, inputs=arrays),),
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
         # one scan of a block serves all its targets
@@ -204,24 +215,13 @@ def plan_limits(
     )
 
 
-def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
-    """Find the limit amplitudes of a grid.
-
-    Parameters
-    ----------
-    maximum_amplitude : float
-        Where the scan ends, m/s².
-    steps : int
-        Steps of the scan.
-    request : Request
-        Variables of `slipsweep.limit_amplitude`; its inputs are those of `engine.solve` but for the amplitude,
-        and the `displacement` that is to be reached, m.
-    """
+def _solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
+    """Limit amplitudes of a grid, whose inputs have the `displacement` to be reached in place of the amplitude."""
     results = request.results()
     for where, motion in engine.motions(request):
         # two thresholds of a pulse, and two sides of each, in addition to the steps
         changes = 4 * _heights(motion).size
-        for slab in slabs(motion.shape, max(1, limit_scans.SCANNED // (steps + changes))):
+        for slab in slabs(motion.shape, max(1, SCANNED // (steps + changes))):
             part = motion.part(slab)
             solved = _solve_part(part, maximum_amplitude, steps)
             for name, values in results.items():
@@ -232,47 +232,107 @@ def solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
 
 
 def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Arrays:
-    """Find the limit amplitudes of a part of a grid that one motion shakes."""
-    problem, shape, arrays = request.problem, request.shape, dict(request.arrays)
+    """Limit amplitudes of a part of a grid that one motion shakes."""
+    scan = _scan(request, maximum_amplitude, steps)
+    cell, low, high = _limits(scan)
+    wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
+    before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
+    results = replace(request, shape=scan.targets.shape).results()
+    for values in results.values():
+        values[:] = math.nan if values.dtype.kind == "f" else SlidingMode.MISSING
+    # without a limit the validity at the maximum amplitude says why
+    results["validity"][:] = scan.found["validity"][:, -1]
+    valueless = np.isnan(scan.found["permanent_displacement"]).all(axis=1)
+    results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
+    for name, values in after.items():
+        results[name][cell] = values
+    results["limit_amplitude"][cell] = high
+    results["limit_status"][cell] = _status(before, after)
+    return {name: values.reshape(request.shape) for name, values in results.items()}
+
+
+def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
+    """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
+    below, above = before["permanent_displacement"], after["permanent_displacement"]
+    jumps = above - below > JUMP * above
+    modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
+    other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
+    status = np.full(above.shape, LimitStatus.REACHED, np.int8)
+    status[jumps] = LimitStatus.AT_JUMP
+    status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP
+    status[np.isnan(below)] = LimitStatus.AFTER_GAP
+    return status
+
+
+class Steps(NamedTuple):
+    """Intervals of amplitude in which cells reach their targets: not at `low`, but at `high`."""
+
+    cell: Indices
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Cells at increasing amplitudes.
+
+    Attributes
+    ----------
+    problem : Problem
+    arrays : mapping of str to array
+        Inputs but for the amplitude: one value for each cell, or one for all.
+    targets : array, (cell,)
+        Displacement to be reached, m.
+    amplitudes : array, (cell, amplitude)
+    found : mapping of str to array, (cell, amplitude)
+        `permanent_displacement`, `validity` and, under a record, `number_of_slips`.
+    """
+
+    problem: Problem
+    arrays: Mapping[str, Floats]
+    targets: Floats
+    amplitudes: Floats
+    found: Mapping[str, NDArray[Any]]
+
+    def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> Arrays:
+        """Results of some cells, each at its own amplitudes (rows of the array)."""
+        more = (1,) * (amplitude.ndim - 1)
+        arrays = {
+            name: (values if values.size == 1 else values[cell]).reshape(-1, *more)
+            for name, values in self.arrays.items()
+        }
+        return engine.solve(Request(self.problem, amplitude.shape, {**arrays, "amplitude": amplitude}, wanted))
+
+    def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
+        """Whether some cells reach their targets at amplitudes of their own."""
+        moved = self.solve(amplitude, cell, ("permanent_displacement",))["permanent_displacement"]
+        return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
+
+
+def _scan(request: Request, maximum_amplitude: float, steps: int) -> Scan:
+    """The cells of a part of a grid at the amplitudes of the scan."""
+    problem, arrays = request.problem, dict(request.arrays)
     displacement = arrays.pop("displacement")
     amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
     # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
     every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
     lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
-    seen = {"permanent_displacement", "validity", *(change.result for change in limit_scans.changes_of(problem))}
-    found = engine.solve(Request(problem, lengths, every, tuple(seen)))
+    slips = ("number_of_slips",) if isinstance(problem.excitation, Record) else ()
+    found = engine.solve(Request(problem, lengths, every, ("permanent_displacement", "validity", *slips)))
 
     def in_rows(values: NDArray[Any]) -> NDArray[Any]:
-        return np.broadcast_to(values, (*shape, amplitudes.shape[-1])).reshape(-1, amplitudes.shape[-1])
+        return np.broadcast_to(values, (*request.shape, lengths[-1])).reshape(-1, lengths[-1])
 
     def in_cells(values: NDArray[Any]) -> NDArray[Any]:
-        return values.ravel() if values.size == 1 else np.broadcast_to(values, shape).ravel()
+        return values.ravel() if values.size == 1 else np.broadcast_to(values, request.shape).ravel()
 
-    scan = limit_scans.Scan(
+    return Scan(
         problem,
         {name: in_cells(values) for name, values in arrays.items()},
-        np.broadcast_to(displacement, shape).ravel(),
+        np.broadcast_to(displacement, request.shape).ravel(),
         in_rows(amplitudes),
         {name: in_rows(values) for name, values in found.items()},
     )
-    cell, low, high = limit_scans.limits_of(scan)
-    codes = tuple(name for name in request.wanted if name in variables.RESULT_DTYPES and name != "limit_status")
-    wanted = ("permanent_displacement", *codes)
-    before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
-
-    # without a limit the validity at the maximum amplitude says why
-    every_cell = np.arange(scan.targets.size)
-    results = Request(problem, every_cell.shape, {}, request.wanted).results()
-    for values in results.values():
-        values[...] = math.nan if values.dtype.kind == "f" else SlidingMode.MISSING
-    results |= scan.solve(np.full(every_cell.shape, maximum_amplitude), every_cell, ("validity",))
-    results["limit_status"][:] = LimitStatus.NOT_REACHED
-    results["limit_status"][np.isnan(scan.found["permanent_displacement"]).all(axis=1)] = LimitStatus.INVALID
-    for name in wanted:
-        results[name][cell] = after[name]
-    results["limit_amplitude"][cell] = high
-    results["limit_status"][cell] = _status(before, after)
-    return {name: values.reshape(shape) for name, values in results.items()}
 
 
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> Floats:
@@ -281,7 +341,7 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
     """
     problem = request.problem
-    blocks = {name: one for name, one in request.arrays.items() if name not in (*_SCALES, "displacement")}
+    blocks = _block_inputs(request.arrays)
     shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, Newmark) else ()
@@ -307,6 +367,11 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     return scanned.reshape(*shape, -1)
 
 
+def _block_inputs(arrays: Mapping[str, Floats]) -> Arrays:
+    """The inputs on which a scan depends: neither those that only scale its result, nor the target."""
+    return {name: one for name, one in arrays.items() if name not in (*_SCALES, "displacement")}
+
+
 def _heights(request: Request) -> Floats:
     """Heights of the highest pulses of the motion of a request, in parts of its amplitude, increasing."""
     motion = request.problem.excitation
@@ -316,14 +381,91 @@ def _heights(request: Request) -> Floats:
     return np.unique(heights)[-_MOST_PULSES:]
 
 
-def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
-    """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
-    below, above = before["permanent_displacement"], after["permanent_displacement"]
-    jumps = above - below > JUMP * above
-    modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
-    other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
-    status = np.full(above.shape, LimitStatus.REACHED, np.int8)
-    status[jumps] = LimitStatus.AT_JUMP
-    status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP
-    status[np.isnan(below)] = LimitStatus.AFTER_GAP
-    return status
+def _limits(scan: Scan) -> Steps:
+    """The lowest neighbouring amplitudes between which cells reach their targets, of those cells that do."""
+    reaches = scan.found["permanent_displacement"] >= scan.targets[:, np.newaxis]
+    first = np.where(reaches.any(axis=1), reaches.argmax(axis=1), reaches.shape[1])
+    before = np.arange(reaches.shape[1] - 1) < first[:, np.newaxis]
+    (cell,) = np.nonzero(reaches.any(axis=1))
+    # the scan begins at yield, where no block has moved: there is always a step before
+    at = first[cell]
+    found = [Steps(cell, scan.amplitudes[cell, at - 1], scan.amplitudes[cell, at]), *_hidden_peaks(scan, before)]
+    # in the gap of the literal rise Kd would be negative: at its edges Kd vanishes, and u grows beyond all bounds
+    found.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
+    if "number_of_slips" in scan.found:  # under a waveform slips are not counted: such jumps are hidden peaks
+        found.append(_at_change(scan, before, "number_of_slips", least=_SLIPS_LEAST, part=_SLIPS_PART))
+    steps = Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
+    order = np.argsort(steps.high, kind="stable")
+    cell, at = np.unique(steps.cell[order], return_index=True)
+    lowest = order[at]
+    return Steps(cell, *_bisected(steps.low[lowest], steps.high[lowest], lambda at, which: scan.reach(at, cell[which])))
+
+
+def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> list[Steps]:
+    """Parts of steps in which a target is reached, `before` (cell, step) the scan itself reaches it."""
+    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier, and then falls
+    saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
+    moved = scan.found["permanent_displacement"]
+    slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
+    # the part of a target from which on a point may lie next to a peak
+    least = np.where(slides_on, saw, np.inf)
+    peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
+    least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = _MAXIMUM
+    near = moved >= least * scan.targets[:, np.newaxis]
+    cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
+    found = []
+    for (some,) in slabs(cell.shape, SCANNED // parts):
+        own, begin = cell[some], step[some]
+        amplitudes = np.linspace(scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1)
+        reaches = scan.reach(amplitudes, own)
+        (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
+        first = reaches[which].argmax(axis=1)
+        found.append(Steps(own[which], amplitudes[which, first - 1], amplitudes[which, first]))
+    return found
+
+
+def _at_change(
+    scan: Scan, before: NDArray[np.bool_], result: str, *, bits: int = -1, least: float = 0.0, part: float = 0.0
+) -> Steps:
+    """Steps up to the last amplitude before a change of a result, or to the first after it, that reaches a target.
+
+    The place of the change is located, to a `part` of the step, where u on either side of it is `least` of the target.
+    """
+    moved, states = scan.found["permanent_displacement"], scan.found[result] & bits
+    cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
+    higher = np.maximum(moved[cell, step + 1], moved[cell, step])
+    # no comparison holds for the NaN of a gap: its edges are located
+    may = before[cell, step] & ~(higher < least * scan.targets[cell])
+    cell, step = cell[may], step[may]
+    start, end, known = scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1], states[cell, step]
+
+    def changed(amplitude: Floats, which: Indices) -> NDArray[np.bool_]:
+        there = scan.solve(amplitude, cell[which], (result,))[result] & bits
+        return np.asarray(there != known[which])
+
+    low, high = _bisected(start, end, changed, part * (end - start))
+    at_low = scan.reach(low, cell)
+    found = at_low | scan.reach(high, cell)
+    return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
+
+
+def _bisected(
+    low: Floats,
+    high: Floats,
+    changed: Callable[[Floats, Indices], NDArray[np.bool_]],
+    width: Floats | float = 0.0,
+) -> tuple[Floats, Floats]:
+    """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
+
+    ``changed(amplitudes, which)``, for intervals by their indices, holds at `high` and not at `low`.
+    """
+    low, high = low.copy(), high.copy()
+    active, width = np.arange(low.size), np.broadcast_to(width, low.shape)
+    while True:
+        middle = low[active] + 0.5 * (high[active] - low[active])
+        inside = (low[active] < middle) & (middle < high[active]) & (high[active] - low[active] > width[active])
+        active, middle = active[inside], middle[inside]
+        if not active.size:
+            return low, high
+        above = changed(middle, active)
+        high[active[above]], low[active[~above]] = middle[above], middle[~above]

@@ -1,6 +1,17 @@
-"""How uncertain inputs are drawn: distributions of scipy.stats by quasi-random numbers of scipy.stats.qmc, checked."""
+"""What is drawn: distributions of scipy.stats, quasi-random numbers of scipy.stats.qmc, and Sobol indices of the draws.
 
-import itertools
+Sobol indices say which uncertain input moves the displacement.  They take two independent sets of draws, A and B, and
+for each of k inputs a third set: A, but with this input from B.  That is k + 2 runs for each sample, of which A has the
+samples of all other statistics.  With means over the samples, and V the variance of A and B, the indices of an input
+are
+
+    first order   mean(u_B (u_AB − u_A)) / V          total   mean((u_A − u_AB)²) / (2 V)
+
+(Saltelli et al. 2010, doi:10.1016/j.cpc.2009.09.018, Table 2, b and f).  `scipy.stats.sobol_indices` has the same
+estimators, but its bootstrap takes no seed, so that a run could not be repeated.
+"""
+
+import functools
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,20 +22,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
-from slipsweep.model.parameters import (
-    BOUNDS,
-    check_choice,
-    check_finite,
-    check_list,
-    check_numbers,
-    check_values,
-    check_whole,
-    computed,
-    number_text,
-    shown,
-)
+from slipsweep.model import parameters
+from slipsweep.model.parameters import check_choice, check_finite, check_list, check_whole, number_text, shown
 from slipsweep.model.units import conversion, quantity
-from slipsweep.model.variables import DRAWN, PARAMETERS
+from slipsweep.model.variables import DRAWN, PARAMETERS, SensitivityStatus
 
 Floats = NDArray[np.float64]
 
@@ -32,11 +33,7 @@ Floats = NDArray[np.float64]
 Thresholds = float | str | Sequence[float | str] | np.ndarray
 
 KINDS = ("absolute", "factor", "offset")
-
 METHODS = ("sobol", "latin_hypercube", "random")
-
-#: Parameters that have an estimate where they are not given, in the order in which each needs those before it.
-ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
 
 #: Most samples a grid point: 2**24 take about 1.5 GB.
 MOST_SAMPLES = 2**24
@@ -45,10 +42,20 @@ MOST_SAMPLES = 2**24
 _MOST_SEED = 2**31 - 1
 
 #: Distributions that errors name.
-_USUAL = ("norm", "lognorm", "uniform", "triang", "truncnorm", "beta", "gamma", "weibull_min")
+_USUAL = "norm, lognorm, uniform, triang, truncnorm, beta, gamma, weibull_min"
 
 #: Half of the last digit of scipy's Sobol numbers, some of which are 0: the quantile there may be infinite.
 _LEAST = 2.0**-31
+
+#: Resamples of the bootstrap, and the shares of them below the ends of an interval.
+RESAMPLES = 1000
+ENDS = (0.025, 0.975)
+
+#: Most parts that a bootstrap resamples: of more samples, neighbours are resampled together.
+_PARTS = 1024
+
+#: Displacements that differ by less, relative to the largest, differ by rounding.
+_SAME = 1e-12
 
 
 @dataclass(frozen=True)
@@ -80,7 +87,7 @@ class Distribution:
 
     def draws(self, uniform: Floats) -> Floats:
         """Turn numbers from 0 to 1 into draws, in the parameter's own unit."""
-        with np.errstate(all="ignore"):  # what is not finite is refused by `_check_draws`
+        with np.errstate(all="ignore"):  # what is not finite is refused by `check_draws`
             return np.asarray(self.frozen.ppf(uniform), np.float64) * self.unit
 
     def applied(self, base: Any, draws: Any) -> Any:
@@ -133,24 +140,42 @@ class Sampling:
         return f"{self.keys or 'uncertain.'}{parameter}"
 
     @property
+    def matrix(self) -> Floats:
+        """Correlations of all parameters."""
+        names = list(self.distributions)
+        matrix = np.eye(len(names))
+        for first, second, value in self.correlation:
+            i, j = names.index(first), names.index(second)
+            matrix[i, j] = matrix[j, i] = value
+        return matrix
+
+    @property
     def independent(self) -> tuple[tuple[str, ...], ...]:
         """The parameters, those that are correlated with one another together, in the order of `distributions`."""
         from scipy.sparse.csgraph import connected_components
 
-        number, group = connected_components(self._matrix(), directed=False)
+        number, group = connected_components(self.matrix, directed=False)
         names = [*self.distributions]
         return tuple(tuple(name for name, own in zip(names, group, strict=True) if own == k) for k in range(number))
 
     @property
-    def sensitivity_runs(self) -> int:
-        """Runs that the Sobol indices of a grid point take; 0 where none are wanted."""
-        return self.samples * (len(self.independent) + 2) if self.sensitivity else 0
+    def runs(self) -> int:
+        """Runs of a grid point: the samples, or all that its Sobol indices take."""
+        return self.samples * (len(self.independent) + 2 if self.sensitivity else 1)
 
-    def draws(self, sets: int = 1) -> list[dict[str, Floats]]:
-        """Draw all parameters, in sets that are independent of each other: arrays of `samples`, the same each time."""
+    def draws(self) -> dict[str, Floats]:
+        """Draws of each parameter for all runs: A; for Sobol indices also B, and A with each input from B."""
         number = len(self.distributions)
-        uniform = self._uniform(sets * number)
-        return [self._draws(uniform[at * number : (at + 1) * number]) for at in range(sets)]
+        if not self.sensitivity:
+            return self._drawn(self._uniform(number))
+        uniform = self._uniform(2 * number)
+        first, second = self._drawn(uniform[:number]), self._drawn(uniform[number:])
+        return {
+            name: np.concatenate(
+                [first[name], second[name], *((second if name in one else first)[name] for one in self.independent)]
+            )
+            for name in first
+        }
 
     def _uniform(self, dimensions: int) -> Floats:
         """Numbers from 0 to 1 that fill a cube of so many dimensions: (dimension, sample)."""
@@ -165,56 +190,53 @@ class Sampling:
             uniform = engines[self.method](dimensions, rng=generator).random(self.samples)
         return np.maximum(uniform.T, _LEAST)
 
-    def _draws(self, uniform: Floats) -> dict[str, Floats]:
+    def _drawn(self, uniform: Floats) -> dict[str, Floats]:
         """Turn a row of numbers from 0 to 1 for each parameter into draws."""
         from scipy.stats import norm
 
         if self.correlation:
-            uniform = norm.cdf(np.linalg.cholesky(self._matrix()) @ norm.ppf(uniform))
+            uniform = norm.cdf(np.linalg.cholesky(self.matrix) @ norm.ppf(uniform))
             uniform = np.clip(uniform, _LEAST, 1.0 - 2.0**-53)
         return {name: one.draws(row) for (name, one), row in zip(self.distributions.items(), uniform, strict=True)}
 
-    def _matrix(self) -> Floats:
-        """Correlations of all parameters."""
-        names = list(self.distributions)
-        matrix = np.eye(len(names))
-        for first, second, value in self.correlation:
-            i, j = names.index(first), names.index(second)
-            matrix[i, j] = matrix[j, i] = value
-        return matrix
-
-    def check_given(self, given: Sequence[str]) -> None:
-        """Refuse parameters both given and drawn, those that others replace, and factors on nothing.
-
-        Raises
-        ------
-        InputError
-        """
+    def check_draws(self, draws: Mapping[str, Floats], coords: Mapping[str, xr.Variable]) -> None:
+        """Refuse draws that no physics allows, anywhere on a grid of these coordinates."""
         for name, one in self.distributions.items():
-            if one.kind == "absolute" and name in given:
+            bound = parameters.BOUNDS[name]
+            # each draw's value is monotone in what it is applied to: the ends of the axis are its extremes.  A factor
+            # on an estimate is checked by itself: the failure of the estimate is a flag of the result
+            bases = [1.0 if one.kind == "factor" else 0.0]
+            if name in coords:
+                bases = [float(coords[name].values.min()), float(coords[name].values.max())]
+            outside, base = max((float(np.mean(~bound.holds(one.applied(at, draws[name])))), at) for at in bases)
+            if outside:
+                about = f" as {one.kind} on {name} = {base:.6g}" if name in coords else ""
                 raise InputError(
-                    f'{self.key(name)}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
-                    'or "offset" to draw about what is given'
+                    f"{self.key(name)} = {one}{about}: {outside:.2%} of the draws are not {bound.text}: "
+                    "take a distribution that has none there, such as lognorm, or truncate it (truncnorm)"
                 )
-            estimated = name in ESTIMATED and (one.kind == "factor" or name == "yield_acceleration")
-            if one.kind != "absolute" and name not in given and not estimated:
-                raise InputError(f'{self.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
-        if "yield_acceleration" in self.distributions and "yield_coefficient" in {*given, *self.distributions}:
-            raise InputError(f"{self.key('yield_acceleration')}: not allowed with yield_coefficient, which replaces it")
+
+    @property
+    def memory(self) -> int:
+        """Bytes that the Sobol indices of a grid point take."""
+        return 8 * RESAMPLES * _PARTS + 64 * self.runs if self.sensitivity else 0
 
     @property
     def attributes(self) -> dict[str, Any]:
         """What results say of how they were sampled; with it they can be drawn again."""
         from scipy import __version__
 
-        correlation = {"correlation": json.dumps(self.correlation)} if self.correlation else {}
-        return {
+        found = {
             "uncertain": json.dumps({name: one.about for name, one in self.distributions.items()}),
             "samples": self.samples,
             "sampling": f"{self.method} (scipy {__version__})",
             "seed": self.seed,
-            **correlation,
         }
+        if self.correlation:
+            found["correlation"] = json.dumps(self.correlation)
+        if self.sensitivity:
+            found["sensitivity"] = f"Saltelli et al. (2010), {self.runs} runs; bootstrap of {RESAMPLES}"
+        return found
 
 
 def check_sampling(
@@ -231,33 +253,25 @@ def check_sampling(
     over: Any = (),
     keys: str = "",
 ) -> Sampling:
-    """Check what is uncertain and how it is sampled.
+    """Check what is uncertain and how it is sampled: the arguments of `slipsweep.sample`.
 
-    Parameters
-    ----------
-    uncertain : mapping of str to mapping or frozen distribution
-    samples, method, seed, quantiles, thresholds, correlation, sensitivity, over
-        As `slipsweep.sample`.
-    g : float
-        What "g" as a unit of acceleration stands for, m/s².
-    keys : str
-        What stands before option names in errors.
+    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.
 
     Raises
     ------
     InputError
         The first thing that is not allowed.
     """
+    before = keys or "uncertain."
     if not isinstance(uncertain, Mapping) or not uncertain:
         raise InputError(
-            f"{keys or 'uncertain'}: must give the distribution of one parameter at least: {', '.join(DRAWN)}"
+            f"{before.removesuffix('.')}: must give the distribution of one parameter at least: {', '.join(DRAWN)}"
         )
-    named = {name: f"{keys or 'uncertain.'}{name}" for name in uncertain}
-    for name, key in named.items():
+    for name in uncertain:
         if name not in DRAWN:
-            raise InputError(f"{key}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
+            raise InputError(f"{before}{name}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
     # in one order, whatever that of the caller: the draws are then the same
-    drawn = {name: distribution_of(named[name], name, uncertain[name], g) for name in DRAWN if name in uncertain}
+    drawn = {name: _distribution(f"{before}{name}", name, uncertain[name], g) for name in DRAWN if name in uncertain}
     method = check_choice(f"{keys}method", method, METHODS)
     samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
     if method == "sobol" and samples & (samples - 1):
@@ -283,28 +297,25 @@ def check_sampling(
         over=tuple(map(str, pooled)),
         keys=keys,
     )
-    if sampling.correlation and np.linalg.eigvalsh(sampling._matrix()).min() < 1e-12:
+    if np.linalg.eigvalsh(sampling.matrix).min() < 1e-12:
         raise InputError(f"{keys}correlation: no such correlations exist together (their matrix is not positive)")
-    if sampling.sensitivity_runs > MOST_SAMPLES:
+    if sampling.runs > MOST_SAMPLES:
         raise InputError(
-            f"{keys}samples = {samples}: Sobol indices take {sampling.sensitivity_runs} runs a grid point with these; "
+            f"{keys}samples = {samples}: Sobol indices take {sampling.runs} runs a grid point with these; "
             f"must be {MOST_SAMPLES} at most"
         )
     return sampling
 
 
-def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribution:
+def _distribution(key: str, parameter: str, given: Any, g: float) -> Distribution:
     """One entry of `uncertain`, called `key` in errors."""
     entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
-    if "distribution" not in entries:
-        raise InputError(f"{key}.distribution: missing: the name of a continuous distribution of scipy.stats")
-    chosen = entries.pop("distribution")
+    chosen = entries.pop("distribution", None)
     kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
-    units = entries.pop("units", None)
+    units, own = entries.pop("units", None), PARAMETERS[parameter]["units"]
     if units is not None and (kind == "factor" or not isinstance(units, str)):
         raise InputError(
-            f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to "
-            f"{PARAMETERS[parameter]['units']}"
+            f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to {own}"
         )
     if isinstance(chosen, str):
         frozen = _frozen(key, chosen, entries)
@@ -315,15 +326,17 @@ def distribution_of(key: str, parameter: str, given: Any, g: float) -> Distribut
             f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, with its "
             "parameters, or a frozen one without"
         )
-    about = _described(frozen)
+    about: dict[str, Any] = {"distribution": repr(frozen)}
+    if family := getattr(frozen, "dist", None):
+        numbers = dict(zip(_arguments(family), frozen.args, strict=False)) | frozen.kwds
+        about = {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}
     with np.errstate(all="ignore"):
-        median = check_numbers(f"{key}: its median", frozen.ppf(0.5))
+        median = parameters.check_numbers(f"{key}: its median", frozen.ppf(0.5))
     if median.ndim or not np.isfinite(median):
         raise InputError(f"{key}: parameters that scipy.stats does not allow for one distribution: {about}")
-    factor = conversion(f"{key}.units", PARAMETERS[parameter]["units"], units, g)
-    return Distribution(
-        parameter, kind, frozen, factor, {**about, **({"units": units} if units is not None else {}), "kind": kind}
-    )
+    factor = conversion(f"{key}.units", own, units, g)
+    about |= {"units": units, "kind": kind} if units is not None else {"kind": kind}
+    return Distribution(parameter, kind, frozen, factor, about)
 
 
 def _frozen(key: str, name: str, given: Mapping[str, Any]) -> Any:
@@ -332,34 +345,19 @@ def _frozen(key: str, name: str, given: Mapping[str, Any]) -> Any:
 
     family = getattr(stats, name, None)
     if not isinstance(family, stats.rv_continuous):
-        known = [one for one in dir(stats) if isinstance(getattr(stats, one), stats.rv_continuous)]
-        hint = did_you_mean(name, known)
-        if hint.startswith("known here"):
-            hint = f"it must be a continuous one of scipy.stats, such as {', '.join(_USUAL)}"
-        raise InputError(f'{key}.distribution = "{name}": no such distribution; {hint}')
-    shapes = _shapes(family)
-    for parameter in given:
-        if parameter not in (*shapes, "loc", "scale"):
-            allowed = ("distribution", "kind", "units", *shapes, "loc", "scale")
-            raise InputError(f"{key}.{parameter}: unknown key; {did_you_mean(str(parameter), allowed)}")
-    for shape in shapes:
-        if shape not in given:
-            raise InputError(f"{key}.{shape}: missing: {name} needs {', '.join(shapes)}")
+        raise InputError(f'{key}.distribution = "{name}": must be a continuous one of scipy.stats, such as {_USUAL}')
+    allowed = _arguments(family)
+    if not {*allowed[:-2]} <= {*given} <= {*allowed}:
+        raise InputError(
+            f"{key}: has {', '.join(map(str, given)) or 'no parameters'}: {name} takes {', '.join(allowed)}, of which "
+            "loc and scale may be left out (and the keys kind and units)"
+        )
     return family(**{parameter: check_finite(f"{key}.{parameter}", value) for parameter, value in given.items()})
 
 
-def _shapes(family: Any) -> list[str]:
-    """Names of a distribution's shape parameters."""
-    return [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
-
-
-def _described(frozen: Any) -> dict[str, Any]:
-    """A frozen distribution in words and numbers."""
-    family = getattr(frozen, "dist", None)
-    if family is None:
-        return {"distribution": repr(frozen)}
-    numbers = dict(zip((*_shapes(family), "loc", "scale"), frozen.args, strict=False)) | frozen.kwds
-    return {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}
+def _arguments(family: Any) -> tuple[str, ...]:
+    """Names of a distribution's parameters: its shapes, and those that all have."""
+    return (*(family.shapes or "").replace(",", " ").split(), "loc", "scale")
 
 
 def check_quantiles(key: str, given: Any) -> Floats:
@@ -369,19 +367,19 @@ def check_quantiles(key: str, given: Any) -> Floats:
 
 def check_thresholds(key: str, given: Any, g: float) -> Floats:
     """Displacements, m or with a unit, one at least, as an increasing coordinate."""
-    entries = np.atleast_1d(np.asarray(computed(given), object)).tolist()
+    entries = np.atleast_1d(np.asarray(parameters.computed(given), object)).tolist()
     values = [quantity(key, one, "m", g) if isinstance(one, str) else one for one in entries]
     return _increasing(key, values, "threshold")
 
 
 def _increasing(key: str, given: Any, bound: str) -> Floats:
     """A list of numbers, one at least, as an increasing coordinate."""
-    values = np.atleast_1d(check_values(bound, given, key))
+    values = np.atleast_1d(parameters.check_values(bound, given, key))
     if values.ndim > 1 or not values.size:
         raise InputError(f"{key} = {shown(given)}: must be a list of one number or more")
-    for before, after in itertools.pairwise(map(float, values)):
-        if after <= before:
-            raise InputError(f"{key}: {number_text(after)} after {number_text(before)}: they must increase")
+    for at in np.flatnonzero(np.diff(values) <= 0.0)[:1]:
+        before, after = (number_text(float(one)) for one in values[at : at + 2])
+        raise InputError(f"{key}: {after} after {before}: they must increase")
     return values
 
 
@@ -392,33 +390,77 @@ def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tup
         one = check_list(key, entry, "two names and a number")
         if len(one) != 3:
             raise InputError(f'{key} = {shown(entry)}: must be ["NAME", "OTHER", NUMBER]')
-        for name in one[:2]:
-            if not isinstance(name, str) or name not in known:
-                raise InputError(f"{key}: {shown(name)} is not drawn; {did_you_mean(str(name), tuple(known))}")
-        first, second, value = *map(str, one[:2]), check_finite(key, one[2])
-        if first == second or frozenset((first, second)) in pairs:
-            raise InputError(f"{key}: {first}, {second}: must be two different parameters, and each pair once")
-        if not -1.0 < value < 1.0:
-            raise InputError(f"{key}: {first}, {second} = {number_text(value)}: must be between -1 and 1")
-        pairs[frozenset((first, second))] = first, second, value
+        first, second = (check_choice(key, name, known) for name in one[:2])
+        value, pair = check_finite(key, one[2]), frozenset((first, second))
+        if len(pair) < 2 or pair in pairs or not -1.0 < value < 1.0:
+            raise InputError(
+                f"{key} = {shown(entry)}: must be two parameters, each pair once, and a number between -1 and 1"
+            )
+        pairs[pair] = first, second, value
     return tuple(pairs.values())
 
 
-def check_draws(
-    sampling: Sampling, draws: Mapping[str, Floats], names: Sequence[str], coords: Mapping[str, xr.Variable]
-) -> None:
-    """Refuse draws of some parameters that no physics allows, anywhere on the grid."""
-    for name in names:
-        one, bound = sampling.distributions[name], BOUNDS[name]
-        # each draw's value is monotone in what it is applied to: the ends of the axis are its extremes.  A factor on an
-        # estimate is checked by itself: the failure of the estimate is a flag of the result
-        bases = [1.0 if one.kind == "factor" else 0.0]
-        if name in coords:
-            bases = [float(coords[name].values.min()), float(coords[name].values.max())]
-        outside, base = max((float(np.mean(~bound.holds(one.applied(at, draws[name])))), at) for at in bases)
-        if outside:
-            about = f" as {one.kind} on {name} = {base:.6g}" if name in coords else ""
-            raise InputError(
-                f"{sampling.key(name)} = {one}{about}: {outside:.2%} of the draws are not {bound.text}: "
-                "take a distribution that has none there, such as lognorm, or truncate it (truncnorm)"
-            )
+def sobol_indices(sampling: Sampling, displacement: Floats) -> dict[str, NDArray[Any]]:
+    """Sobol indices of grid points, their intervals and their status.
+
+    Parameters
+    ----------
+    sampling : Sampling
+    displacement : array, (point, run)
+        Of the runs of `Sampling.draws`.  The indices do not depend on the frequency, as u = W/ω².
+
+    Returns
+    -------
+    dict of str to array
+        `first_order_index`, `first_order_interval`, `total_index`, `total_interval` and `sensitivity_status`; the first
+        dimension is that of the grid points.  NaN where the status says why.
+    """
+    inputs = len(sampling.independent)
+    runs = displacement.reshape(-1, inputs + 2, sampling.samples)
+    status, values = zip(*(_of_point(one, sampling.seed) for one in runs), strict=True)
+    # (point, index and ends of its interval, kind, input)
+    found = np.stack(values)
+    return {
+        "first_order_index": found[:, 0, 0],
+        "first_order_interval": found[:, 1:, 0],
+        "total_index": found[:, 0, 1],
+        "total_interval": found[:, 1:, 1],
+        "sensitivity_status": np.array(status, np.int8),
+    }
+
+
+def _of_point(runs: Floats, seed: int) -> tuple[SensitivityStatus, Floats]:
+    """The status of one grid point, its indices (kind, input), and the ends of their intervals."""
+    inputs, samples = runs.shape[0] - 2, runs.shape[1]
+    largest = np.abs(runs).max()
+    none = np.full((3, 2, inputs), np.nan)
+    if np.isnan(largest):
+        return SensitivityStatus.RUNS_WITHOUT_VALUE, none
+    if np.ptp(runs[:2]) <= _SAME * largest:
+        return SensitivityStatus.NO_VARIANCE, none
+    scaled = runs / largest  # squares of no displacement are then too large or too small
+    a, b, *mixed = scaled - scaled[:2].mean()
+    terms = np.stack([a + b, a**2 + b**2, *(b * (ab - a) for ab in mixed), *(0.5 * (a - ab) ** 2 for ab in mixed)])
+    starts = np.arange(0, samples, -(-samples // _PARTS))
+    weights = _resamples(starts.size, seed)
+    counts = np.diff(starts, append=samples) @ weights
+    resampled = _ratios(np.add.reduceat(terms, starts, axis=-1) @ weights, counts)
+    # a resample may have no variance
+    ends = np.nanquantile(resampled, ENDS, axis=-1)
+    return SensitivityStatus.COMPUTED, np.concatenate([_ratios(terms.sum(axis=-1), samples)[None], ends])
+
+
+def _ratios(sums: Floats, count: Any) -> Floats:
+    """First-order and total indices (kind, input, ...) from the sums of `count` samples' terms."""
+    means = sums / count
+    variance = means[1] / 2.0 - (means[0] / 2.0) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = means[2:] / np.where(variance > 0.0, variance, np.nan)
+    return np.asarray(found.reshape(2, -1, *found.shape[1:]))
+
+
+@functools.lru_cache(maxsize=1)
+def _resamples(parts: int, seed: int) -> Floats:
+    """How often each resample of the bootstrap has each part of the samples, (part, resample)."""
+    drawn = np.random.default_rng(seed).multinomial(parts, np.full(parts, 1.0 / parts), RESAMPLES)
+    return np.ascontiguousarray(drawn.T, np.float64)

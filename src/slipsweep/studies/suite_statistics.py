@@ -25,11 +25,14 @@ REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
 #: The median, and one standard deviation of a normal distribution on either side of it.
 QUANTILES = (0.16, 0.5, 0.84)
 
+#: Displacements to exceed where none are given, m.
+THRESHOLDS = (0.01, 0.1, 1.0)
+
 
 def suite_statistics(
     result: xr.Dataset,
     *,
-    thresholds: Thresholds = (0.01, 0.1, 1.0),
+    thresholds: Thresholds = THRESHOLDS,
     quantiles: float | Sequence[float] | np.ndarray = QUANTILES,
     zero: float | str = 0.0,
     over: str | Sequence[str] | None = None,

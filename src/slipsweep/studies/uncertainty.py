@@ -15,25 +15,57 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid import chunks, engine, plans, resources, tally
+from slipsweep.grid import chunks, engine, plans, resources, tally, threads
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.problem import Problem
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies import datasets, sample_statistics
+from slipsweep.studies import datasets
 from slipsweep.studies.datasets import Values
-from slipsweep.studies.sampling import ESTIMATED, Sampling, Thresholds, check_draws, check_sampling
+from slipsweep.studies.sampling import ENDS, Sampling, Thresholds, check_sampling, sobol_indices
 
 Floats = NDArray[np.float64]
 Arrays = Mapping[str, NDArray[Any]]
 
+TITLE = "Permanent displacement of a rigid block under uncertain inputs"
+
+#: Statistics, and their dimensions in addition to those of the grid.
+STATISTICS: dict[str, tuple[str, ...]] = {
+    "displacement_quantile": ("quantile",),
+    "mean_displacement": (),
+    "exceedance_probability": ("threshold",),
+    "mode_share": ("mode",),
+    "flag_share": ("flag",),
+    "valueless_share": (),
+}
+SENSITIVITY: dict[str, tuple[str, ...]] = {
+    "first_order_index": ("input",),
+    # in this order: CDO reads no variable whose last dimension but one has texts
+    "first_order_interval": ("bound", "input"),
+    "total_index": ("input",),
+    "total_interval": ("bound", "input"),
+    "sensitivity_status": (),
+}
+
+#: Those that depend on the frequency even where the samples do not.
+_BY_FREQUENCY = ("displacement_quantile", "mean_displacement", "exceedance_probability")
+
+_MODES = tuple(mode for mode in variables.SlidingMode if mode is not variables.SlidingMode.MISSING)
+
+#: Parameters that have an estimate where they are not given, in the order in which each needs those before it.
+_ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
+
+#: A value that every parameter may have: the grid of those that are drawn is planned with it.
+_ANY = 0.5
+
 #: Samples solved together: 30 MB, yet enough to keep the kernels busy.
 _CELLS = 1_000_000
 
+#: Cost of the Sobol indices of a grid point in addition to its runs, in cells of the cycle solver.
+_SOBOL_COST = 30_000
+
 #: The dimension of the draws; no result has it.
 _DRAW = "draw of the uncertain inputs"
-
-TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
 
 @datasets.naming_choices
@@ -72,23 +104,20 @@ def sample(
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
 
-    Parameters span a grid as in `sweep`; at every grid point those in `uncertain` are drawn.  The
-    draws are the same at all grid points.
+    Parameters span a grid as in `sweep`; at every grid point those in `uncertain` are drawn, with the same draws.
 
     Parameters
     ----------
     theta, mu_s, amplitude, frequency : float, array or DataArray
         As in `sweep`.  One that is drawn with ``kind="absolute"`` must not be given.
     uncertain : mapping of str to mapping or frozen distribution
-        For any of `theta`, `mu_s`, `amplitude`, `displacement_amplitude`, `frequency`, `scale`, `time_scale`,
-        `yield_acceleration`, `decay_rate`, `delta_mu` and `minimum_friction` either a frozen
-        distribution of scipy.stats, or a mapping with
+        For any parameter but `polarity` and `azimuth` either a frozen distribution of scipy.stats, or a mapping with
 
         - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
           whose shape parameters, ``loc`` and ``scale`` are further keys;
-        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
-          at the grid point or, for the last four, the estimate; under a record for the yield acceleration only) or
-          "offset" (it is added to it);
+        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value at the grid point
+          or, for `yield_acceleration`, and without a record for `decay_rate`, `delta_mu` and `minimum_friction`, the
+          estimate) or "offset" (it is added to it);
         - ``units``: of the draws, if not the parameter's own; not with factors.
     samples : int
         Samples a grid point; a power of 2 for Sobol's.
@@ -107,9 +136,8 @@ def sample(
         the samples among them.
     over : str or list of str
         Dimensions of the grid, such as ``["motion", "polarity"]`` of a suite, whose values are equally likely draws:
-        each meets all samples, statistics are over all of them together, and the result does not have these dimensions.
-        By default there are none: a suite has statistics for each motion.  Not with `sensitivity`, nor a dimension of
-        `frequency` or `time_scale`.
+        each meets all samples, and statistics are over all of them together; by default each motion has its own.  Not
+        with `sensitivity`, nor a dimension of `frequency` or `time_scale`.
     yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         These and the remaining parameters as in `sweep`.
     progress : callable, optional
@@ -120,22 +148,17 @@ def sample(
     Dataset
         Over the grid:
 
-        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and
-          `exceedance_probability`, dimension `threshold` (m): P(u > threshold).  They are of the
-          samples that have a value; NaN where none has.  Statically unstable samples have no value, and are counted
-          as exceeding every threshold.
-        - `mode_share`, dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
-          all samples, how many slide in which mode, have which flag, and have no value.  They do not
-          depend on the frequency (of a record: the time scale) and have no such dimension (but with
-          `displacement_amplitude`).  Under a record there is no `mode_share`.
-        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the
-          variance of the displacement that an input makes by itself, and with all that depends on it.
-          `first_order_interval` and `total_interval` are their 95 % intervals (dimension `bound`), by a bootstrap.
-          Inputs that are correlated count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
-          `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).  They lack the
-          frequency as shares do.
-
-        How the inputs were drawn is in the attributes.
+        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and `exceedance_probability`,
+          dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value; NaN where none has.
+          Statically unstable samples have no value, and are counted as exceeding every threshold.
+        - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
+          all samples, how many slide in which mode, have which flag, and have no value.  They do not depend on the
+          frequency (of a record: the time scale) and have no such dimension (but with `displacement_amplitude`).
+        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the variance of the
+          displacement that an input makes by itself, and with all that depends on it; their 95 % intervals by a
+          bootstrap, `first_order_interval` and `total_interval`, dimension `bound`.  They lack the frequency as shares
+          do.  Inputs that are correlated count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
+          `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).
 
     Raises
     ------
@@ -194,14 +217,7 @@ def sample(
 def plan_samples(
     sampling: Sampling, inputs: Inputs, *, excitation: Any = "sine", model: Any = "mendez", solver: Any = "auto"
 ) -> "SamplePlan":
-    """Plan of the samples of a grid, drawn and checked.
-
-    Parameters
-    ----------
-    sampling : Sampling
-    inputs : Inputs
-    excitation, model, solver
-        As `plans.plan_sweep`.
+    """Plan of the samples of a grid, drawn and checked; as `plans.plan_sweep`.
 
     Raises
     ------
@@ -210,31 +226,21 @@ def plan_samples(
     """
     # friction may be given, or drawn about, by its angle
     given = ["phi" if name == "mu_s" and inputs.phi is not None else name for name in inputs.given]
-    if "structure_frequency" in given:
-        raise InputError(
-            "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
-        )
     problem = plans.check_problem(excitation, model, solver)
     _check_drawn(sampling, given, problem)
-    sampling.check_given(given)
-    draws = sample_statistics.draws_of_runs(sampling)
-    check_draws(sampling, draws, sampling.absolute, {})
-    # what has no value of its own is planned for with one of its draws
-    stand_ins = {name: float(draws[name][0]) for name in sampling.absolute}
+    drawn = sampling.distributions
     plan = plans.plan_sweep(
-        inputs.but(stand_ins), excitation=excitation, model=model, solver=solver, variables=["permanent_displacement"]
-    )
-    dropped = {*stand_ins, *(["mu_s"] if "phi" in sampling.distributions else [])}
+        inputs.but(dict.fromkeys(sampling.absolute, _ANY)),
+        excitation=excitation, model=model, solver=solver, variables=["permanent_displacement"],
+    )  # fmt: skip
+    dropped = {*sampling.absolute, *(["mu_s"] if "phi" in drawn else [])}
     if "displacement_amplitude" in plan.coords and {"displacement_amplitude", "frequency"} & dropped:
-        dropped.add("amplitude")  # A = ω²d of the stand-ins is nobody's amplitude
+        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
-    check_draws(sampling, draws, [name for name in sampling.distributions if name not in stand_ins], coords)
-    kinds = {name: one.kind for name, one in sampling.distributions.items()}
-    about = options.friction_inputs(problem.model.name, coords, kinds)
+    draws = sampling.draws()
+    sampling.check_draws(draws, coords)
+    about = options.friction_inputs(problem.model.name, coords, {name: one.kind for name, one in drawn.items()})
     attrs = {**plan.attrs, "title": TITLE, "friction_inputs": about, **sampling.attributes}
-    if sampling.sensitivity:
-        runs = f"{sampling.sensitivity_runs} runs; bootstrap of {sample_statistics.RESAMPLES}"
-        attrs["sensitivity"] = f"Saltelli et al. (2010), {runs}"
     found = SamplePlan(sampling, draws, problem, coords, attrs)
     if sampling.over:
         attrs["pooled"] = resources.grid_text(found.pooled)
@@ -242,21 +248,31 @@ def plan_samples(
 
 
 def _check_drawn(sampling: Sampling, given: Sequence[str], problem: Problem) -> None:
-    """Refuse to draw what the model or the shaking does not have."""
+    """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
+    if "structure_frequency" in given:
+        raise InputError(
+            "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
+        )
     recorded = not isinstance(problem.excitation, Waveform)
-    own = variables.RECORD_INPUTS if recorded else variables.WAVEFORM_INPUTS
-    other = variables.WAVEFORM_INPUTS if recorded else variables.RECORD_INPUTS
+    kinds = variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS
+    own, other = reversed(kinds) if recorded else kinds
     for name, one in sampling.distributions.items():
         friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
         if name in other and name not in own:
             raise InputError(f"{sampling.key(name)}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
             raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
-        if friction_law and recorded and one.kind != "absolute" and name not in given:
+        if one.kind == "absolute" and name in given:
             raise InputError(
-                f'{sampling.key(name)}: kind = "{one.kind}" needs {name} given: under a record each pulse has an '
-                "estimate of its own"
+                f'{sampling.key(name)}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
+                'or "offset" to draw about what is given'
             )
+        # under a record each pulse has estimates of its own, but for Coulomb's yield acceleration
+        estimated = friction_law and one.kind == "factor" and not recorded
+        if name == "yield_acceleration":
+            estimated = "yield_coefficient" not in {*given, *sampling.distributions}
+        if one.kind != "absolute" and name not in given and not estimated:
+            raise InputError(f'{sampling.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
 
 
 class SamplePlan:
@@ -280,28 +296,32 @@ class SamplePlan:
     ) -> None:
         self.sampling, self.draws, self.problem = sampling, draws, problem
         self.coords, self.attrs = coords, attrs
+        is_wave, drawn = isinstance(problem.excitation, Waveform), sampling.distributions
         #: Results, and their dimensions in addition to those of the grid.
-        self.results = sample_statistics.RESULTS | (
-            sample_statistics.SENSITIVITY_RESULTS if sampling.sensitivity else {}
-        )
-        if not isinstance(problem.excitation, Waveform):
-            self.results = {name: dims for name, dims in self.results.items() if name != "mode_share"}
+        self.results = STATISTICS | (SENSITIVITY if sampling.sensitivity else {})
+        if not is_wave:
+            del self.results["mode_share"]
         self.names = tuple(self.results)
-        drawn = sampling.distributions
-        self.clock = clock = "frequency" if isinstance(problem.excitation, Waveform) else "time_scale"
+        self.clock = clock = "frequency" if is_wave else "time_scale"
         inputs = plans.inputs_of(problem, coords)
-        if {"phi"} <= coords.keys() & drawn.keys():
+        if "phi" in coords and "phi" in drawn:
             inputs["phi"] = coords["phi"]
         if "displacement_amplitude" in {*inputs, *drawn}:
             inputs.pop("amplitude", None)  # A = ω²d
         sizes = plans.grid_sizes(inputs)
         plans.check_dimensions(sizes, coords, {*variables.STATISTICS, *variables.STATISTIC_COORDINATES})
+        for dim in sampling.over:
+            key = f"{sampling.keys}over = {parameters.shown(dim)}"
+            if dim not in sizes:
+                raise InputError(f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}")
+            if clock in coords and dim in coords[clock].dims:  # the samples of a grid point serve all its frequencies
+                raise InputError(f"{key}: must not be a dimension of {clock}")
         # strengths that change with the time, and f + offset, depend on the frequency itself: no scaling law then
         unscaled = {"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn} or (
             clock in drawn and drawn[clock].kind == "offset"
         )
         own = plans.grid_sizes({name: one for name, one in inputs.items() if name != clock or unscaled})
-        self.pooled = {dim: sizes[dim] for dim in self._pooled(sizes)}
+        self.pooled = {dim: sizes[dim] for dim in sampling.over}
         self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
         self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in own}
         self.solved = {dim: size for dim, size in self.sizes.items() if dim in own}
@@ -309,38 +329,24 @@ class SamplePlan:
         self.frequency = xr.Variable((), 1.0)
         if self.scaled:
             clocks = inputs.pop(clock)
-            self.frequency = clocks if clock == "frequency" else 1.0 / clocks
+            self.frequency = clocks if is_wave else 1.0 / clocks
             if clock not in drawn:
                 inputs[clock] = xr.Variable((), 1.0)
         self.inputs = inputs
         #: Runs of a grid point, all draws with all that is pooled; and how many points are solved together.
-        self.runs = max(map(len, draws.values())) * math.prod(self.pooled.values())
+        self.runs = sampling.runs * math.prod(self.pooled.values())
         self.points = max(_CELLS // self.runs, 1)
         # as in `anyplan.AnyPlan`
         self.cells = math.prod(self.solved.values()) * self.runs
         self.together = tuple(self.scaled)
         self.cost = max(1.0, plans.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
+        self.cost += _SOBOL_COST if sampling.sensitivity else 0
         run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
-        self.memory = self.runs * run + plans.memory_of(problem)
-        if sampling.sensitivity:
-            self.cost += sample_statistics.WORK
-            self.memory += sample_statistics.memory_of_bootstrap(sampling)
-
-    def _pooled(self, sizes: Mapping[str, int]) -> tuple[str, ...]:
-        """The dimensions that are pooled (InputError: which cannot be)."""
-        over, clock = self.sampling.over, self.coords.get(self.clock, xr.Variable((), 1.0))
-        for dim in over:
-            key = f"{self.sampling.keys}over = {parameters.shown(dim)}"
-            if dim not in sizes:
-                raise InputError(f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}")
-            if dim in clock.dims:  # the samples of a grid point serve all its frequencies
-                raise InputError(f"{key}: must not be a dimension of {self.clock}")
-        return over
+        self.memory = self.runs * run + plans.memory_of(problem) + sampling.memory
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
-        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
-        return SamplePlan(self.sampling, self.draws, self.problem, coords, self.attrs)
+        return SamplePlan(self.sampling, self.draws, self.problem, _cut(self.coords, chunk), self.attrs)
 
     def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
@@ -360,7 +366,9 @@ class SamplePlan:
             self.memory + self.template().nbytes,
             "ask for fewer samples, grid points, quantiles or thresholds",
         )
-        return self._dataset(self._reduced(progress))
+        # chunks follow one another in the order of the grid
+        parts = [self._reduced(chunk, progress) for chunk in chunks.grid_chunks(self.solved, self.points)]
+        return self._dataset({name: np.concatenate([part[name] for part in parts]) for name in self.results})
 
     def _dataset(self, found: Arrays) -> xr.Dataset:
         """The results as a Dataset, of values that broadcast to (solved, scaled, own dimensions)."""
@@ -368,7 +376,7 @@ class SamplePlan:
         lengths = {**self.sizes, **{name: one.size for name, one in own_coords.items()}}
         results = {}
         for name, own in self.results.items():
-            dims = (*self.solved, *(self.scaled if name in sample_statistics.BY_FREQUENCY else ()), *own)
+            dims = (*self.solved, *(self.scaled if name in _BY_FREQUENCY else ()), *own)
             shape = [lengths[dim] for dim in dims]
             filled = found[name].reshape(shape) if found[name].ndim else np.broadcast_to(found[name], shape)
             dtype = variables.RESULT_DTYPES.get(name, "float64")
@@ -382,86 +390,131 @@ class SamplePlan:
         values: dict[str, NDArray[Any]] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,
-            "mode": np.array(sample_statistics.MODES, np.int8),
+            "mode": np.array(_MODES, np.int8),
             "flag": np.array(variables.Validity, np.int16),
             "input": np.array(["+".join(one) for one in self.sampling.independent]),
-            "bound": np.array(sample_statistics.ENDS),
+            "bound": np.array(ENDS),
         }
         own = {dim for dims in self.results.values() for dim in dims}
         about = variables.STATISTIC_COORDINATES
         return {dim: xr.Variable((dim,), one, about[dim]) for dim, one in values.items() if dim in own}
 
-    def _reduced(self, progress: Callable[[int], None] | None) -> Arrays:
-        """The results at all grid points, (solved, frequencies, own dimension)."""
-        parts: list[Arrays] = []
-        for chunk in chunks.grid_chunks(self.solved, self.points):
-            solved = self._solve(chunk, progress)
-            sizes = {dim: cut.stop - cut.start for dim, cut in chunks.places(chunk, self.solved).items()}
-            rows = math.prod(sizes.values())
-            values = {name: one.reshape(rows, -1) for name, one in solved.items()}
-            frequency = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
-            found = sample_statistics.statistics_of_samples(self.sampling, values, frequency.values.reshape(rows, -1))
-            if self.sampling.sensitivity:
-                found |= sample_statistics.sobol_indices(self.sampling, values["permanent_displacement"])
-            parts.append(found)
-        # chunks follow one another in the order of the grid
-        return {name: np.concatenate([part[name] for part in parts]) for name in self.results}
-
-    def _solve(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
-        """Displacement, mode and flags of a chunk, (solved, pooled, draw): a sweep with one more dimension."""
-        inputs = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.inputs.items()}
+    def _reduced(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> Arrays:
+        """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
         sizes = {dim: cut.stop - cut.start for dim, cut in chunks.places(chunk, self.solved).items()}
+        rows = math.prod(sizes.values())
+        arrays, shape = self._drawn(chunk, sizes)
+        names = ("permanent_displacement", *(["sliding_mode"] if "mode_share" in self.names else []), "validity")
+        solved = engine.solve(engine.Request(self.problem, shape, arrays, names, progress))
+        runs = {name: values.reshape(rows, -1) for name, values in solved.items()}
+        # of Sobol indices the first runs are the samples
+        samples = self.runs // self.sampling.runs * self.sampling.samples
+        frequency = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
+        found = statistics_of_samples(
+            self.sampling, {name: one[:, :samples] for name, one in runs.items()}, frequency.values.reshape(rows, -1)
+        )
+        return found | (
+            sobol_indices(self.sampling, runs["permanent_displacement"]) if self.sampling.sensitivity else {}
+        )
+
+    def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, Floats], tuple[int, ...]]:
+        """Inputs of the runs of a chunk, and their shape, (solved, pooled, draw): a sweep with one more dimension."""
+        inputs = _cut(self.inputs, chunk)
+        sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.draws.items()}
-        sizes |= self.pooled | {_DRAW: max(map(len, self.draws.values()))}
-        about_estimates = {}
+        about_estimates = []
         for name, one in self.sampling.distributions.items():
             if name in inputs or one.kind == "absolute":
                 inputs[name] = one.applied(inputs.get(name), drawn[name])
             elif name == self.clock:  # a factor on the frequencies that displacements are scaled to
                 inputs[name] = drawn[name]
             else:
-                about_estimates[name] = one
+                about_estimates.append(name)
         if "phi" in inputs:
             angles = inputs.pop("phi")
             inputs["mu_s"] = angles.copy(data=np.tan(np.radians(angles.values)))
         arrays = plans.aligned(inputs, sizes)
-        for name in ESTIMATED:
-            if name in about_estimates:
-                draws = plans.aligned({name: drawn[name]}, sizes)[name]
-                arrays[name] = self._about_estimate(about_estimates[name], draws, arrays)
-        modes = ("sliding_mode",) if "mode_share" in self.names else ()
-        names = ("permanent_displacement", *modes, "validity")
-        return engine.solve(engine.Request(self.problem, tuple(sizes.values()), arrays, names, progress))
-
-    def _about_estimate(self, one: Any, draws: Floats, arrays: Mapping[str, Floats]) -> Floats:
-        """A parameter drawn about its estimate; NaN, which leaves it to the estimate and its flag, where that fails."""
-        name = one.parameter
-        # Coulomb's yield acceleration depends on no shaking, which a record has of its own
-        arrays = {"amplitude": np.zeros((1,) * draws.ndim), **arrays}
-        shape = np.broadcast_shapes(*(values.shape for values in arrays.values()))
-        estimate = engine.friction_parameters(engine.Request(self.problem, shape, arrays, (name,)), finite=False)[name]
-        values = one.applied(estimate, draws)
-        return np.where(parameters.BOUNDS[name].holds(values), values, np.nan)
+        for name in sorted(about_estimates, key=_ESTIMATED.index):
+            one, draws = self.sampling.distributions[name], plans.aligned({name: drawn[name]}, sizes)[name]
+            # Coulomb's yield acceleration depends on no shaking, which a record has of its own
+            every = {"amplitude": np.zeros((1,) * draws.ndim), **arrays}
+            shape = np.broadcast_shapes(*(values.shape for values in every.values()))
+            request = engine.Request(self.problem, shape, every, (name,))
+            values = one.applied(engine.friction_parameters(request, finite=False)[name], draws)
+            # NaN leaves it to the estimate and its flag where that fails
+            arrays[name] = np.where(parameters.BOUNDS[name].holds(values), values, np.nan)
+        return arrays, tuple(sizes.values())
 
     def tally(self, results: Mapping[str, NDArray[Any]]) -> tally.Tally:
         """Samples by sliding mode and by flag, from their shares; grid points by what moves the displacement."""
-        indices = None
-        if "sensitivity_status" in results:
-            indices = tally.Indices.counted(
-                self._statistic_coords()["input"].values.tolist(),
-                *(results[name] for name in ("first_order_index", "total_index", "sensitivity_status")),
-            )
         samples = self.sampling.samples * math.prod(self.pooled.values())
 
         def counts(name: str, codes: Sequence[Any]) -> dict[Any, int]:
             shares = results[name].reshape(-1, len(codes)).astype(np.float64)
             return dict(zip(codes, np.rint(shares * samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
 
-        found = tally.Tally(indices=indices)
+        found = tally.Tally()
+        if "sensitivity_status" in results:
+            found.indices = tally.Indices.counted(
+                self._statistic_coords()["input"].values.tolist(),
+                *(results[name] for name in ("first_order_index", "total_index", "sensitivity_status")),
+            )
         if {"flag_share", "valueless_share"} <= results.keys():
             found.flags = counts("flag_share", tuple(variables.Validity))
             found.counted = results["valueless_share"].size * samples
             if "mode_share" in results:
                 found.modes = counts("valueless_share", (variables.SlidingMode.MISSING,))
-                found.modes |= counts("mode_share", sample_statistics.MODES)
+                found.modes |= counts("mode_share", _MODES)
         return found
+
+
+def _cut(coords: Mapping[str, xr.Variable], chunk: chunks.Chunk) -> dict[str, xr.Variable]:
+    return {name: one.isel(chunk, missing_dims="ignore") for name, one in coords.items()}
+
+
+def statistics_of_samples(
+    sampling: Sampling, solved: Mapping[str, NDArray[Any]], frequency: Floats
+) -> dict[str, NDArray[Any]]:
+    """`STATISTICS` of the samples of grid points, (point, own dimension), at each frequency where they depend on it.
+
+    Quantiles, mean, probabilities and shares are of the samples that have a value; probabilities also count the
+    statically unstable ones, as exceeding every threshold.  `solved` has results of samples, (point, sample);
+    displacements are divided by the square of `frequency`, (point, frequency).
+    """
+    displacement, flags = solved["permanent_displacement"], solved["validity"]
+    points, samples = displacement.shape
+    squares = frequency[..., np.newaxis] ** 2
+    quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
+    means = np.full((*frequency.shape, 1), np.nan)
+    exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
+
+    def reduce(first: int, last: int) -> None:
+        for point in range(first, last):
+            values = np.sort(displacement[point])
+            values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
+            # these slide without any shaking: their displacement has no value and exceeds every threshold
+            unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
+            if values.size + unstable:
+                above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
+                exceeding[point] = (above + unstable) / (values.size + unstable)
+            if values.size:
+                with np.errstate(over="ignore"):  # refused below
+                    quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
+                    means[point] = values.mean() / squares[point]
+
+    threads.spread(points, reduce, max(samples // 8, 1))
+    wrong = (np.isinf(quantiles) | np.isinf(means)).any(axis=-1)
+    if wrong.any():
+        first = parameters.number_text(float(frequency[wrong][0]))
+        raise InputError(f"frequency or 1 / time_scale = {first}: must be nearer to 1")
+    found = {
+        "displacement_quantile": quantiles,
+        "mean_displacement": means,
+        "exceedance_probability": exceeding,
+        "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
+        "valueless_share": np.isnan(displacement).mean(axis=-1),
+    }
+    if "sliding_mode" in solved:
+        modes = solved["sliding_mode"]
+        found["mode_share"] = np.stack([np.mean(modes == mode.value, axis=-1) for mode in _MODES], axis=-1)
+    return found
