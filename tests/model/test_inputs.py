@@ -124,7 +124,7 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("sweep", {"progress": 3}, "progress = 3: must be a function"),
     ("sample", {"thresholds": None}, "thresholds = "),
     ("sample", {"correlation": 5}, "correlation = 5: must be a list"),
-    ("sample", {"correlation": [["mu_s", ["theta"], 0.1]]}, r"correlation: \['theta'\] is not drawn"),
+    ("sample", {"correlation": [["mu_s", ["theta"], 0.1]]}, r"correlation = \['theta'\]: must be one of"),
     ("sweep of a record", {"polarity": {1}}, r"polarity = \{1\}: must be 1, -1"),
 ]
 
