@@ -24,7 +24,7 @@ LINES = {
     "motion": 2_262,
     "kernels": 3_270,
     "grid": 1_490,
-    "studies": 4_720,
+    "studies": 4_695,
     "files": 2_200,
     "charts": 2_770,
     "explore": 735,

@@ -131,13 +131,12 @@ def suite_statistics(
         "displacement_quantile": _quantiles(moved, wanted, dims),
         "exceedance_probability": (moved > threshold).where(there).mean(dims),
     }
-    own = {"flag": flag.variable, "threshold": threshold.variable}
-    own["quantile"] = xr.Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"])
+    quantile = xr.Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"])
+    own = {"flag": flag.variable, "threshold": threshold.variable, "quantile": quantile}
     attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
     grid = [dim for dim in moved.dims if dim not in dims]
-    variables = {name: values.transpose(*grid, ...).variable.copy(deep=False) for name, values in found.items()}
-    for name, variable in variables.items():
-        variable.attrs = SUITE_STATISTICS[name]
+    laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
+    variables = {name: (one.dims, one.values, SUITE_STATISTICS[name]) for name, one in laid.items()}
     coords = {name: one.variable for name, one in result.coords.items() if not {*dims, *own} & {*one.dims, name}}
     return xr.Dataset(variables, coords | own, attrs)
 
@@ -152,13 +151,7 @@ def _quantiles(values: xr.DataArray, quantiles: np.ndarray, dims: Sequence[str])
 
 
 def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
-    """The dimensions that make up the suite: those in `over`, or `SUITE`.
-
-    Raises
-    ------
-    InputError
-        The dimension `motion` is not among them.
-    """
+    """The dimensions that make up the suite: those in `over`, or `SUITE`; InputError: `motion` is not among them."""
     there = tuple(map(str, values.dims))
     if "motion" not in there:
         raise InputError(
@@ -176,22 +169,11 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
 
 
 def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Dataset:
-    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point.
+    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
 
-    A motion that does not reach the displacement up to the maximum amplitude has a limit above all others.  Motions
-    without a value are left out.
-
-    Parameters
-    ----------
-    limits : Dataset
-        A result of `slipsweep.limit_amplitude` with the dimension `motion`.
-    quantiles : float or array
-
-    Returns
-    -------
-    Dataset
-        `limit_quantile` (m/s², dimension `quantile`; infinite where so many motions do not reach it, NaN where none has
-        a value), `value_count` and `not_reached_count`.
+    A motion that does not reach the displacement up to the maximum amplitude has a limit above all others: a
+    `limit_quantile` (m/s²) is infinite where too many do not.  Those without a value are left out of it, and of
+    `value_count`; `not_reached_count` has those above all others.
     """
     dims = suite_dims(limits["limit_amplitude"])
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
@@ -246,11 +228,11 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         how = "slipsweep info OUT.nc --at NAME=VALUE -d 50mm"
         return [f"statistics over {suite} at {points} grid points: {how} prints those of some"]
     found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
-    columns: dict[str, Sequence[str]] = {}
-    labels = pd.MultiIndex.from_product([_labels_of(found, dim) for dim in grid]) if grid else None
-    for at, (dim, size) in enumerate(grid.items()):
-        if size > 1 and labels is not None:
-            columns[_title_of(found, dim)] = labels.get_level_values(at).tolist()
+    # peak ground accelerations in g
+    factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
+    places = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in grid))
+    labels = zip(grid.items(), zip(*places, strict=True), strict=True) if grid else ()
+    columns: dict[str, Sequence[str]] = {_title_of(found, dim): column for (dim, n), column in labels if n > 1}
     rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
     for title, column in zip(("16 %", "median", "84 %"), rows["displacement_quantile"], strict=True):
         columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
@@ -272,11 +254,6 @@ def _title_of(data: xr.Dataset, dim: Hashable) -> str:
     units = data[dim].attrs.get("units", "1") if dim in data.variables else "1"
     titles = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
     return titles.get(str(dim), str(dim) if units == "1" else f"{dim} ({units})")
-
-
-def _labels_of(data: xr.Dataset, dim: Hashable) -> list[str]:
-    """The places along a dimension; peak ground accelerations in g."""
-    return labels_along(data, dim, 1.0 / float(data.attrs.get("g", np.nan)) if dim == "amplitude" else 1.0)
 
 
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:
