@@ -21,7 +21,7 @@ ORDER = (
 LINES = {
     "jit": 410,
     "model": 1_490,
-    "motion": 2_262,
+    "motion": 2_260,
     "kernels": 3_270,
     "grid": 1_490,
     "studies": 4_695,

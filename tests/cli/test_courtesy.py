@@ -30,17 +30,12 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
             ("--amplitude", "4"),
             "theta 5 degree, amplitude 4 m/s2",
         ),
-        (("--amplitude", "490.5 cm/s^2"), ("--amplitude", "4.905"), "amplitude 4.905 m/s2 (0.5 g)"),
         (
             ("--amplitude", "4", "--yield-acceleration", "0.1g"),
             ("--amplitude", "4", "--yield-acceleration", "0.981"),
             "yield acceleration 0.981 m/s2 (0.1 g)",
         ),
-        (
-            ("--displacement-amplitude", "30mm"),
-            ("--displacement-amplitude", "0.03"),
-            "displacement amplitude 0.03 m",
-        ),
+        (("--displacement-amplitude", "30mm"), ("--displacement-amplitude", "0.03"), "displacement amplitude 0.03 m"),
     ],
 )
 def test_simulate_takes_units_and_says_what_it_took(
@@ -81,39 +76,18 @@ def test_a_unit_that_does_not_fit_is_refused(
 def test_simulate_without_a_value_says_why_and_fails(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, given: tuple[str, ...], flag: str
 ) -> None:
-    path = tmp_path / "a.csv"
-    for quiet in ((), ("--quiet",)):
-        message = told(capsys, *BLOCK, *given, *quiet, "-o", str(path), status=1)
-        assert f"the model gives no value: {flag}" in message
-        assert message.count("\n") == 1
-        assert not path.exists()
-
-
-def test_run_writes_no_file_that_its_name_belies(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    sweep = tmp_path / "a.toml"
-    sweep.write_text(SWEEP)
-    for ending in ("pdf", "CSV"):
-        path = tmp_path / f"a.{ending}"
-        assert f"a.{ending}: the name must end in one of .nc, .zarr" in told(
-            capsys, "run", str(sweep), "-o", str(path), status=2
-        )
-        assert not path.exists()
-    sweep.write_text(f'{SWEEP}[output]\npath = "b.pdf"\n')
-    assert "b.pdf: the name must end in one of .nc, .zarr" in told(capsys, "run", str(sweep), status=2)
-    assert "a.pdf: the name must end in one of .html, .htm" in told(
-        capsys, "explore", str(tmp_path / "a.nc"), "-o", str(tmp_path / "a.pdf"), status=2
-    )
+    message = told(capsys, *BLOCK, *given, "-o", str(tmp_path / "a.csv"), status=1)
+    assert f"the model gives no value: {flag}" in message
+    assert message.count("\n") == 1
+    assert not (tmp_path / "a.csv").exists()
 
 
 def test_limit_says_what_it_took(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     sweep = tmp_path / "a.toml"
     sweep.write_text(SWEEP)
-    bare = told(capsys, "limit", str(sweep), "-d", "0.05", "--maximum-amplitude", "20")
-    assert "\ndisplacement 0.05 m, searched up to 20 m/s2 (2.039 g)\n" in bare
-    assert bare == told(capsys, "limit", str(sweep), "-d", "50mm", "--maximum-amplitude", "20 m/s2")
-    assert "searched up to 19.62 m/s2 (2 g)\n" in told(
-        capsys, "limit", str(sweep), "-d", "5cm", "--maximum-amplitude", "2g"
-    )
+    bare = told(capsys, "limit", str(sweep), "-d", "0.05", "--maximum-amplitude", "19.62")
+    assert "\ndisplacement 0.05 m, searched up to 19.62 m/s2 (2 g)\n" in bare
+    assert bare == told(capsys, "limit", str(sweep), "-d", "50mm", "--maximum-amplitude", "2g")
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

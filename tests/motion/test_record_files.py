@@ -93,7 +93,6 @@ def test_baseline() -> None:
         ("a.csv", "0,1\n1,x\n", {"units": "g"}, "line 2: '1,x'"),
         ("a.csv", "0,1\n1,\n", {"units": "g"}, "first at t = 1 s"),
         ("a.csv", "0,1\n1,1\n1,2\n", {"units": "g"}, "time of sample 3 = 1: must be greater than 1"),
-        ("a.csv", "0,1\n1,2,3\n", {"units": "g"}, "line 2"),
         ("a.csv", "no numbers\n", {"units": "g"}, "no line of a time and an acceleration"),
         ("a.csv", "0,1\n1,2\n", {"units": "g", "channel": 1}, "channel = 1: only COSMOS files hold several"),
         ("a.txt", "1\n2\n", {"units": "g"}, "interval: must be given"),
@@ -102,12 +101,7 @@ def test_baseline() -> None:
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n", {}, "2 accelerations, where its header says 3"),
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n oops\n", {}, "line 6: ' oops'"),
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2 1e999\n", {}, "sample 3 = inf"),
-        (
-            "a.AT2",
-            f"{AT2}NPTS= 2, DT= .005 SEC\n 1 2\n",
-            {"interval": 0.01},
-            "interval = 0.01: only for a file without",
-        ),
+        ("a.AT2", f"{AT2}NPTS= 2, DT= .005 SEC\n 1 2\n", {"interval": 0.01}, "only for a file without times"),
         ("a.NS", KNET.replace("  -4194", ""), {}, "4 accelerations, where its header says 5"),
         ("a.AT2", f"{AT2}NPTS= many, DT= .005 SEC\n 1 2\n", {}, "no NPTS= in its header"),
     ],
@@ -184,10 +178,10 @@ def test_peaks_of_999_gal_are_no_fill_values(tmp_path: Path) -> None:
 
 def test_what_a_summary_says(tmp_path: Path) -> None:
     path = motion(tmp_path, TIMES, np.where(TIMES == 5.0, 0.3, 0.0))
-    velocity = 0.3 * 9.80665 * 0.01  # of a triangle of 0.02 s
-    assert read_record(path, units="g").summary() == (
-        f"{path}: 10 s at 0.01 s, PGA 0.3 g, PGV {velocity:.4g} m/s, read in g"
-    )
+    found = read_record(path, units="g").summary()
+    assert (
+        found == f"{path}: 10 s at 0.01 s, PGA 0.3 g, PGV {0.003 * 9.80665:.4g} m/s, read in g"
+    )  # a triangle of 0.02 s
 
 
 # --------------------------------------------------------------------------------- ObsPy
@@ -246,7 +240,6 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
         ("       1       1       4     120", "       1       2       5     120", "it holds 0 channels of acceleration"),
         ("     5.000000     0.050000", "  -999.000000     0.050000", "sampling interval -0.999"),
         ("      10 acceleration", "      11 acceleration", "10 values, where 11 are announced"),
-        ("      10 acceleration", "       9 acceleration", "10 values, where 9 are announced"),
         ("-100.00001", "-100.0x001", "must be numbers, 10 columns each"),
         ("End-of-data", "end of file", "no line End-of-data"),
         (" 100 Real-header", " 100 Complex-header", "line 25"),

@@ -315,12 +315,11 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         for part, reason in reasons.items():
             refused.add_note(f"{part}: {reason}")
         raise refused
-    names_of = [Path(source[0]) if isinstance(source[0], Path) else Path(source[0].name) for source in sources]
+    names_of = [one if isinstance(one, Path) else Path(one.name) for one, *_ in sources]
     if pairs is not None:
         names_of = [one.with_name(one.stem.removesuffix(pairs[0]).rstrip("_-. ") or one.stem) for one in names_of]
-    motions = tuple(
-        Pair(*(records[one] for one in source)) if len(source) == 2 else records[source[0]] for source in sources
-    )
+    found = [[records[part] for part in source] for source in sources]
+    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
     return Suite(motions, _labels(names_of), str(entry) if isinstance(entry, (str, Path)) else "suite")
 
@@ -333,16 +332,13 @@ def _components(motion: Motion) -> tuple[Record, ...]:
 def _sources(given: Any, folder: Path) -> list[_Source]:
     """What entries name, each file once."""
     what = "files, folders, patterns, pairs of files or Records"
-    found: list[_Source] = []
+    parts, found = (str, Path, Record), list[_Source]()
     for entry in [given] if isinstance(given, (str, Path, Record, Pair)) else check_list("paths", given, what):
         if isinstance(entry, (Record, Pair)):
             found.append(_components(entry))
         elif isinstance(entry, (str, Path)):
             found += [(file,) for file in _matching(folder, entry) if (file,) not in found]
-        elif isinstance(entry, (list, tuple)) and [isinstance(one, (str, Path, Record)) for one in entry] == [
-            True,
-            True,
-        ]:
+        elif isinstance(entry, (list, tuple)) and len(entry) == sum(isinstance(one, parts) for one in entry) == 2:
             found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
         else:
             raise InputError(f"paths: {shown(entry)}: must be one of {what}")
