@@ -91,7 +91,8 @@ def _options(choice: Family[Any] | type[Any], default: Any) -> dict[str, tuple[A
     note = f" (default: {choice.default})" if may_be_none else ""
     text = f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}."
     names: Any = Literal[tuple(choice.names)]
-    which = Annotated[names | None if may_be_none else names, panel(text, f"--{choice.attribute}", metavar="NAME")]  # type: ignore[valid-type]
+    kind: Any = names | None if may_be_none else names
+    which = Annotated[kind, panel(text, f"--{choice.attribute}", metavar="NAME")]
     found: dict[str, tuple[Any, Any]] = {choice.attribute: (which, None if may_be_none else choice.default)}
     for name, one in choice.options.items():
         of = [kind.name for kind in choice.choices if name in {other.name for other in declared(kind)}]
