@@ -229,7 +229,7 @@ def _magnitudes() -> Iterator[Cell]:
 def _float32() -> Iterator[Cell]:
     for frequency in (1e-6, 1.0, 1e6):
         yield {**_cell(5.0, 0.38, 3.55), "frequency": frequency}
-    for amplitude in (1e-43, 1e-38, 1e36):  # u is about as large: subnormal, the least normal, near the greatest
+    for amplitude in (1e-43, 1e-38):  # u is about as large: subnormal, the least normal
         yield _cell(5.0, 0.38, amplitude, yield_acceleration=0.5 * amplitude, model="newmark")
 
 
@@ -257,7 +257,7 @@ CATEGORIES = (
     Category("many_cycles", "10⁶ cycles: rounding adds up, or a loop takes for ever", _many_cycles),
     Category("frequencies", "f from 10⁻⁶ to 10⁶ Hz: 1/ω² over 24 decades", _frequencies),
     Category("magnitudes", "subnormal accelerations", _magnitudes),
-    Category("float32", "results kept in single precision: subnormal there, or near its greatest", _float32, "float32"),
+    Category("float32", "results kept in single precision: subnormal there", _float32, "float32"),
 )
 DTYPES = {category.name: category.dtype for category in CATEGORIES}
 
