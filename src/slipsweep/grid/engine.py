@@ -225,18 +225,17 @@ def _fill(
     tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // cost, 1)
     tiles = list(slabs(cell_shape, tile))
 
-    def work(first: int, last: int) -> None:
-        if first == last:  # what a first call compiles, seconds long, is compiled on the thread that hears Ctrl-C
-            solve_cells(np.empty(0, CELL), np.empty((1 + max(rows.values()), 0)))
-        for slab in tiles[first:last]:
-            where = tuple(slice(None) if axis == scaled else own for axis, own in enumerate(slab))
-            shape = tuple(len(range(*own.indices(size))) for own, size in zip(slab, cell_shape, strict=True))
-            part = request.part(where)
-            _fill_tile(_views(results, where), part, shape, solve_cells, rows, finite)
-            part.count(math.prod(part.shape))
+    def work(slab: tuple[slice, ...]) -> None:
+        where = tuple(slice(None) if axis == scaled else own for axis, own in enumerate(slab))
+        shape = tuple(len(range(*own.indices(size))) for own, size in zip(slab, cell_shape, strict=True))
+        part = request.part(where)
+        _fill_tile(_views(results, where), part, shape, solve_cells, rows, finite)
+        part.count(math.prod(part.shape))
 
     if math.prod(request.shape):
-        threads.spread(len(tiles), work, tile * cost)
+        # what a first call compiles, seconds long, is compiled on the thread that hears Ctrl-C
+        solve_cells(np.empty(0, CELL), np.empty((1 + max(rows.values()), 0)))
+        threads.spread(tiles, work)
 
 
 def _fill_tile(

@@ -4,7 +4,7 @@ One policy, here and nowhere else:
 
 * Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, so
   no numba threading layer is ever started and none can abort.
-* A call from the main thread of a process spreads its cells over Python threads, itself among them.
+* A call from the main thread of a process spreads its cells over Python threads.
 * A call from any other thread (dask's threaded scheduler, a dask.distributed worker, a
   user's own pool) computes on that thread: whoever started it already shares the cores.
 * The number of threads is the least of the processor affinity, `NUMBA_NUM_THREADS` and
@@ -15,15 +15,13 @@ One policy, here and nowhere else:
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numba
 
-#: Cells of the cycle solver that one call of a kernel takes: long enough to hide the call
-#: (some 20 µs), short enough that Ctrl-C is heard.
-MOST_CELLS_PER_CALL = 65536
-LEAST_CELLS_PER_CALL = 2048
+Part = TypeVar("Part")
 
 
 def cores() -> int:
@@ -45,46 +43,17 @@ def thread_count() -> int:
     return cores()
 
 
-def spread(cells: int, work: Callable[[int, int], None], work_per_cell: int = 1) -> None:
-    """Call ``work(first, last)`` over all of ``range(cells)``, on as many threads as the policy allows.
-
-    Parameters
-    ----------
-    cells : int
-        Number of cells.
-    work : callable
-        Does a part, or none of it, ``work(0, 0)``; the first exception of any part ends the whole.
-    work_per_cell : int
-        What a cell takes, in cells of the cycle solver.
-    """
-    threads = thread_count()
-    least, most = max(LEAST_CELLS_PER_CALL // work_per_cell, 1), max(MOST_CELLS_PER_CALL // work_per_cell, 1)
-    taken = 0
-    taking, over = threading.Lock(), threading.Event()
-
-    def take_parts() -> None:
-        nonlocal taken
+def spread(parts: Collection[Part], work: Callable[[Part], None]) -> None:
+    """Call ``work(part)`` for all parts, on as many threads as the policy allows; an exception ends the whole."""
+    count = min(thread_count(), len(parts))
+    if count <= 1:
+        for part in parts:
+            work(part)
+        return
+    with ThreadPoolExecutor(count) as pool:
         try:
-            while not over.is_set():
-                with taking:
-                    # ever smaller ones, so that the threads finish together
-                    first = taken
-                    last = taken = min(first + min(max((cells - first) // (2 * threads), least), most), cells)
-                if first == last:
-                    return
-                work(first, last)
-        except BaseException:
-            over.set()
+            for _ in pool.map(work, parts):
+                pass
+        except BaseException:  # Ctrl-C, too: what has not begun does not
+            pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-    others = min(threads - 1, (cells - 1) // least)
-    if others:
-        work(0, 0)  # what a first call compiles, seconds long, is compiled on the thread that hears Ctrl-C
-    with ThreadPoolExecutor(max(others, 1)) as pool:  # starts as many threads as are submitted to
-        try:
-            futures = [pool.submit(take_parts) for _ in range(others)]
-            take_parts()
-        finally:  # whatever ended it, Ctrl-C too: the other threads find no more to do
-            over.set()
-    for future in futures:
-        future.result()

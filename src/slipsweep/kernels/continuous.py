@@ -8,7 +8,14 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import Block, inflection, opposite, relative_acceleration, relative_acceleration_root
+from slipsweep.kernels.block import (
+    Block,
+    Options,
+    inflection,
+    opposite,
+    relative_acceleration,
+    relative_acceleration_root,
+)
 from slipsweep.kernels.eq4 import eq4_integrals, lag_integrals
 from slipsweep.kernels.exact import MOST_PHASES, Workspace, inside, next_break
 from slipsweep.kernels.excitation import offset_at
@@ -100,8 +107,8 @@ _slide = series_of(_follow_cycle)
 
 
 @scalar
-def slide_continuously(block: Block, wants_peak: bool, wave: Wave, workspace: Workspace) -> Pulse:
+def slide_continuously(block: Block, options: Options, wave: Wave, workspace: Workspace) -> Pulse:
     """Continuous sliding from the first Üg ≥ Üy on, as one pulse."""
-    if not find_zeros(block, wants_peak, wave, workspace):
+    if not find_zeros(block, options.wants_peak, wave, workspace):
         return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
-    return _slide(block, wave, workspace)
+    return _slide(block, options, wave, workspace)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import Block
+from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.motion.pieces import Wave
 
@@ -22,14 +22,16 @@ class Gain(NamedTuple):
     peak: float
 
 
-def series_of(follow: Callable[[Block, Wave, Any, int, int, float], Gain]) -> Callable[[Block, Wave, Any], Pulse]:
+def series_of(
+    follow: Callable[[Block, Wave, Any, int, int, float], Gain],
+) -> Callable[[Block, Options, Wave, Any], Pulse]:
     """The jitted series of the cycles of continuous sliding.
 
     ``follow(block, wave, table, c, p, tau)`` is Eq. 4 from rest at τ on piece p to the end of cycle c of the table.
     """
 
     @scalar
-    def slide_continuously(block: Block, wave: Wave, table: Any) -> Pulse:
+    def slide_continuously(block: Block, options: Options, wave: Wave, table: Any) -> Pulse:
         """Continuous sliding from the first Üg ≥ Üy on, as one pulse: Eq. 4 throughout."""
         velocity, displacement, peak = 0.0, 0.0, 0.0
         whole, known = Gain(0.0, 0.0, 0.0), -1

@@ -23,15 +23,15 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels import block as physics
-from slipsweep.kernels.block import Block, Cell, Motion, Options
+from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
 from slipsweep.kernels.grid import cell_at
-from slipsweep.kernels.pulse import Pulse, beginning, motion_of, validity_before, yield_seems_to_govern
+from slipsweep.kernels.pulse import Pulse, beginning, yield_seems_to_govern
 from slipsweep.kernels.series import Gain, series_of
-from slipsweep.kernels.train import train_of
+from slipsweep.kernels.train import cell_solver_of
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import FrictionLaw, exponential
+from slipsweep.model.friction import exponential
 from slipsweep.motion.pieces import Piece, Wave
 from slipsweep.motion.steps import RECTANGLE, TRAPEZOID, Steps
 
@@ -375,23 +375,7 @@ def follow(block: Block, wave: Wave, steps: Steps, c: int, p: int, tau: float) -
     return Gain(state.velocity, state.displacement, state.peak)
 
 
-_train = train_of(pulse)
-_slide_continuously = series_of(follow)
-
-
-@single
-def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, steps: Steps) -> Motion:
-    """The response of a cell with any friction law."""
-    interface = physics.interface_of(cell, options.rise, options.g)
-    block, mode = physics.block_of(law, cell, interface, options.rise, options.g), interface.sliding_mode
-    validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
-    found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
-    if mode == eq.CONTINUOUS:
-        found = _slide_continuously(block, wave, steps)
-    elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
-        validity |= physics.YIELD_GOVERNS if yield_seems_to_govern(block, wave) else 0
-        found = _train(block, options, wave, steps, steps.known)
-    return motion_of(block, mode, validity, found)
+solve_cell = cell_solver_of(pulse, series_of(follow), yield_seems_to_govern)
 
 
 @kernel

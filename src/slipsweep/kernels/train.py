@@ -1,4 +1,4 @@
-"""A train of pulses: what all of the shaking comes to, given how one pulse goes.
+"""A cell under a waveform, given how one pulse goes and how continuous sliding does: a train of pulses.
 
 Both solvers bring their own `pulse`, a map from the velocity with which one is entered to that with which the next is;
 what follows from that map over many cycles stands here.
@@ -15,10 +15,17 @@ from slipsweep.kernels.block import (
     NO_VALUE,
     NOT_RECOUPLED,
     UNSOLVED,
+    YIELD_GOVERNS,
     Block,
+    Cell,
+    Motion,
     Options,
+    block_of,
+    interface_of,
 )
-from slipsweep.kernels.pulse import Pulse, first_pulse
+from slipsweep.kernels.pulse import Pulse, first_pulse, motion_of, validity_before
+from slipsweep.model import equations as eq
+from slipsweep.model.friction import FrictionLaw
 from slipsweep.motion.pieces import Wave
 
 
@@ -129,3 +136,28 @@ def train_of(
         return Pulse(velocity, displacement, peak, 0.0, 0.0, 0.0, validity)
 
     return train
+
+
+def cell_solver_of(
+    pulse: Callable[[Block, Options, Wave, Any, int, int, float], Pulse],
+    slide_continuously: Callable[[Block, Options, Wave, Any], Pulse],
+    yield_governs: Callable[[Block, Wave], bool],
+) -> Callable[[FrictionLaw, Cell, Options, Wave, Any], Motion]:
+    """The jitted response of a cell by a solver's pulses, its continuous sliding and its view of Eq. 4 below Üy."""
+    train = train_of(pulse)
+
+    @single
+    def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, table: Any) -> Motion:
+        """The response of a cell of any law that gives what the solver takes of it (`FrictionLaw.missing`)."""
+        interface = interface_of(cell, options.rise, options.g)
+        block, mode = block_of(law, cell, interface, options.rise, options.g), interface.sliding_mode
+        validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
+        found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
+        if mode == eq.CONTINUOUS:
+            found = slide_continuously(block, options, wave, table)
+        elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
+            validity |= YIELD_GOVERNS if yield_governs(block, wave) else 0
+            found = train(block, options, wave, table, table.known)
+        return motion_of(block, mode, validity, found)
+
+    return solve_cell

@@ -482,27 +482,25 @@ def statistics_of_samples(
     displacements are divided by the square of `frequency`, (point, frequency).
     """
     displacement, flags = solved["permanent_displacement"], solved["validity"]
-    points, samples = displacement.shape
     squares = frequency[..., np.newaxis] ** 2
     quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
     means = np.full((*frequency.shape, 1), np.nan)
     exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
 
-    def reduce(first: int, last: int) -> None:
-        for point in range(first, last):
-            values = np.sort(displacement[point])
-            values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-            # these slide without any shaking: their displacement has no value and exceeds every threshold
-            unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
-            if values.size + unstable:
-                above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
-                exceeding[point] = (above + unstable) / (values.size + unstable)
-            if values.size:
-                with np.errstate(over="ignore"):  # refused below
-                    quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
-                    means[point] = values.mean() / squares[point]
+    def reduce(point: int) -> None:
+        values = np.sort(displacement[point])
+        values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
+        # these slide without any shaking: their displacement has no value and exceeds every threshold
+        unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
+        if values.size + unstable:
+            above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
+            exceeding[point] = (above + unstable) / (values.size + unstable)
+        if values.size:
+            with np.errstate(over="ignore"):  # refused below
+                quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
+                means[point] = values.mean() / squares[point]
 
-    threads.spread(points, reduce, max(samples // 8, 1))
+    threads.spread(range(len(displacement)), reduce)
     wrong = (np.isinf(quantiles) | np.isinf(means)).any(axis=-1)
     if wrong.any():
         first = parameters.number_text(float(frequency[wrong][0]))
