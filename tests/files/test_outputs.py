@@ -20,26 +20,15 @@ values = [3, 5]
 values = [1]
 """
 
-#: Every command that writes, with one output left out.
+#: Every command that writes, with its output left out, and what it writes.
 COMMANDS = {
-    "run": "run a.toml -o",
-    "limit": "limit a.toml -d 50mm -o",
-    "simulate": "simulate --theta 5 --mu-s 0.4 --amplitude 4 --frequency 2 -o",
-    "chart": "chart a.nc --kind contours -o",
-    "export": "export a.nc -o",
-    "explore": "explore a.nc -o",
-    "report": "report a.nc -o",
-}
-
-#: What each of them writes.
-SUFFIX = {
-    "run": ".nc",
-    "limit": ".nc",
-    "simulate": ".nc",
-    "chart": ".png",
-    "export": ".csv",
-    "explore": ".html",
-    "report": ".pdf",
+    "run a.toml -o": ".nc",
+    "limit a.toml -d 50mm -o": ".nc",
+    "simulate --theta 5 --mu-s 0.4 --amplitude 4 --frequency 2 -o": ".nc",
+    "chart a.nc --kind contours -o": ".png",
+    "export a.nc -o": ".csv",
+    "explore a.nc -o": ".html",
+    "report a.nc -o": ".pdf",
 }
 
 
@@ -65,14 +54,14 @@ def test_what_exists_is_kept(
     folder: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)
-    path = Path(f"kept{SUFFIX[command]}")
+    path = Path(f"kept{COMMANDS[command]}")
     path.write_text("mine")
-    assert "exists already; give --overwrite" in refused(capfd, *COMMANDS[command].split(), str(path))
+    assert "exists already; give --overwrite" in refused(capfd, *command.split(), str(path))
     assert path.read_text() == "mine"
     missing = str(Path("nowhere") / path)
-    assert "the folder nowhere does not exist" in refused(capfd, *COMMANDS[command].split(), missing)
+    assert "the folder nowhere does not exist" in refused(capfd, *command.split(), missing)
     if os.path.isdir("/proc"):
-        assert f"/proc/{path}" in refused(capfd, *COMMANDS[command].split(), f"/proc/{path}")
+        assert f"/proc/{path}" in refused(capfd, *command.split(), f"/proc/{path}")
 
 
 def test_no_command_writes_what_it_reads(

@@ -42,12 +42,10 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert mine.read_bytes() == (SWEEPS / "data" / "synthetic.csv").read_bytes()
 
 
-def test_the_shipped_files_themselves_are_never_replaced(tmp_path: Path) -> None:
-    (tmp_path / "paper.toml").symlink_to(SWEEPS / "paper.toml")
-    assert "which this command reads" in command(tmp_path, "example", "paper", "--overwrite").stderr
-
-
-def test_a_name_that_is_not_there(tmp_path: Path) -> None:
+def test_what_is_refused(tmp_path: Path) -> None:
+    """A name that is not there; to replace the shipped files themselves."""
     done = command(tmp_path, "example", "recrods")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert 'NAME = recrods: no such sweep file; did you mean "records"?' in done.stderr
+    (tmp_path / "paper.toml").symlink_to(SWEEPS / "paper.toml")
+    assert "which this command reads" in command(tmp_path, "example", "paper", "--overwrite").stderr

@@ -179,20 +179,6 @@ def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyP
         stored(job_of(folder, "suite"), folder / "a.nc", resume=True)
 
 
-def test_two_runs_on_one_output(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "CHUNK_CELLS", 6)
-    solve = running._solve_here
-
-    def solve_and_run_again(target: Any, *arguments: Any) -> None:
-        with pytest.raises(RunError, match=r"a\.nc: another run is writing it"):
-            stored(job_of(folder, "sweep"), folder / "a.nc", overwrite=True)
-        solve(target, *arguments)
-
-    monkeypatch.setattr(running, "_solve_here", solve_and_run_again)
-    stored(job_of(folder, "sweep"), folder / "a.nc")
-    assert read_result(folder / "a.nc").sizes["theta"] == 3
-
-
 def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
     (folder / "large.toml").write_text(WAVE.replace("num = 4", "num = 9000000").replace("[0.5, 1, 2]", "[0.5, 1]"))
     text = (folder / "large.toml").read_text().replace("values = [0.3, 0.5]", "start = 0.3\nstop = 1\nnum = 900000")

@@ -1,7 +1,7 @@
 """netCDF-4 files of results by the CF conventions: what stands in them, and how xarray is told to write it."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
@@ -79,17 +79,11 @@ def new_file(
         elif compression and is_result and one.dims:
             sizes = tuple((lengths or {}).get(str(dim), size) for dim, size in one.sizes.items())
             encoding[name] |= {"zlib": True, "complevel": compression, "shuffle": True, "chunksizes": sizes}
-    file = netCDF4.Dataset(path, "w", format="NETCDF4")
-    file.set_fill_off()  # every value is written: to fill the file first would be to write it twice
-    try:
+    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        file.set_fill_off()  # every value is written: to fill the file first would be to write it twice
         found.dump_to_store(xr.backends.NetCDF4DataStore(file), encoding=encoding)
         file.set_auto_maskandscale(False)
         yield file
-    except BaseException:
-        with suppress(RuntimeError, OSError):  # the first error is the one to report
-            file.close()
-        raise
-    file.close()
 
 
 def _attributes(attrs: Mapping[Any, Any], dtype: Any = np.int32) -> dict[Any, Any]:
