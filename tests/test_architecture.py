@@ -25,7 +25,7 @@ LINES = {
     "kernels": 3_265,
     "grid": 1_450,
     "studies": 4_695,
-    "files": 2_200,
+    "files": 2_190,
     "charts": 2_770,
     "explore": 735,
     "cli": 1_510,

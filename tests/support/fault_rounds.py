@@ -159,7 +159,7 @@ def full_disk(folder: Path, output: str, whole: bytes, chance: random.Random) ->
     try:
         process = start(folder, "run", "a.toml", "-o", output, "-q", limit=None if mounted else 2_000 + rest // 2)
         if mounted:
-            chunks = chance.randint(0, 12)
+            chunks = chance.randint(1, 12)
             _until(lambda: len([*(folder / f"{output}.part").glob("*.chunk")]) >= chunks or process.has_ended)
             with (disk / "filler").open("wb") as file:
                 for _ in range(20):  # the run takes some of it meanwhile
