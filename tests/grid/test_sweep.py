@@ -39,7 +39,7 @@ AXES: dict[str, Any] = {
 def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Cells of each call of a motion kernel."""
     solved: list[int] = []
-    solver_of = engine.solver_of
+    solver_of = engine.solvers.solver_of
 
     def counting(*arguments: Any) -> Any:
         solve, cost = solver_of(*arguments)
@@ -50,7 +50,7 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
         return call, cost
 
-    monkeypatch.setattr(engine, "solver_of", counting)
+    monkeypatch.setattr(engine.solvers, "solver_of", counting)
     return solved
 
 

@@ -27,13 +27,7 @@ from slipsweep.explore.figures import decades, figures, label, scale_of
 from slipsweep.explore.histories import POINTS, Histories, compute_histories
 from slipsweep.files import outputs
 from slipsweep.grid.resources import size_text
-from slipsweep.model.variables import (
-    FLAG_KIND_TEXT,
-    PARAMETERS,
-    FlagKind,
-    SlidingMode,
-    flags_of,
-)
+from slipsweep.model import variables as known
 
 #: Bytes of a page when no other number is asked for: what every mail server lets pass.
 PAGE_BYTES = 10_000_000
@@ -192,15 +186,15 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
         ],
         "arrays": arrays,
         "figures": figures(excerpt),
-        "modes": {int(mode): mode.name.lower() for mode in SlidingMode},
+        "modes": {int(mode): mode.name.lower() for mode in known.SlidingMode},
         "flags": [
             {"mask": int(flag), "name": (flag.name or "").lower(), "kind": str(kind), "text": flag.text}
-            for kind in FlagKind
-            for flag in flags_of(kind)
+            for kind in known.FlagKind
+            for flag in known.flags_of(kind)
         ],
-        "kinds": {str(kind): text for kind, text in FLAG_KIND_TEXT.items()},
-        "cautions": int(flags_of(FlagKind.CAUTION)),
-        "unsound": int(flags_of(FlagKind.CAUTION) | flags_of(FlagKind.NO_VALUE)),
+        "kinds": {str(kind): text for kind, text in known.FLAG_KIND_TEXT.items()},
+        "cautions": int(known.flags_of(known.FlagKind.CAUTION)),
+        "unsound": int(known.flags_of(known.FlagKind.CAUTION) | known.flags_of(known.FlagKind.NO_VALUE)),
         "g": float(table.attrs["g"]),
         "histories": histories
         and {
@@ -219,7 +213,7 @@ def _dimension(name: str) -> dict[str, Any]:
         "name": name,
         "title": label(name),
         "symbol": SYMBOLS.get(name, name.replace("_", " ")),
-        "unit": unit(name) if name in PARAMETERS else "m" if name == "threshold" else "",
+        "unit": unit(name) if name in known.PARAMETERS else "m" if name == "threshold" else "",
         "acceleration": is_acceleration(name),
     }
 
@@ -230,7 +224,7 @@ def _thinned(excerpt: Excerpt) -> list[tuple[str, str]]:
     for dim, length in excerpt.lengths.items():
         if excerpt.sizes[dim] < length:
             values = ", ".join(f"{value:.5g}" for value in excerpt.values(dim))
-            units = f" {unit(dim)}" if dim in PARAMETERS else ""
+            units = f" {unit(dim)}" if dim in known.PARAMETERS else ""
             found.append((f"{dim}: {excerpt.sizes[dim]} of {length} values", values + units))
     return found
 

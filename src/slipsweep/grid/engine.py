@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
-from slipsweep.grid import threads
+from slipsweep.grid import solvers, threads
 from slipsweep.grid.chunks import slabs
 from slipsweep.grid.problem import Problem
-from slipsweep.grid.solvers import PARAMETER_ROWS, ROWS, Solve, find_friction_parameters, solver_of
 from slipsweep.kernels.block import UNSOLVED, Cell
 from slipsweep.kernels.grid import CELL
+from slipsweep.model import variables as known
 from slipsweep.model.parameters import number_text
-from slipsweep.model.variables import RESULT_DTYPES, VALUELESS, Validity
 from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
@@ -72,7 +71,7 @@ class Request:
 
     def results(self) -> Arrays:
         """Arrays for what is wanted, not filled in: of `shape`, float64 but for codes (`variables.RESULT_DTYPES`)."""
-        return {name: np.empty(self.shape, RESULT_DTYPES.get(name, "float64")) for name in self.wanted}
+        return {name: np.empty(self.shape, known.RESULT_DTYPES.get(name, "float64")) for name in self.wanted}
 
     def count(self, cells: int) -> None:
         """Report progress."""
@@ -98,8 +97,8 @@ def solve(request: Request) -> Arrays:
     results, wants_peak = request.results(), "peak_relative_velocity" in request.wanted
     for where, part in motions(request):
         polarity = float(part.arrays["polarity"].item()) if "polarity" in part.arrays else 1.0
-        solve_cells, cost = solver_of(part.problem, wants_peak, polarity)
-        _fill(_views(results, where), part, solve_cells, ROWS, cost)
+        solve_cells, cost = solvers.solver_of(part.problem, wants_peak, polarity)
+        _fill(_views(results, where), part, solve_cells, solvers.ROWS, cost)
     return results
 
 
@@ -111,7 +110,7 @@ def friction_parameters(request: Request, finite: bool = True) -> Arrays:
     """
     request = replace(request, problem=replace(request.problem, excitation=Sine()))
     results = request.results()
-    _fill(results, request, find_friction_parameters(request.problem), PARAMETER_ROWS, 1, finite)
+    _fill(results, request, solvers.find_friction_parameters(request.problem), solvers.PARAMETER_ROWS, 1, finite)
     for values in results.values():
         if finite and values.dtype.kind == "f":
             values[np.isinf(values)] = math.nan  # of a cell without a value
@@ -216,7 +215,12 @@ def _views(results: Arrays, where: tuple[slice, ...]) -> Arrays:
 
 
 def _fill(
-    results: Arrays, request: Request, solve_cells: Solve, rows: Mapping[str, int], cost: int, finite: bool = True
+    results: Arrays,
+    request: Request,
+    solve_cells: solvers.Solve,
+    rows: Mapping[str, int],
+    cost: int,
+    finite: bool = True,
 ) -> None:
     """Fill in results, tile by tile, by what finds these rows of a cell in `cost` times the time of a sine's."""
     scaled = scaled_dimension(request)
@@ -239,7 +243,12 @@ def _fill(
 
 
 def _fill_tile(
-    results: Arrays, request: Request, shape: tuple[int, ...], solve_cells: Solve, rows: Mapping[str, int], finite: bool
+    results: Arrays,
+    request: Request,
+    shape: tuple[int, ...],
+    solve_cells: solvers.Solve,
+    rows: Mapping[str, int],
+    finite: bool,
 ) -> None:
     """Solve the cells of a tile, in all its dimensions but the scaled one, and spread them over the results."""
     cells = np.full((*shape, len(Cell._fields)), math.nan).view(CELL)[..., 0]
@@ -251,7 +260,7 @@ def _fill_tile(
         validity = found[rows["validity"]].reshape(shape).astype(np.int16)
         if (validity & UNSOLVED).any():
             _refuse_unsolved(validity, request)
-        valued = validity & np.int16(VALUELESS) == 0
+        valued = validity & np.int16(known.VALUELESS) == 0
         seconds = phase_seconds(request.problem, request.arrays)
         for name, target in results.items():
             own, factor = found[rows[name]].reshape(shape), seconds ** _POWERS.get(name, 0)
@@ -265,7 +274,7 @@ def _fill_tile(
     if "structure_frequency" in request.arrays and "validity" in results:
         # a block that is not rigid, 0.2 ≤ f/fs ≤ 1.3
         ratio = request.arrays["frequency"] / request.arrays["structure_frequency"]
-        results["validity"] |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(Validity.FLEXIBLE_BLOCK)
+        results["validity"] |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(known.Validity.FLEXIBLE_BLOCK)
 
 
 def _inputs_at(request: Request, cell: Any) -> str:

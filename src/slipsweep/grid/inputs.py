@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid.problem import Problem
+from slipsweep.model import variables as known
 from slipsweep.model.options import Model, Newmark
 from slipsweep.model.parameters import (
     BOUNDS,
@@ -19,16 +20,6 @@ from slipsweep.model.parameters import (
     number_text,
     shown,
     with_friction_coefficient,
-)
-from slipsweep.model.variables import (
-    DIMENSION_ORDER,
-    INTERFACE_INPUTS,
-    MOTION,
-    MOTION_COORDINATES,
-    PARAMETERS,
-    RECORD_INPUTS,
-    STRENGTHS,
-    WAVEFORM_INPUTS,
 )
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
@@ -83,15 +74,15 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
     motion = problem.excitation
     parameters = inputs.given
     if isinstance(motion, Waveform):
-        check_inputs(parameters, WAVEFORM_INPUTS, "a waveform")
+        check_inputs(parameters, known.WAVEFORM_INPUTS, "a waveform")
         if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
             raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
         _check_interface(problem.model, parameters)
         check_given(parameters, ("frequency",))
         return checked(parameters, problem.model.g)
-    check_inputs(parameters, RECORD_INPUTS, "a Suite" if isinstance(motion, Suite) else "a Record")
+    check_inputs(parameters, known.RECORD_INPUTS, "a Suite" if isinstance(motion, Suite) else "a Record")
     _check_interface(problem.model, parameters)
-    strengths = [name for name in STRENGTHS if name in parameters]
+    strengths = [name for name in known.STRENGTHS if name in parameters]
     if len(strengths) > 1:
         raise InputError(f"{', '.join(strengths[:2])}: must not both be given; either is the strength of the motion")
     if isinstance(motion, Suite) and motion.has_pairs:
@@ -106,7 +97,7 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
     polarity = _polarity(parameters.pop("polarity", 1))
     defaults = {"time_scale": 1.0} if strengths else {"scale": 1.0, "time_scale": 1.0}
     parameters = defaults | parameters
-    found = checked({name: parameters[name] for name in PARAMETERS if name in parameters}, problem.model.g)
+    found = checked({name: parameters[name] for name in known.PARAMETERS if name in parameters}, problem.model.g)
     found["polarity"] = polarity
     found |= motion_coordinates(motion, found)
     if strengths and strengths != ["scale"]:
@@ -124,14 +115,14 @@ def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
             f"yield_coefficient: not allowed with model = {model.name!r}, whose friction needs theta and mu_s; "
             "only with model = 'newmark'"
         )
-    for name in INTERFACE_INPUTS:
+    for name in known.INTERFACE_INPUTS:
         if name in parameters:
             raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
 
 
 def check_inputs(given: Collection[str], shaking: Collection[str], what: str) -> None:
     """Refuse inputs of another kind of shaking."""
-    others = {*WAVEFORM_INPUTS, *RECORD_INPUTS} - {*shaking}
+    others = {*known.WAVEFORM_INPUTS, *known.RECORD_INPUTS} - {*shaking}
     for name in given:
         if name in others:
             raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
@@ -141,15 +132,17 @@ def motion_coordinates(motion: Record | Suite, coords: Mapping[str, xr.Variable]
     """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
     if not isinstance(motion, Suite):
         return {}
-    found = {"motion": xr.Variable(("motion",), np.array(motion.labels), MOTION)}
-    found |= {name: xr.Variable(("motion",), one, MOTION_COORDINATES[name]) for name, one in motion.measures.items()}
+    found = {"motion": xr.Variable(("motion",), np.array(motion.labels), known.MOTION)}
+    found |= {
+        name: xr.Variable(("motion",), one, known.MOTION_COORDINATES[name]) for name, one in motion.measures.items()
+    }
     if motion.has_pairs:
         azimuth, places = coords["azimuth"], xr.Variable(("motion",), np.arange(len(motion)))
         sizes = grid_sizes({"azimuth": azimuth, "motion": places})
         both = aligned({"motion": places, "azimuth": azimuth}, sizes)
         at = np.broadcast_arrays(both["motion"], both["azimuth"], np.empty(tuple(sizes.values())))
         for name, one in motion.intensities(at[0], at[1]).items():
-            found[name] = xr.Variable(tuple(sizes), one, MOTION_COORDINATES[name])
+            found[name] = xr.Variable(tuple(sizes), one, known.MOTION_COORDINATES[name])
     return found
 
 
@@ -177,7 +170,7 @@ def _polarity(given: Any) -> xr.Variable:
     if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
         raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
     dims = ("polarity",) if values.ndim else ()
-    return xr.Variable(dims, values.astype(np.int8), PARAMETERS["polarity"])
+    return xr.Variable(dims, values.astype(np.int8), known.PARAMETERS["polarity"])
 
 
 def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
@@ -191,7 +184,7 @@ def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
             dims = tuple(map(str, given.dims))
             if len(set(dims)) < len(dims):
                 raise InputError(f"{name}: dimensions {', '.join(dims)}: must be named each once")
-            variable = xr.Variable(dims, check_values(name, given, g=g), {**given.attrs, **PARAMETERS[name]})
+            variable = xr.Variable(dims, check_values(name, given, g=g), {**given.attrs, **known.PARAMETERS[name]})
         else:
             values = check_values(name, given, g=g)
             if values.ndim > 1:
@@ -199,7 +192,7 @@ def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
                     f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
                     "that names its dimensions"
                 )
-            variable = xr.Variable((name,) if values.ndim else (), values, PARAMETERS[name])
+            variable = xr.Variable((name,) if values.ndim else (), values, known.PARAMETERS[name])
         if variable.values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = variable
@@ -225,7 +218,9 @@ def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
         for dim, size in zip(map(str, variable.dims), variable.shape, strict=True):
             if sizes.setdefault(dim, size) != size:
                 raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
-    ordered = [dim for dim in DIMENSION_ORDER if dim in sizes] + [dim for dim in sizes if dim not in DIMENSION_ORDER]
+    ordered = [dim for dim in known.DIMENSION_ORDER if dim in sizes] + [
+        dim for dim in sizes if dim not in known.DIMENSION_ORDER
+    ]
     return {dim: sizes[dim] for dim in ordered}
 
 
@@ -240,7 +235,7 @@ def aligned(variables: Mapping[str, xr.Variable], sizes: Mapping[str, int]) -> d
 
 def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The coordinates that cells are solved for: no friction angle; of a motion its place in the suite, and no more."""
-    own = {name: one for name, one in coords.items() if name not in ("phi", *MOTION_COORDINATES)}
+    own = {name: one for name, one in coords.items() if name not in ("phi", *known.MOTION_COORDINATES)}
     suite = problem.excitation
     if not isinstance(suite, Suite):
         return own

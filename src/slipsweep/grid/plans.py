@@ -15,20 +15,17 @@ import xarray as xr
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.grid import engine
-from slipsweep.grid.chunks import Chunk, places
-from slipsweep.grid.engine import Arrays, Request
-from slipsweep.grid.inputs import Inputs, aligned, check_amplitudes, check_parameters, checked, grid_sizes, inputs_of
-from slipsweep.grid.problem import Problem, check_problem, cost_of, memory_of
-from slipsweep.grid.resources import check_memory, grid_text
+from slipsweep.grid import chunks, engine, resources
+from slipsweep.grid import inputs as grid_inputs
+from slipsweep.grid import problem as problems
 from slipsweep.grid.solvers import ROWS
 from slipsweep.grid.tally import Tally
+from slipsweep.model import options
 from slipsweep.model import variables as known
-from slipsweep.model.options import MODELS, SOLVERS, Newmark, friction_inputs
 from slipsweep.model.parameters import check_choices, check_given, check_progress
+from slipsweep.motion import waveforms
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 
 _FRICTION_INPUTS = (
     "theta", "mu_s", "amplitude", "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu",
@@ -53,11 +50,11 @@ class Task:
         Parameters, with all dimensions, of length 1 where they do not vary.
     """
 
-    solver: Callable[[Request], Arrays]
-    problem: Problem
+    solver: Callable[[engine.Request], engine.Arrays]
+    problem: problems.Problem
     names: tuple[str, ...]
     sizes: dict[str, int]
-    inputs: Arrays
+    inputs: engine.Arrays
 
     @property
     def nbytes(self) -> int:
@@ -66,10 +63,10 @@ class Task:
             np.dtype(known.RESULT_DTYPES.get(name, "float64")).itemsize for name in self.names
         )
 
-    def solve(self, progress: Callable[[int], None] | None = None) -> Arrays:
+    def solve(self, progress: Callable[[int], None] | None = None) -> engine.Arrays:
         """Compute the results; `progress` is told of cells as they are finished."""
         shape = tuple(self.sizes.values())
-        return self.solver(Request(self.problem, shape, self.inputs, self.names, progress))
+        return self.solver(engine.Request(self.problem, shape, self.inputs, self.names, progress))
 
     def part(self, slices: tuple[slice, ...]) -> "Task":
         """The task cut to a slice of every dimension."""
@@ -117,10 +114,10 @@ class Plan:
         """Number of cells of the grid."""
         return math.prod(self.sizes.values())
 
-    def part(self, chunk: Chunk) -> "Plan":
+    def part(self, chunk: chunks.Chunk) -> "Plan":
         """The plan cut to a chunk of its grid."""
-        tasks = tuple(task.part(tuple(places(chunk, task.sizes).values())) for task in self.tasks)
-        sizes = {dim: cut.stop - cut.start for dim, cut in places(chunk, self.sizes).items()}
+        tasks = tuple(task.part(tuple(chunks.places(chunk, task.sizes).values())) for task in self.tasks)
+        sizes = {dim: cut.stop - cut.start for dim, cut in chunks.places(chunk, self.sizes).items()}
         coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
         return replace(self, sizes=sizes, coords=coords, tasks=tasks)
 
@@ -141,8 +138,8 @@ class Plan:
             (task.sizes for task in self.tasks), key=lambda sizes: math.prod(sizes.values()), default={}
         )
         cells = math.prod(sizes.values())
-        check_memory(
-            f"grid of {grid_text(sizes)}, {cells:.4g} cells",
+        resources.check_memory(
+            f"grid of {resources.grid_text(sizes)}, {cells:.4g} cells",
             sum(task.nbytes for task in self.tasks) + cells * self.cell_memory,
             _ADVICE,
         )
@@ -171,7 +168,7 @@ class Plan:
 
 
 def plan_sweep(
-    inputs: Inputs,
+    inputs: grid_inputs.Inputs,
     *,
     excitation: Any = "sine",
     model: Any = "mendez",
@@ -191,69 +188,71 @@ def plan_sweep(
     InputError
         As `slipsweep.sweep`.
     """
-    problem = check_problem(excitation, model, solver)
-    parameters = check_parameters(problem, inputs)
+    problem = problems.check_problem(excitation, model, solver)
+    parameters = grid_inputs.check_parameters(problem, inputs)
     if isinstance(problem.excitation, (Record, Suite)):
         return _plan_records(problem, parameters, variables)
     return _plan_waveform(problem, parameters, variables)
 
 
-def _plan_records(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
+def _plan_records(problem: problems.Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a record or a suite; `coords` as `check_parameters` gives them."""
     is_suite = isinstance(problem.excitation, Suite)
     default = known.DEFAULT_SUITE_RESULTS if is_suite else known.DEFAULT_RECORD_RESULTS
     wanted = default if variables is None else check_choices("variables", variables, known.RECORD_RESULTS)
-    inputs = inputs_of(problem, coords)
-    sizes = grid_sizes(inputs)
+    inputs = grid_inputs.inputs_of(problem, coords)
+    sizes = grid_inputs.grid_sizes(inputs)
     tasks = _motion_tasks(
-        problem, [name for name in known.RECORD_RESULTS if name in wanted], sizes, aligned(inputs, sizes)
+        problem, [name for name in known.RECORD_RESULTS if name in wanted], sizes, grid_inputs.aligned(inputs, sizes)
     )
-    cost = cost_of(problem) * max(len(tasks), 1)
+    cost = problems.cost_of(problem) * max(len(tasks), 1)
     if "motion_factor" in wanted:
         tasks.append(_factor_task(problem, inputs))
     motions = "suite of recorded motions" if is_suite else "recorded motion"
     attrs = about(f"Response of a rigid block to a {motions}", problem, coords)
-    return Plan(sizes, coords, tuple(tasks), wanted, attrs, cost, memory=memory_of(problem))
+    return Plan(sizes, coords, tuple(tasks), wanted, attrs, cost, memory=problems.memory_of(problem))
 
 
-def _factor_task(problem: Problem, inputs: Mapping[str, xr.Variable]) -> Task:
+def _factor_task(problem: problems.Problem, inputs: Mapping[str, xr.Variable]) -> Task:
     """The factor on each motion, on the dimensions it depends on."""
     strength = next(name for name in known.STRENGTHS if name in inputs)
     names = [strength, *(["time_scale"] if strength in ("pgv", "arias_intensity") else []), "azimuth", "motion"]
     own = {name: inputs[name] for name in names if name in inputs}
-    sizes = grid_sizes(own)
-    return Task(engine.factors, problem, ("motion_factor",), sizes, aligned(own, sizes))
+    sizes = grid_inputs.grid_sizes(own)
+    return Task(engine.factors, problem, ("motion_factor",), sizes, grid_inputs.aligned(own, sizes))
 
 
-def _motion_tasks(problem: Problem, wanted: Collection[str], sizes: dict[str, int], inputs: Arrays) -> list[Task]:
+def _motion_tasks(
+    problem: problems.Problem, wanted: Collection[str], sizes: dict[str, int], inputs: engine.Arrays
+) -> list[Task]:
     """The motion of the block, and of Newmark's on the same cells."""
     tasks = []
     if motion := tuple(name for name in wanted if name in ROWS and name != "newmark_displacement"):
         tasks.append(Task(engine.solve, problem, motion, sizes, inputs))
     if "newmark_displacement" in wanted:
-        classical = replace(problem, model=Newmark(problem.model.g))
+        classical = replace(problem, model=options.Newmark(problem.model.g))
         tasks.append(Task(engine.solve, classical, ("newmark_displacement",), sizes, inputs))
     return tasks
 
 
-def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
+def _plan_waveform(problem: problems.Problem, coords: dict[str, xr.Variable], variables: Any) -> Plan:
     """Plan of a sweep under a waveform; `coords` as `check_parameters` gives them."""
     wanted = known.DEFAULT_RESULTS if variables is None else check_choices("variables", variables, known.RESULTS)
-    sizes, inputs = grid_sizes(coords), inputs_of(problem, coords)
+    sizes, inputs = grid_inputs.grid_sizes(coords), grid_inputs.inputs_of(problem, coords)
     drive: dict[str, xr.Variable] = {
         name: coords[name] for name in ("displacement_amplitude", "frequency") if name in coords
     }
     if len(drive) == 2:
-        check_amplitudes(**drive)
-        dims = grid_sizes(drive)
+        grid_inputs.check_amplitudes(**drive)
+        dims = grid_inputs.grid_sizes(drive)
         # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
         if any(dims.keys() == set(variable.dims) for variable in drive.values()):
-            both = aligned(drive, dims)
-            amplitudes = xr.Variable(tuple(dims), peak_acceleration(**both), known.PARAMETERS["amplitude"])
+            both = grid_inputs.aligned(drive, dims)
+            amplitudes = xr.Variable(tuple(dims), waveforms.peak_acceleration(**both), known.PARAMETERS["amplitude"])
             coords = coords | {"amplitude": amplitudes}
 
-    tasks = _motion_tasks(problem, wanted, sizes, aligned(inputs, sizes))
-    cost = cost_of(problem) * max(len(tasks), 1)
+    tasks = _motion_tasks(problem, wanted, sizes, grid_inputs.aligned(inputs, sizes))
+    cost = problems.cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
     friction = tuple(name for name in known.FRICTION_PARAMETERS if name in wanted and name not in inputs)
     for name in friction if "yield_coefficient" in inputs else ():
@@ -263,7 +262,7 @@ def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: 
         tasks.append(_friction_task(problem, friction, inputs))
     amplitude = ("amplitude",) if "amplitude" in wanted and "amplitude" not in coords else ()
     if amplitude:
-        tasks.append(Task(engine.amplitudes, problem, amplitude, dims, aligned(drive, dims)))
+        tasks.append(Task(engine.amplitudes, problem, amplitude, dims, grid_inputs.aligned(drive, dims)))
     return Plan(
         sizes,
         coords,
@@ -274,14 +273,14 @@ def _plan_waveform(problem: Problem, coords: dict[str, xr.Variable], variables: 
     )
 
 
-def plan_friction_parameters(inputs: Inputs, *, model: Any = "mendez") -> Plan:
+def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez") -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
-    problem = check_problem("sine", model, "auto")
+    problem = problems.check_problem("sine", model, "auto")
     check_given(inputs.given, ("theta", "mu_s", "amplitude"))
-    coords = checked(inputs.given, problem.model.g)
+    coords = grid_inputs.checked(inputs.given, problem.model.g)
     names = (*(name for name in known.FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
-    attrs = {"title": "Friction parameters", **_SOURCE, **MODELS.attributes(problem.model)}
+    attrs = {"title": "Friction parameters", **_SOURCE, **options.MODELS.attributes(problem.model)}
     return Plan(task.sizes, coords, (task,), names, attrs)
 
 
@@ -294,7 +293,7 @@ def check_dimensions(sizes: Mapping[str, int], coords: Mapping[str, xr.Variable]
             raise InputError(f"{dim}: is a dimension of another parameter: must have values along it")
 
 
-def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[str, xr.Variable]) -> Task:
+def _friction_task(problem: problems.Problem, names: tuple[str, ...], variables: Mapping[str, xr.Variable]) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
     made = ("displacement_amplitude", "frequency") if "displacement_amplitude" in variables else ()
     own = {name: variable for name, variable in variables.items() if name in (*_FRICTION_INPUTS, *made)}
@@ -302,8 +301,8 @@ def _friction_task(problem: Problem, names: tuple[str, ...], variables: Mapping[
     for name in ("delta_mu", "decay_rate"):
         if name in names and (own[drive].values == 0.0).any():
             raise InputError(f"{drive} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
-    sizes = grid_sizes(own)
-    return Task(engine.friction_parameters, problem, names, sizes, aligned(own, sizes))
+    sizes = grid_inputs.grid_sizes(own)
+    return Task(engine.friction_parameters, problem, names, sizes, grid_inputs.aligned(own, sizes))
 
 
 _ADVICE = "ask for fewer variables or cells, or give chunks= for a lazy result"
@@ -311,9 +310,9 @@ _ADVICE = "ask for fewer variables or cells, or give chunks= for a lazy result"
 _SOURCE = {"source": f"slipsweep {__version__}", "references": known.REFERENCE}
 
 
-def about(title: str, problem: Problem, given: Collection[str]) -> dict[str, Any]:
+def about(title: str, problem: problems.Problem, given: Collection[str]) -> dict[str, Any]:
     """What results say of themselves: the choices read back from it are those of the problem."""
-    inputs = {"friction_inputs": friction_inputs(problem.model.name, given)}
+    inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given)}
     motion = problem.excitation
     shaking: Mapping[str, Any]
     if isinstance(motion, Record):
@@ -321,5 +320,5 @@ def about(title: str, problem: Problem, given: Collection[str]) -> dict[str, Any
     elif isinstance(motion, Suite):
         shaking = motion.attrs
     else:
-        shaking = WAVEFORMS.attributes(motion) | SOLVERS.attributes(problem.solver)
-    return {"title": title, **_SOURCE, **MODELS.attributes(problem.model), **inputs, **shaking}
+        shaking = waveforms.WAVEFORMS.attributes(motion) | options.SOLVERS.attributes(problem.solver)
+    return {"title": title, **_SOURCE, **options.MODELS.attributes(problem.model), **inputs, **shaking}

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
+from slipsweep.grid import problem as problems
 from slipsweep.grid.inputs import Inputs
-from slipsweep.grid.problem import Problem
 from slipsweep.kernels import exact
 from slipsweep.kernels import history as kernels
 from slipsweep.kernels.block import Cell
@@ -113,7 +113,7 @@ def simulate(
         yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
         minimum_friction=minimum_friction, structure_frequency=structure_frequency,
     )  # fmt: skip
-    problem = plans.check_problem(excitation, model, "cycle")
+    problem = problems.check_problem(excitation, model, "cycle")
     if isinstance(problem.excitation, Suite):
         label = problem.excitation.labels[0]
         of = ".rotated(azimuth)" if problem.excitation.has_pairs else ""
@@ -150,7 +150,7 @@ class _History:
     Phases are ωt; under a record the times at time scale 1 take their place.
     """
 
-    problem: Problem
+    problem: problems.Problem
     inputs: Mapping[str, Floats]
     summary: xr.Dataset
 

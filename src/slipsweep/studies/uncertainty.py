@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import chunks, engine, plans, resources, tally, threads
-from slipsweep.grid.inputs import Inputs
-from slipsweep.grid.problem import Problem
+from slipsweep.grid import inputs as grid_inputs
+from slipsweep.grid import problem as problems
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
@@ -187,7 +187,7 @@ def sample(
     >>> result.displacement_quantile.sel(quantile=0.5).round(3).values
     array([0.   , 0.265])
     """
-    inputs = Inputs(
+    inputs = grid_inputs.Inputs(
         theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, frequency=frequency,
         displacement_amplitude=displacement_amplitude, scale=scale, pgv=pgv, arias_intensity=arias_intensity,
         time_scale=time_scale, polarity=polarity, azimuth=azimuth, yield_acceleration=yield_acceleration,
@@ -215,7 +215,12 @@ def sample(
 
 
 def plan_samples(
-    sampling: Sampling, inputs: Inputs, *, excitation: Any = "sine", model: Any = "mendez", solver: Any = "auto"
+    sampling: Sampling,
+    inputs: grid_inputs.Inputs,
+    *,
+    excitation: Any = "sine",
+    model: Any = "mendez",
+    solver: Any = "auto",
 ) -> "SamplePlan":
     """Plan of the samples of a grid, drawn and checked; as `plans.plan_sweep`.
 
@@ -226,7 +231,7 @@ def plan_samples(
     """
     # friction may be given, or drawn about, by its angle
     given = ["phi" if name == "mu_s" and inputs.phi is not None else name for name in inputs.given]
-    problem = plans.check_problem(excitation, model, solver)
+    problem = problems.check_problem(excitation, model, solver)
     _check_drawn(sampling, given, problem)
     drawn = sampling.distributions
     plan = plans.plan_sweep(
@@ -247,7 +252,7 @@ def plan_samples(
     return found
 
 
-def _check_drawn(sampling: Sampling, given: Sequence[str], problem: Problem) -> None:
+def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Problem) -> None:
     """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
     if "structure_frequency" in given:
         raise InputError(
@@ -290,7 +295,7 @@ class SamplePlan:
         self,
         sampling: Sampling,
         draws: dict[str, Floats],
-        problem: Problem,
+        problem: problems.Problem,
         coords: dict[str, xr.Variable],
         attrs: dict[str, Any],
     ) -> None:
@@ -303,12 +308,12 @@ class SamplePlan:
             del self.results["mode_share"]
         self.names = tuple(self.results)
         self.clock = clock = "frequency" if is_wave else "time_scale"
-        inputs = plans.inputs_of(problem, coords)
+        inputs = grid_inputs.inputs_of(problem, coords)
         if "phi" in coords and "phi" in drawn:
             inputs["phi"] = coords["phi"]
         if "displacement_amplitude" in {*inputs, *drawn}:
             inputs.pop("amplitude", None)  # A = ω²d
-        sizes = plans.grid_sizes(inputs)
+        sizes = grid_inputs.grid_sizes(inputs)
         plans.check_dimensions(sizes, coords, {*variables.STATISTICS, *variables.STATISTIC_COORDINATES})
         for dim in sampling.over:
             key = f"{sampling.keys}over = {parameters.shown(dim)}"
@@ -320,7 +325,7 @@ class SamplePlan:
         unscaled = {"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn} or (
             clock in drawn and drawn[clock].kind == "offset"
         )
-        own = plans.grid_sizes({name: one for name, one in inputs.items() if name != clock or unscaled})
+        own = grid_inputs.grid_sizes({name: one for name, one in inputs.items() if name != clock or unscaled})
         self.pooled = {dim: sizes[dim] for dim in sampling.over}
         self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
         self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in own}
@@ -339,10 +344,10 @@ class SamplePlan:
         # as in `anyplan.AnyPlan`
         self.cells = math.prod(self.solved.values()) * self.runs
         self.together = tuple(self.scaled)
-        self.cost = max(1.0, plans.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
+        self.cost = max(1.0, problems.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
         self.cost += _SOBOL_COST if sampling.sensitivity else 0
         run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
-        self.memory = self.runs * run + plans.memory_of(problem) + sampling.memory
+        self.memory = self.runs * run + problems.memory_of(problem) + sampling.memory
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
@@ -433,9 +438,9 @@ class SamplePlan:
         if "phi" in inputs:
             angles = inputs.pop("phi")
             inputs["mu_s"] = angles.copy(data=np.tan(np.radians(angles.values)))
-        arrays = plans.aligned(inputs, sizes)
+        arrays = grid_inputs.aligned(inputs, sizes)
         for name in sorted(about_estimates, key=_ESTIMATED.index):
-            one, draws = self.sampling.distributions[name], plans.aligned({name: drawn[name]}, sizes)[name]
+            one, draws = self.sampling.distributions[name], grid_inputs.aligned({name: drawn[name]}, sizes)[name]
             # Coulomb's yield acceleration depends on no shaking, which a record has of its own
             every = {"amplitude": np.zeros((1,) * draws.ndim), **arrays}
             shape = np.broadcast_shapes(*(values.shape for values in every.values()))
