@@ -11,12 +11,13 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import Block, Cell, Options, block_of, interface_of, response
+from slipsweep.kernels import block as physics
+from slipsweep.kernels import record as recorded
+from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.exact import ATTENUATE, FOLLOW, Workspace, pulse
 from slipsweep.kernels.excitation import base_acceleration, held_integrals, phase_at
 from slipsweep.kernels.pulse import beginning, first_pulse
-from slipsweep.kernels.record import block_in_pulse, end_of_following, recorded_pulse, slides_continuously
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential
 from slipsweep.motion.pieces import Wave
@@ -95,7 +96,7 @@ def sample_part(
         found.block_acceleration[at] += b
         gained, moved = -b * since, -0.5 * b * since * since
     elif part["kind"] == FOLLOW:
-        found.block_acceleration[at] = response(block, found.ground_acceleration[at])
+        found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
         gained, moved = eq4_integrals(block, wave.pieces[part["piece"]], tau, tau + since)
     else:
         found.block_acceleration[at] = b
@@ -186,7 +187,7 @@ def sample_following(
         while at < phases.size and phases[at] < end_phase + offset:
             since = max(phases[at] - start_phase, 0.0)
             gained, moved = eq4_integrals(block, wave.pieces[q], start, min(start + since, end))
-            found.block_acceleration[at] = response(block, found.ground_acceleration[at])
+            found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
             found.velocity[at] = velocity + gained
             found.displacement[at] = displacement + velocity * since + moved
             at += 1
@@ -227,7 +228,7 @@ def sample_continuous_pulse(
 ) -> int:
     """Fill Ü, v and u of a continuous pulse of a record (`record.continuous_pulse`); the first sample beyond."""
     p, tau = beginning(block, wave, k)
-    until = end_of_following(block, wave, k, following)
+    until = recorded.end_of_following(block, wave, k, following)
     at = now.sample
     while at < times.size and times[at] < phase_at(wave.pieces[p], tau):
         found.displacement[at] = now.displacement
@@ -236,7 +237,7 @@ def sample_continuous_pulse(
         block, wave, p, tau, until.piece, until.tau, 0.0, Moving(now.velocity, now.displacement, at), times, found
     )
     at = after.sample
-    held, speed, side = response(block, peak), abs(after.velocity), math.copysign(1.0, after.velocity)
+    held, speed, side = physics.response(block, peak), abs(after.velocity), math.copysign(1.0, after.velocity)
     while at < times.size and times[at] < until.begins:
         since = max(times[at] - until.ends, 0.0)
         left = eq.attenuated_velocity(speed, held, since)
@@ -249,19 +250,19 @@ def sample_continuous_pulse(
 
 @kernel
 def record_history(
-    cell: Cell, options: Options, wave: Wave, workspace: Workspace, times: np.ndarray, found: History
+    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, times: np.ndarray, found: History
 ) -> None:
     """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
     fill_base(cell.amplitude, 1, wave, times, found)
     rest(found)
-    block, interface = block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
+    block, interface = recorded.block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
     at, velocity, displacement = 0, 0.0, 0.0
     k = first_pulse(block, wave, 0)
     while at < times.size and k < wave.height.size:
         following, peak = first_pulse(block, wave, k + 1), cell.amplitude * wave.height[k]
-        block, interface = block_in_pulse(exponential(), cell, options, peak)
-        continuous = slides_continuously(interface, options, peak)
-        now = recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
+        block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
+        continuous = recorded.slides_continuously(interface, options, peak)
+        now = recorded.recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
         if continuous:
             moving = Moving(velocity, displacement, at)
             at = sample_continuous_pulse(block, wave, k, following, peak, moving, times, found)
@@ -276,11 +277,11 @@ def record_history(
 
 @kernel
 def wave_history(
-    cell: Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
+    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
 ) -> None:
     """Fill a history under a waveform at increasing phases."""
-    interface = interface_of(cell, options.rise, options.g)
-    block = block_of(exponential(), cell, interface, options.rise, options.g)
+    interface = physics.interface_of(cell, options.rise, options.g)
+    block = physics.block_of(exponential(), cell, interface, options.rise, options.g)
     fill_base(block.amplitude, options.cycles, wave, phases, found)
     rest(found)
     if interface.sliding_mode == eq.CONTINUOUS:

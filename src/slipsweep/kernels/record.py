@@ -14,12 +14,12 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels import block as physics
-from slipsweep.kernels.block import Block, Cell, Interface, Motion, Options
+from slipsweep.kernels import pulse as pulses
+from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.continuous import find_zeros, follow_eq4
 from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
 from slipsweep.kernels.excitation import phase_at
 from slipsweep.kernels.grid import cell_at, uncounted_wave
-from slipsweep.kernels.pulse import Pulse, beginning, first_pulse
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw, exponential
 from slipsweep.motion.pieces import Wave
@@ -35,9 +35,11 @@ class Following(NamedTuple):
 
 
 @inlined
-def block_in_pulse(law: FrictionLaw, cell: Cell, options: Options, peak: float) -> tuple[Block, Interface]:
+def block_in_pulse(
+    law: FrictionLaw, cell: physics.Cell, options: Options, peak: float
+) -> tuple[Block, physics.Interface]:
     """The block in a pulse of that peak, for Eqs. 7-11 and λ; its `amplitude` is the factor on the record."""
-    in_pulse = Cell(
+    in_pulse = physics.Cell(
         cell.tan_theta, cell.mu_s, peak, cell.yield_acceleration, cell.decay_rate, cell.delta_mu,
         cell.minimum_friction,
     )  # fmt: skip
@@ -51,7 +53,7 @@ def block_in_pulse(law: FrictionLaw, cell: Cell, options: Options, peak: float) 
 
 
 @inlined
-def slides_continuously(interface: Interface, options: Options, peak: float) -> bool:
+def slides_continuously(interface: physics.Interface, options: Options, peak: float) -> bool:
     """Whether the block slides continuously in a pulse of that peak.
 
     Not its own mode, which is missing where the harmonic motion of that peak would uplift.
@@ -84,7 +86,7 @@ def end_of_following(block: Block, wave: Wave, k: int, following: int) -> Follow
         ends = phase_at(wave.pieces[until], tau)
     begins = math.inf
     if not last:
-        next_piece, next_tau = beginning(block, wave, following)
+        next_piece, next_tau = pulses.beginning(block, wave, following)
         begins = phase_at(wave.pieces[next_piece], next_tau)
         if following == k + 1 and wave.interval[following, 0] == until:
             until, tau, ends = next_piece, next_tau, begins
@@ -95,16 +97,16 @@ def end_of_following(block: Block, wave: Wave, k: int, following: int) -> Follow
 def continuous_pulse(
     block: Block, options: Options, wave: Wave, k: int, following: int, peak: float, velocity: float,
     workspace: Workspace,
-) -> Pulse:  # fmt: skip
+) -> pulses.Pulse:  # fmt: skip
     """A continuous pulse, of that `peak`, from Üg = Üy in interval k to the pulse of the `following` one.
 
     Eq. 4 holds through the negative half wave and, if the pulse follows at once, up to it; else Eq. 12
     takes V, of either sign, to zero from there on.
     """
-    p, tau = beginning(block, wave, k)
+    p, tau = pulses.beginning(block, wave, k)
     until = end_of_following(block, wave, k, following)
     if not find_zeros(block, options.wants_peak, wave, workspace):
-        return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
+        return pulses.Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
     gained, displaced, most = follow_eq4(block, wave, workspace, p, tau, until.piece, until.tau)
     after = velocity + gained
     displacement = velocity * (until.ends - phase_at(wave.pieces[p], tau)) + displaced
@@ -113,14 +115,14 @@ def continuous_pulse(
         displacement += side * eq.attenuated_displacement(speed, held, until.begins - until.ends)
         after = side * eq.attenuated_velocity(speed, held, until.begins - until.ends)
     slips = 1.0 if velocity == 0.0 else 0.0
-    return Pulse(after, displacement, velocity + most, 0.0, 0.0, slips, 0)
+    return pulses.Pulse(after, displacement, velocity + most, 0.0, 0.0, slips, 0)
 
 
 @inlined
 def recorded_pulse(
     block: Block, continuous: bool, options: Options, wave: Wave, k: int, following: int, peak: float,
     velocity: float, workspace: Workspace,
-) -> Pulse:  # fmt: skip
+) -> pulses.Pulse:  # fmt: skip
     """A pulse, continuous or not, from Üg = Üy in interval k to the pulse of the `following` one."""
     if continuous:
         return continuous_pulse(block, options, wave, k, following, peak, velocity, workspace)
@@ -129,7 +131,7 @@ def recorded_pulse(
 
 
 @scalar
-def remarks_in(cell: Cell, block: Block, interface: Interface, continuous: bool, peak: float) -> int:
+def remarks_in(cell: physics.Cell, block: Block, interface: physics.Interface, continuous: bool, peak: float) -> int:
     """The flags of a pulse of that peak."""
     if block.rise == physics.NEWMARK:
         return 0
@@ -154,7 +156,7 @@ def added(total: float, lost: float, term: float) -> tuple[float, float]:
 
 
 @scalar
-def validity_of_record(law: FrictionLaw, cell: Cell, options: Options, wave: Wave) -> int:
+def validity_of_record(law: FrictionLaw, cell: physics.Cell, options: Options, wave: Wave) -> int:
     """What is known before the motion: Üy ≤ 0, no limit by Eq. 7, or n ≤ 0 where Üg is lowest."""
     _, interface = block_in_pulse(law, cell, options, cell.amplitude * max(wave.highest, -wave.lowest))
     validity = interface.validity & (physics.STATICALLY_UNSTABLE | physics.LIMIT_UNDEFINED)
@@ -164,16 +166,18 @@ def validity_of_record(law: FrictionLaw, cell: Cell, options: Options, wave: Wav
 
 
 @single
-def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, workspace: Workspace) -> Motion:
+def solve_cell(
+    law: FrictionLaw, cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace
+) -> physics.Motion:
     """The response of a cell, pulse by pulse; `cell.amplitude` is the factor on the record."""
     scale = cell.amplitude
     validity = validity_of_record(law, cell, options, wave)
     block, interface = block_in_pulse(law, cell, options, scale * wave.highest)
     velocity, displacement, lost, highest, slips = 0.0, 0.0, 0.0, 0.0, 0.0
     stick_slips, continuous_pulses = 0.0, 0.0
-    k = first_pulse(block, wave, 0)
+    k = pulses.first_pulse(block, wave, 0)
     while k < wave.height.size and validity & physics.NO_VALUE == 0:
-        following, peak = first_pulse(block, wave, k + 1), scale * wave.height[k]
+        following, peak = pulses.first_pulse(block, wave, k + 1), scale * wave.height[k]
         if block.rise != physics.NEWMARK:
             block, interface = block_in_pulse(law, cell, options, peak)
         continuous = slides_continuously(interface, options, peak)
@@ -197,8 +201,8 @@ def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, works
     displacement += lost
     validity = physics.settled(validity, displacement, scale * max(wave.highest, -wave.lowest))
     if validity & physics.NO_VALUE:
-        return Motion(math.nan, math.nan, math.nan, float(validity), -1.0, -1.0, -1.0)
-    return Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous_pulses)
+        return physics.Motion(math.nan, math.nan, math.nan, float(validity), -1.0, -1.0, -1.0)
+    return physics.Motion(displacement, highest, math.nan, float(validity), slips, stick_slips, continuous_pulses)
 
 
 @kernel

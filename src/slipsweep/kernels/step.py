@@ -23,11 +23,11 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels import block as physics
-from slipsweep.kernels.block import Block, Options
+from slipsweep.kernels import excitation
+from slipsweep.kernels import pulse as pulses
+from slipsweep.kernels.block import Block
 from slipsweep.kernels.events import root_of
-from slipsweep.kernels.excitation import base_acceleration, offset_at, phase_at
 from slipsweep.kernels.grid import cell_at
-from slipsweep.kernels.pulse import Pulse, beginning, yield_seems_to_govern
 from slipsweep.kernels.series import Gain, series_of
 from slipsweep.kernels.train import cell_solver_of
 from slipsweep.model import equations as eq
@@ -147,7 +147,7 @@ def tabulate(block: Block, w: np.ndarray, rates: np.ndarray) -> None:
 @scalar
 def point_at(block: Block, piece: Piece, tau: float) -> Point:
     """The instant τ on a piece, whose side of Üg = 0 it takes where rounding would take the other's."""
-    x = math.copysign(base_acceleration(piece, block.amplitude, tau), piece.top)
+    x = math.copysign(excitation.base_acceleration(piece, block.amplitude, tau), piece.top)
     return Point(tau, x, eq4_rate(block, x))
 
 
@@ -194,7 +194,7 @@ def next_event(block: Block, piece: Piece, start: Point, end: Point, state: Stat
         return end, top
     where = (block, piece, state, 1e-4 * (top.tau - start.tau))
     tau = _crossing(where, start.tau, top.tau, 0.5 * (start.tau + top.tau), 0.0)
-    x = base_acceleration(piece, block.amplitude, tau)
+    x = excitation.base_acceleration(piece, block.amplitude, tau)
     # Ü is by Eq. 4 there, without its rounding
     return Point(tau, x, x - state.held if state.sliding else 0.0), top
 
@@ -212,13 +212,13 @@ def onset(block: Block, piece: Piece, start: Point, end: Point, state: State) ->
     if end.base < block.yield_acceleration:
         return end, state
     if start.base < block.yield_acceleration:
-        tau = min(max(offset_at(piece, block.amplitude, block.yield_acceleration), start.tau), end.tau)
+        tau = min(max(excitation.offset_at(piece, block.amplitude, block.yield_acceleration), start.tau), end.tau)
         start = Point(tau, block.yield_acceleration, eq4_rate(block, block.yield_acceleration))
     began, top = next_event(block, piece, start, end, state)
     if began.tau >= end.tau:
         return end, state
     grows = (top.tau if top.tau < end.tau else piece.finish) - began.tau
-    return began, begun(block, began, phase_at(piece, began.tau), grows, state)
+    return began, begun(block, began, excitation.phase_at(piece, began.tau), grows, state)
 
 
 @inlined
@@ -272,7 +272,7 @@ def cut_step(
             start, state = onset(block, piece, start, end, state)
         if not state.sliding:
             break
-        longest = min(2.0 * size, longest_step(per_cycle, phase_at(piece, start.tau), state))
+        longest = min(2.0 * size, longest_step(per_cycle, excitation.phase_at(piece, start.tau), state))
         cut = end if start.tau + longest >= end.tau else point_at(block, piece, start.tau + longest)
         middle = point_at(block, piece, 0.5 * (start.tau + cut.tau))
         bend = abs(start.rate - 2.0 * middle.rate + cut.rate)
@@ -324,10 +324,12 @@ def walk(
 
 
 @single
-def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float) -> Pulse:
+def pulse(
+    block: Block, options: physics.Options, wave: Wave, steps: Steps, k: int, following: int, velocity: float
+) -> pulses.Pulse:
     """A pulse of the paper: t1 to t5 in interval k of Üg > 0, and Eq. 12 up to the `following` one (see `train`)."""
     pieces, end, validity = wave.pieces, wave.interval[k, 1], 0
-    p, tau = beginning(block, wave, k)
+    p, tau = pulses.beginning(block, wave, k)
     b = physics.starting_acceleration(block, max(block.amplitude * pieces[p].first, block.yield_acceleration))
     state = State(velocity, 0.0, b, velocity, velocity, velocity > 0.0, -math.inf, 0.0)
     for q in range(p, end):
@@ -338,7 +340,8 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
             if state.sliding:
                 _, state = slide(block, RECTANGLE, block.rise, top, top, top, state)
             elif top.base >= block.yield_acceleration and top.rate > 0.0:
-                grows = offset_at(pieces[q], block.amplitude, physics.starting_acceleration(block, top.base)) - begin
+                held = physics.starting_acceleration(block, top.base)
+                grows = excitation.offset_at(pieces[q], block.amplitude, held) - begin
                 state = begun(block, top, pieces[q].start, grows, state)
         if rises:
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, block.rise, state)
@@ -346,12 +349,12 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
             validity = physics.KD_NOT_POSITIVE if state.sliding and state.held <= 0.0 else validity
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, HELD, state)
     if state.sliding and state.held <= 0.0:
-        return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
+        return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
     started = stopped_at = pieces[end - 1].end  # t5: Üg = 0
     next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
     if following < wave.height.size:
-        next_p, next_tau = beginning(block, wave, following)
-        begins = phase_at(pieces[next_p], next_tau)
+        next_p, next_tau = pulses.beginning(block, wave, following)
+        begins = excitation.phase_at(pieces[next_p], next_tau)
     if options.recoupling == physics.INTEGRATE:
         for q in range(end, min(next_p + 1, pieces.shape[0])):
             if state.sliding:
@@ -362,7 +365,7 @@ def pulse(block: Block, options: Options, wave: Wave, steps: Steps, k: int, foll
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
         velocity = eq.attenuated_velocity(velocity, state.held, begins - started)
-    return Pulse(velocity, displacement, state.peak, min(state.least, velocity), stopped_at, 0.0, validity)
+    return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), stopped_at, 0.0, validity)
 
 
 @scalar
@@ -375,11 +378,11 @@ def follow(block: Block, wave: Wave, steps: Steps, c: int, p: int, tau: float) -
     return Gain(state.velocity, state.displacement, state.peak)
 
 
-solve_cell = cell_solver_of(pulse, series_of(follow), yield_seems_to_govern)
+solve_cell = cell_solver_of(pulse, series_of(follow), pulses.yield_seems_to_govern)
 
 
 @kernel
-def solve_steps(cells: np.ndarray, options: Options, wave: Wave, steps: Steps, results: np.ndarray) -> None:
+def solve_steps(cells: np.ndarray, options: physics.Options, wave: Wave, steps: Steps, results: np.ndarray) -> None:
     """Solve the cells of a tile by steps; `results` is (fields of `Motion`, cells)."""
     for j in range(cells.size):
         physics.store(solve_cell(exponential(), cell_at(cells, j), options, wave, steps), j, results)

@@ -6,12 +6,10 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar
-from slipsweep.kernels.block import NEWMARK, UNSOLVED, Options, settled, without_estimates
-from slipsweep.kernels.block import YIELD_GOVERNS as YIELD_GOVERNS_FLAG
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.sine import kinds, pulse
 from slipsweep.kernels.sine.batch import BATCH, DISPLACEMENT, PEAK_VELOCITY, VALIDITY, WIDTH, Batch, load
 from slipsweep.kernels.sine.continuous import find_peak_velocity, slide_on
-from slipsweep.kernels.sine.kinds import KINDS, OTHER, RESTS, SLIDES_ON, YIELD_GOVERNS, classify
-from slipsweep.kernels.sine.pulse import begin_to_slide, fall, repeat, rise
 from slipsweep.model.equations import STUCK
 
 
@@ -31,60 +29,62 @@ def append(source: Batch, j: int, cell: int, target: Batch) -> None:
 
 
 @scalar
-def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) -> int:
+def solve_batch(batch: Batch, kind: int, options: physics.Options, results: np.ndarray) -> int:
     """Solve a batch of cells of one kind, store what was found, and empty it; how many cells remain unsolved."""
     used = batch.used
     for k in range(used, WIDTH):
         append(batch, k - used, batch.cell[k - used], batch)
-    if kind == SLIDES_ON:
+    if kind == kinds.SLIDES_ON:
         slide_on(batch, options)
         if options.wants_peak:
             find_peak_velocity(batch, options)
     else:
-        begin_to_slide(batch, kind, options.g)
-        rise(batch, kind, options.g)
-        fall(batch, options)
-        repeat(batch, kind, options)
-    governs = YIELD_GOVERNS_FLAG if kind == YIELD_GOVERNS and options.rise != NEWMARK else 0
+        pulse.begin_to_slide(batch, kind, options.g)
+        pulse.rise(batch, kind, options.g)
+        pulse.fall(batch, options)
+        pulse.repeat(batch, kind, options)
+    governs = physics.YIELD_GOVERNS if kind == kinds.YIELD_GOVERNS and options.rise != physics.NEWMARK else 0
     unsolved = 0
     for k in range(used):
         cell, displacement = batch.cell[k], batch.displacement[k]
-        validity = without_estimates(int(results[VALIDITY, cell]) | int(batch.validity[k]) | governs)
+        validity = physics.without_estimates(int(results[VALIDITY, cell]) | int(batch.validity[k]) | governs)
         solved = batch.solved[k] > 0.0 and not math.isnan(displacement)  # where sums overflow
         results[DISPLACEMENT, cell], results[PEAK_VELOCITY, cell] = displacement, batch.peak_velocity[k]
-        results[VALIDITY, cell] = settled(validity, displacement, batch.amplitude[k]) if solved else UNSOLVED
+        results[VALIDITY, cell] = (
+            physics.settled(validity, displacement, batch.amplitude[k]) if solved else physics.UNSOLVED
+        )
         unsolved += 0 if solved else 1
     batch.used = 0
     return unsolved
 
 
 @kernel
-def solve_sine(cells: np.ndarray, options: Options, results: np.ndarray) -> int:
+def solve_sine(cells: np.ndarray, options: physics.Options, results: np.ndarray) -> int:
     """Solve cells under a sine into W, V, mode and validity, the first rows of `results`, (fields of `Motion`, cells).
 
     Returns how many are left to the kernel that solves any waveform: their validity is `UNSOLVED`.
     """
-    batches = np.empty(KINDS + 1, BATCH)
-    for kind in range(KINDS):
+    batches = np.empty(kinds.KINDS + 1, BATCH)
+    for kind in range(kinds.KINDS):
         batches[kind].used = 0
-    loaded = batches[KINDS]
+    loaded = batches[kinds.KINDS]
     unsolved = 0
     for first in range(0, cells.size, WIDTH):
         load(cells, first, loaded)
-        classify(loaded, first, options, results)
+        kinds.classify(loaded, first, options, results)
         for j in range(loaded.used):
             kind, cell = loaded.kind[j], first + j
-            if kind == RESTS:
+            if kind == kinds.RESTS:
                 at_rest = 0.0 if loaded.sliding_mode[j] >= STUCK else math.nan
                 results[DISPLACEMENT, cell] = results[PEAK_VELOCITY, cell] = at_rest
-            elif kind == OTHER:
-                results[VALIDITY, cell] = UNSOLVED
+            elif kind == kinds.OTHER:
+                results[VALIDITY, cell] = physics.UNSOLVED
                 unsolved += 1
             else:
                 append(loaded, j, cell, batches[kind])
                 if batches[kind].used == WIDTH:
                     unsolved += solve_batch(batches[kind], kind, options, results)
-    for kind in range(KINDS):
+    for kind in range(kinds.KINDS):
         if batches[kind].used > 0:
             unsolved += solve_batch(batches[kind], kind, options, results)
     return unsolved
