@@ -245,6 +245,35 @@ def test_settings_of_other_programs_do_no_harm(small: Path) -> None:
     assert (small / "limit.png").exists()
 
 
+#: A process whose user has no account.
+NOBODY = """
+import pwd, sys
+def missing(uid):
+    raise KeyError(uid)
+pwd.getpwuid = missing
+from slipsweep.cli import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "small.toml", "-o", "a.nc"),
+        ("chart", "small.nc", "-k", "contours", "-o", "a.png"),
+    ],
+)
+def test_a_user_without_home_and_account_is_served(small: Path, arguments: tuple[str, ...]) -> None:
+    assert command(small, "run", "small.toml").returncode == 0
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("HOME", "XDG"))}
+    done = subprocess.run(
+        [sys.executable, "-c", NOBODY, *arguments], cwd=small, env=environment, capture_output=True, text=True,
+        timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_control_sequences_of_a_file_do_not_reach_the_terminal(small: Path) -> None:
     command(small, "run", "small.toml")
     with netCDF4.Dataset(small / "small.nc", "a") as file:

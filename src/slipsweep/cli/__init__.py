@@ -7,6 +7,7 @@ one line, never a traceback.  What a command needs is imported inside it, so tha
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -61,6 +62,10 @@ app.registered_commands.sort(key=lambda one: _MODULES.index(one.callback.__modul
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     os.environ["MPLBACKEND"] = "agg"  # figures go to files only
+    try:
+        Path.home()
+    except RuntimeError:  # no HOME and no account: libraries that look for their settings find none
+        os.environ["HOME"] = os.devnull
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # an alphabet without λ fails no command

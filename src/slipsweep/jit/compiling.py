@@ -97,18 +97,16 @@ def _jitted(function: Callable[..., Any], folder: Path | None) -> Callable[..., 
 def cache_folder() -> Path | None:
     """Folder of the compiled kernels of these sources, or None where there is none that is this user's alone."""
     given = numba.config.CACHE_DIR
-    base = Path(given) / "slipsweep" if given else platformdirs.user_cache_path("slipsweep")
-    folder = base / _digest_of_sources()
     try:
-        if not base.is_absolute():  # no home
-            return None
+        base = Path(given) / "slipsweep" if given else platformdirs.user_cache_path("slipsweep")
+        folder = base / _digest_of_sources()
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = base.stat()
         if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
             return None
         folder.mkdir(exist_ok=True)
         folder.touch()
-    except OSError:
+    except (OSError, RuntimeError):  # RuntimeError: neither HOME nor an account
         return None
     old = sorted((one for one in base.iterdir() if one.is_dir()), key=lambda one: one.stat().st_mtime)
     for other in old[:-_KEPT]:
