@@ -22,7 +22,7 @@ LINES = {
     "jit": 410,
     "model": 1_490,
     "motion": 2_260,
-    "kernels": 3_275,
+    "kernels": 3_285,
     "grid": 1_450,
     "studies": 4_695,
     "files": 2_190,

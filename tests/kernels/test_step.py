@@ -259,6 +259,10 @@ def hyperbolic_friction(x: float, mu_s: float, delta_mu: float, decay_rate: floa
 HYPERBOLIC = FrictionLaw(friction=hyperbolic_friction)
 
 
+def test_a_law_says_what_it_lacks_for_the_exact_kernel() -> None:
+    assert HYPERBOLIC.missing == ("derivatives", "inflection", "static_acceleration", "moments", "decay_length")
+
+
 @numba.njit(error_model="numpy")
 def solve_hyperbolic(cell: Cell, options: Options, wave: Any, steps: Steps) -> Motion:
     return solve_cell(HYPERBOLIC, cell, options, wave, steps)

@@ -17,7 +17,7 @@ from slipsweep.kernels.block import (
     relative_acceleration_root,
 )
 from slipsweep.kernels.eq4 import eq4_integrals, lag_integrals
-from slipsweep.kernels.exact import MOST_PHASES, Workspace, inside, next_break
+from slipsweep.kernels.exact import MOST_STAGES, Workspace, inside, next_break
 from slipsweep.kernels.excitation import offset_at
 from slipsweep.kernels.pulse import Pulse
 from slipsweep.kernels.series import Gain, series_of
@@ -34,7 +34,7 @@ def zeros_on_one_side(block: Block, end: float, zeros: np.ndarray) -> int:
         # D bends to one side only
         zeros[0] = relative_acceleration_root(block, inner, end)
         return -1 if math.isnan(zeros[0]) else 1
-    for _ in range(MOST_PHASES):
+    for _ in range(MOST_STAGES):
         target = next_break(block, x, end)
         inner = inside(x, target)
         if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):

@@ -1,8 +1,8 @@
 """One pulse from event to event, for waves and records: the exact walk.
 
-While the base's acceleration Üg rises, the block sticks until t1 (`onset`), then slides in phases that end at events
-(`phase_on_rise`): its acceleration b is held, or follows Eq. 4.  While Üg falls b is held (`hold`); from Üg = 0 (t5) on
-Eq. 12 takes V down, or b is held on (`recouple`).  Each phase is integrated in closed form, or by quadrature to
+While the base's acceleration Üg rises, the block sticks until t1 (`onset`), then slides in stages that end at events
+(`next_stage`): its acceleration b is held, or follows Eq. 4.  While Üg falls b is held (`hold`); from Üg = 0 (t5) on
+Eq. 12 takes V down, or b is held on (`recouple`).  Each stage is integrated in closed form, or by quadrature to
 rounding (`eq4`).  docs/numerics.md#onset-and-switch and docs/numerics.md#stop
 """
 
@@ -22,12 +22,12 @@ from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import Piece, Wave
 
-#: Signs at the start of a phase are read this fraction of the phase inside it, but no closer to the start than this
-#: fraction of that: where a phase ends at a turn of E, the sign just behind is known only beyond rounding.
+#: The signs of a stage are read `_SLIVER` of its length behind its start, and `_ROUNDING` times |Üg| at least: at the
+#: start itself, which may be a root, the sign is rounding.
 _SLIVER, _ROUNDING = 1e-10, 4.5e-16
 
-#: More phases than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
-MOST_PHASES = 32
+#: More stages than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
+MOST_STAGES = 32
 
 #: Kinds of motion in a log of it: b held, b by Eq. 4, Eq. 12.
 HOLD, FOLLOW, ATTENUATE = range(3)
@@ -46,7 +46,7 @@ class Workspace(NamedTuple):
     """What the exact kernels write into, one for all cells.
 
     `log` has one row for each part of a pulse if a history is requested, else none, and `logged`, (1,), is how many
-    are in use; `zeros`, (2, MOST_PHASES), is for zeros of D on either side of Üg = 0, and `zero_counts`, (2,), for how
+    are in use; `zeros`, (2, MOST_STAGES), is for zeros of D on either side of Üg = 0, and `zero_counts`, (2,), for how
     many there are (`continuous`); `known` is for pulses that come again (`train`).
     """
 
@@ -58,10 +58,10 @@ class Workspace(NamedTuple):
 
 
 class State(NamedTuple):
-    """The block in a pulse: V, W since its beginning, its acceleration b, and whether it slides.
+    """The block in a pulse: V, W since its beginning, its acceleration b (`held`), and whether it slides.
 
-    Besides the largest and the least V, the phase at which it last came to rest, slides that began from rest, and the
-    rows of the log.
+    While it slides b is constant, or as last taken from Eq. 4.  Besides: the largest and the least V, the phase at
+    which it last came to rest, slides that began from rest, and the rows of the log.
     """
 
     velocity: float
@@ -70,7 +70,7 @@ class State(NamedTuple):
     sliding: bool
     peak: float
     least: float
-    stopped_at: float
+    shaken_until: float
     slips: float
     logged: int
 
@@ -86,8 +86,8 @@ class Part(NamedTuple):
     stops: bool
 
 
-class RisePhase(NamedTuple):
-    """A phase of a slide on the rise: Üg at its end, whether b follows Eq. 4 on it, and from there on."""
+class RiseStage(NamedTuple):
+    """A stage of a slide on the rise, on which b keeps one rule: Üg at its end, whether b follows Eq. 4, and then."""
 
     end: float
     follows: bool
@@ -97,11 +97,11 @@ class RisePhase(NamedTuple):
 def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
     """A workspace for a wave; a log has as many rows as a pulse may have parts."""
     longest = int(np.diff(wave.interval, axis=1).max(initial=0))
-    logged = longest * MOST_PHASES + wave.pieces.shape[0] + 3 if keeps_log else 0
+    logged = longest * MOST_STAGES + wave.pieces.shape[0] + 3 if keeps_log else 0
     return Workspace(
         log=np.empty(logged, LOG),
         logged=np.zeros(1, np.int64),
-        zeros=np.empty((2, MOST_PHASES)),
+        zeros=np.empty((2, MOST_STAGES)),
         zero_counts=np.zeros(2, np.int64),
         known=np.empty((wave.height.size, 2)),
     )
@@ -120,7 +120,7 @@ def uncounted_workspace(workspace: Workspace) -> Workspace:
 def with_held(state: State, held: float) -> State:
     """The state with another b."""
     return State(
-        state.velocity, state.displacement, held, state.sliding, state.peak, state.least, state.stopped_at,
+        state.velocity, state.displacement, held, state.sliding, state.peak, state.least, state.shaken_until,
         state.slips, state.logged,
     )  # fmt: skip
 
@@ -129,13 +129,13 @@ def with_held(state: State, held: float) -> State:
 def begun(state: State, held: float) -> State:
     """The state of a block at rest that begins to slide (t1)."""
     return State(
-        0.0, state.displacement, held, True, state.peak, state.least, state.stopped_at, state.slips + 1.0,
+        0.0, state.displacement, held, True, state.peak, state.least, state.shaken_until, state.slips + 1.0,
         state.logged,
     )  # fmt: skip
 
 
 @scalar
-def after(
+def state_after(
     state: State, part: Part, kind: int, pieces: np.ndarray, p: int, start: float, log: np.ndarray
 ) -> State:  # fmt: skip
     """The state after a part of a slide along piece p from τ = `start` on; the log has it, if one is kept."""
@@ -147,7 +147,7 @@ def after(
     return State(
         part.velocity, state.displacement + part.displacement, state.held, not part.stops,
         np.maximum(part.peak, state.peak), min(part.least, state.least),  # NaN is kept
-        stop if part.stops else state.stopped_at, state.slips, logged,
+        stop if part.stops else state.shaken_until, state.slips, logged,
     )  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def note(row: np.record, state: State, kind: int, piece: int, tau: float, start:
 
 @scalar
 def inside(x: float, end: float) -> float:
-    """Where on the way from x to end the signs of a phase from x on are read, which is not at x itself."""
+    """Where on the way from x to end the signs of a stage from x on are read, which is not at x itself."""
     way = end - x
     return x + math.copysign(min(max(_SLIVER * abs(way), _ROUNDING * abs(x)), abs(way)), way)
 
@@ -187,7 +187,7 @@ def onset(block: Block, x: float, top: float) -> float:
     """t1: Üg on the rise from x ≥ Üy to `top` at which the block at rest starts to slide (`top` if it does not)."""
     if block.rise == physics.NEWMARK or physics.relative_acceleration(block, inside(x, top)) > 0.0:
         return x
-    for _ in range(MOST_PHASES):
+    for _ in range(MOST_STAGES):
         if x >= top:
             break
         end = next_break(block, x, top)
@@ -201,14 +201,14 @@ def onset(block: Block, x: float, top: float) -> float:
 
 
 @scalar
-def phase_on_rise(block: Block, x: float, top: float, held: float, follows: bool) -> RisePhase:
-    """The next phase of a slide on the rise from x to `top`; what `rise` does is decided here.
+def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -> RiseStage:
+    """The next stage of a slide on the rise from x to `top`; what `rise` does is decided here.
 
     Newmark: b = Üy to the top.  Literal: b = Eq. 4 throughout.  Monotone: b = max(b, Eq. 4), held until Eq. 4 comes to
-    it, followed until Eq. 4 falls.  A phase that follows Eq. 4 ends where D changes its sign, too.
+    it, followed until Eq. 4 falls.  A stage that follows Eq. 4 ends where D changes its sign, too.
     """
     if block.rise == physics.NEWMARK:
-        return RisePhase(top, False, False)
+        return RiseStage(top, False, False)
     end = top
     inner = inside(x, end)
     bends = inner < physics.inflection(block)
@@ -223,13 +223,13 @@ def phase_on_rise(block: Block, x: float, top: float, held: float, follows: bool
             inner = inside(x, end)
         if physics.opposite(physics.relative_acceleration(block, inner), physics.relative_acceleration(block, end)):
             end = physics.relative_acceleration_root(block, inner, end)
-        return RisePhase(end, True, True)
+        return RiseStage(end, True, True)
     crosses = physics.response(block, end) > held
     if crosses:
         end = physics.response_root(block, held, inner, end)
     if x < held < end:  # from there on V grows
-        return RisePhase(held, False, False)
-    return RisePhase(end, False, crosses)
+        return RiseStage(held, False, False)
+    return RiseStage(end, False, crosses)
 
 
 @scalar
@@ -352,10 +352,10 @@ def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, las
 def rise(
     block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
 ) -> State:  # fmt: skip
-    """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, phase by phase."""
+    """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, stage by stage."""
     amplitude, top, p = block.amplitude, block.amplitude * pieces[last].last, first
     follows = block.rise == physics.LITERAL
-    for _ in range(MOST_PHASES * (1 + last - first)):
+    for _ in range(MOST_STAGES * (1 + last - first)):
         if not state.sliding:
             began = top
             if top > block.yield_acceleration:
@@ -368,28 +368,28 @@ def rise(
             beyond = began > max(x, block.yield_acceleration)
             b = began if beyond else min(physics.starting_acceleration(block, began), began)
             state, follows, x = begun(state, b), block.rise == physics.LITERAL, began
-        phase = phase_on_rise(block, x, top, state.held, follows)
-        until, tau_until = place_of(block, pieces, phase.end, p, tau, last)
+        stage = next_stage(block, x, top, state.held, follows)
+        until, tau_until = place_of(block, pieces, stage.end, p, tau, last)
         while True:
             end = tau_until if p == until else pieces[p].finish
-            if phase.follows:
+            if stage.follows:
                 part = follow(block, pieces[p], state.velocity, tau, end)
             else:
                 part = hold(pieces[p], amplitude, state.held, state.velocity, tau, end)
-            state = after(state, part, FOLLOW if phase.follows else HOLD, pieces, p, tau, log)
+            state = state_after(state, part, FOLLOW if stage.follows else HOLD, pieces, p, tau, log)
             tau = part.end
             if not state.sliding or p == until:
                 break
             p += 1
             tau = pieces[p].begin
         if not state.sliding and (p < until or tau < tau_until):
-            if phase.follows:  # D < 0 up to the end of the phase: no slide begins before
-                p, tau, x = until, tau_until, phase.end
+            if stage.follows:  # D < 0 up to the end of the stage: no slide begins before
+                p, tau, x = until, tau_until, stage.end
             else:
                 x = base_acceleration(pieces[p], amplitude, tau)
             continue
-        x, follows = phase.end, phase.follows_after
-        state = with_held(state, physics.response(block, x) if phase.follows else state.held)
+        x, follows = stage.end, stage.follows_after
+        state = with_held(state, physics.response(block, x) if stage.follows else state.held)
         if x >= top:
             return state
     return State(math.nan, math.nan, state.held, True, math.nan, math.nan, 0.0, state.slips, state.logged)
@@ -424,7 +424,7 @@ def hold_on(
 ) -> State:
     """The state after `hold`."""
     part = hold(pieces[p], amplitude, state.held, state.velocity, start, end)
-    return after(state, part, HOLD, pieces, p, start, log)
+    return state_after(state, part, HOLD, pieces, p, start, log)
 
 
 @single
@@ -437,14 +437,14 @@ def recouple(
     """
     count = pieces.shape[0]
     started = pieces[q].start if q < count else pieces[q - 1].end
-    stopped_at = started  # Eq. 12 goes on beyond the shaking just the same
+    shaken_until = started  # Eq. 12 goes on beyond the shaking just the same
     if recoupling == physics.INTEGRATE:
         while state.sliding and q < min(p + 1, count):
-            end = tau if q == p else pieces[min(q, count - 1)].finish
-            if q < count and end > pieces[q].begin:
+            end = tau if q == p else pieces[q].finish
+            if end > pieces[q].begin:
                 state = hold_on(pieces, q, block.amplitude, pieces[q].begin, end, state, log)
             q += 1
-        started, stopped_at = pieces[count - 1].end, math.inf
+        started, shaken_until = pieces[count - 1].end, math.inf
     if not state.sliding or (p < count and recoupling == physics.INTEGRATE):
         return state
     duration = math.inf if p >= count else phase_at(pieces[p], tau) - started
@@ -455,7 +455,7 @@ def recouple(
     velocity = eq.attenuated_velocity(state.velocity, state.held, duration)
     displacement = state.displacement + eq.attenuated_displacement(state.velocity, state.held, duration)
     return State(
-        velocity, displacement, state.held, state.sliding, state.peak, min(state.least, velocity), stopped_at,
+        velocity, displacement, state.held, state.sliding, state.peak, min(state.least, velocity), shaken_until,
         state.slips, logged,
     )  # fmt: skip
 
@@ -478,7 +478,7 @@ def pulse(
         sliding=velocity > 0.0,
         peak=velocity,
         least=velocity,
-        stopped_at=0.0,
+        shaken_until=0.0,
         slips=0.0,
         logged=0,
     )
@@ -494,7 +494,7 @@ def pulse(
             level = pieces[q].first == pieces[q].last
             least_held = least_held if level else min(least_held, state.held)
             part = hold(pieces[q], block.amplitude, state.held, state.velocity, tau, pieces[q].finish)
-            state = after(state, part, HOLD, pieces, q, tau, log)
+            state = state_after(state, part, HOLD, pieces, q, tau, log)
             if level and part.stops:
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
@@ -511,6 +511,6 @@ def pulse(
     workspace.logged[0] = state.logged
     validity = physics.KD_NOT_POSITIVE if least_held <= 0.0 else 0
     return Pulse(
-        state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.stopped_at,
+        state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.shaken_until,
         state.slips, validity,
     )  # fmt: skip

@@ -27,11 +27,11 @@ def series_of(
 ) -> Callable[[Block, Options, Wave, Any], Pulse]:
     """The jitted series of the cycles of continuous sliding.
 
-    ``follow(block, wave, table, c, p, tau)`` is Eq. 4 from rest at τ on piece p to the end of cycle c of the table.
+    ``follow(block, wave, workspace, c, p, tau)`` is Eq. 4 from rest at τ on piece p to the end of cycle c of the table.
     """
 
     @scalar
-    def slide_continuously(block: Block, options: Options, wave: Wave, table: Any) -> Pulse:
+    def slide_continuously(block: Block, options: Options, wave: Wave, workspace: Any) -> Pulse:
         """Continuous sliding from the first Üg ≥ Üy on, as one pulse: Eq. 4 throughout."""
         velocity, displacement, peak = 0.0, 0.0, 0.0
         whole, known = Gain(0.0, 0.0, 0.0), -1
@@ -42,12 +42,12 @@ def series_of(
             if wave.cycle[c + 1] <= p:
                 continue
             if first <= p:
-                velocity, displacement, peak = follow(block, wave, table, c, p, tau)
+                velocity, displacement, peak = follow(block, wave, workspace, c, p, tau)
                 repeats -= 1
             if repeats == 0:
                 continue
             if wave.shape[c] != known:
-                whole, known = follow(block, wave, table, c, first, wave.pieces[first].begin), wave.shape[c]
+                whole, known = follow(block, wave, workspace, c, first, wave.pieces[first].begin), wave.shape[c]
             later = repeats - 1.0
             peak = max(peak, max(velocity, velocity + later * whole.velocity) + whole.peak)
             displacement += repeats * (whole.displacement + math.pi * (2.0 * velocity + whole.velocity * later))

@@ -37,16 +37,16 @@ from slipsweep.motion.steps import RECTANGLE, TRAPEZOID, Steps
 
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
 HELD, FOLLOWED = 3, 4
-#: No slide up to its greatest rate is covered by fewer than N/64 steps, N a cycle; no step is shorter than the other.
+#: From its onset to the largest D a slide takes N/64 steps at least, N a cycle; no cut makes a step shorter than this.
 SHARE_OF_CYCLE, LEAST_STEP = 64.0, 1e-14
 #: Accelerations nearer to each other than this part of Üg are one.
 ROUNDING = 1e-12
 
 
 class State(NamedTuple):
-    """The block: V, W, its acceleration b while it slides, the largest and the least V, whether it slides.
+    """The block: V, W, its acceleration b while it slides (`held`), the largest and the least V, whether it slides.
 
-    The slide `began` at a phase, and its rate `grows` for another: that limits steps (`longest_step`).
+    `began` is the phase of the onset, and `growth` how long D growth from there: that limits steps (`longest_step`).
     """
 
     velocity: float
@@ -56,11 +56,11 @@ class State(NamedTuple):
     least: float
     sliding: bool
     began: float
-    grows: float
+    growth: float
 
 
 class Point(NamedTuple):
-    """An instant: τ on its piece, Üg, and Üg − Ü by Eq. 4."""
+    """An instant: τ on its piece, Üg, and D = Üg − Ü by Eq. 4, whether or not the block follows it."""
 
     tau: float
     base: float
@@ -115,7 +115,7 @@ def advance(
     displacement = state.displacement + (state.velocity + (0.5 * c0 + taken * (c1 / 6.0 + taken * c2 / 12.0)) * h) * h
     peak, least = max(state.peak, velocity, extreme), min(state.least, least)
     return taken, State(
-        velocity, displacement, held, peak, least, state.sliding and not stops, state.began, state.grows
+        velocity, displacement, held, peak, least, state.sliding and not stops, state.began, state.growth
     )
 
 
@@ -175,7 +175,10 @@ _crossing = root_of(_beyond_and_slope)
 
 @scalar
 def next_event(block: Block, piece: Piece, start: Point, end: Point, state: State) -> tuple[Point, Point]:
-    """Where in a step Eq. 4 comes beyond Ü of the block, or turns back beyond it (`end` if nowhere); and that turn."""
+    """The event of a step, and where `beyond` has its maximum in it (each `end`, if there is none).
+
+    The event is where `beyond` becomes positive; of a slide on Eq. 4 it is the maximum, from which on b is held.
+    """
     middle, top = point_at(block, piece, 0.5 * (start.tau + end.tau)), end
     first, half, last = beyond(start, state), beyond(middle, state), beyond(end, state)
     if turns(first, half, last):
@@ -200,10 +203,10 @@ def next_event(block: Block, piece: Piece, start: Point, end: Point, state: Stat
 
 
 @inlined
-def begun(block: Block, at: Point, phase: float, grows: float, state: State) -> State:
-    """The block as it begins to slide (t1), after which its rate grows for a phase."""
+def begun(block: Block, at: Point, phase: float, growth: float, state: State) -> State:
+    """The block as it begins to slide (t1), after which its rate growth for a phase."""
     b = min(acceleration(block.rise, block.yield_acceleration, block.yield_acceleration, at.base - at.rate), at.base)
-    return State(state.velocity, state.displacement, b, state.peak, state.least, True, phase, grows)
+    return State(state.velocity, state.displacement, b, state.peak, state.least, True, phase, growth)
 
 
 @scalar
@@ -217,8 +220,8 @@ def onset(block: Block, piece: Piece, start: Point, end: Point, state: State) ->
     began, top = next_event(block, piece, start, end, state)
     if began.tau >= end.tau:
         return end, state
-    grows = (top.tau if top.tau < end.tau else piece.finish) - began.tau
-    return began, begun(block, began, excitation.phase_at(piece, began.tau), grows, state)
+    growth = (top.tau if top.tau < end.tau else piece.finish) - began.tau
+    return began, begun(block, began, excitation.phase_at(piece, began.tau), growth, state)
 
 
 @inlined
@@ -246,7 +249,7 @@ def slide(
 @inlined
 def longest_step(per_cycle: int, phase: float, state: State) -> float:
     """The longest step from a phase on: those of a slide shorter than steps grow from its onset on."""
-    return max(SHARE_OF_CYCLE / per_cycle * max(state.grows, 0.25 * (phase - state.began)), LEAST_STEP)
+    return max(SHARE_OF_CYCLE / per_cycle * max(state.growth, 0.25 * (phase - state.began)), LEAST_STEP)
 
 
 @inlined
@@ -317,7 +320,7 @@ def walk(
         whole = is_whole(how, start, middle, end, longest, limit, state)
         if whole:
             _, after = slide(block, rule, how, start, middle, end, state)
-        if not whole or not (after.sliding or how == HELD):
+        if not whole or not (after.sliding or how == HELD):  # after a stop on a rise a slide may begin anew
             after = cut_step(block, pieces[p], rule, per_cycle, how, start, end, limit, state)
         state, start, i, first = after, end, i + 1, first + 1
     return state
@@ -335,14 +338,14 @@ def pulse(
     for q in range(p, end):
         begin = tau if q == p else pieces[q].begin
         rises = pieces[q].first <= pieces[q].last
-        if pieces[q].jumps and not rises:
+        if pieces[q].jumps and not rises:  # a step of no length: b as on a rise, or a slide begins here
             top = point_at(block, pieces[q], begin)
             if state.sliding:
                 _, state = slide(block, RECTANGLE, block.rise, top, top, top, state)
             elif top.base >= block.yield_acceleration and top.rate > 0.0:
                 held = physics.starting_acceleration(block, top.base)
-                grows = excitation.offset_at(pieces[q], block.amplitude, held) - begin
-                state = begun(block, top, pieces[q].start, grows, state)
+                growth = excitation.offset_at(pieces[q], block.amplitude, held) - begin
+                state = begun(block, top, pieces[q].start, growth, state)
         if rises:
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, block.rise, state)
         else:
@@ -350,7 +353,7 @@ def pulse(
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, HELD, state)
     if state.sliding and state.held <= 0.0:
         return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
-    started = stopped_at = pieces[end - 1].end  # t5: Üg = 0
+    started = shaken_until = pieces[end - 1].end  # t5: Üg = 0
     next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
     if following < wave.height.size:
         next_p, next_tau = pulses.beginning(block, wave, following)
@@ -360,12 +363,12 @@ def pulse(
             if state.sliding:
                 until = next_tau if q == next_p else pieces[q].finish
                 state = walk(block, pieces, steps, q, pieces[q].begin, until, HELD, state)
-                stopped_at = math.inf if state.sliding else pieces[q].end
+                shaken_until = math.inf if state.sliding else pieces[q].end
     velocity, displacement = state.velocity, state.displacement
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
         velocity = eq.attenuated_velocity(velocity, state.held, begins - started)
-    return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), stopped_at, 0.0, validity)
+    return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), shaken_until, 0.0, validity)
 
 
 @scalar

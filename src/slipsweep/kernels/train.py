@@ -31,29 +31,36 @@ from slipsweep.motion.pieces import Wave
 
 @scalar
 def keep(wave: Wave, k: int, now: Pulse, known: np.ndarray) -> None:
-    """Keep a pulse that began from rest in interval k, if it came to rest before the next interval.
+    """Keep W and the largest V of a pulse entered at rest for all intervals that are the `same`.
 
-    Up to there all intervals that are the `same` have the same pieces; its next pulse may come later, and did not
-    matter.  `known`, (intervals, 2), has W and the largest V of such pulses; W is NaN where none is kept.
+    If the shaking plays no part in it from the next interval on: up to there these intervals have the same pieces.
+    `known` is (intervals, 2); W is NaN where none is kept.
     """
     last = wave.pieces.shape[0] - 1
     until = wave.pieces[wave.interval[k + 1, 0]].start if k + 1 < wave.height.size else wave.pieces[last].end
-    if now.velocity == 0.0 and now.validity == 0 and now.stopped_at <= until:
+    if now.velocity == 0.0 and now.validity == 0 and now.shaken_until <= until:
         known[wave.same[k], 0], known[wave.same[k], 1] = now.displacement, now.peak
 
 
 def train_of(
     pulse: Callable[[Block, Options, Wave, Any, int, int, float], Pulse],
-) -> Callable[[Block, Options, Wave, Any, np.ndarray], Pulse]:
+) -> Callable[[Block, Options, Wave, Any], Pulse]:
     """The jitted train of a solver's pulses.
 
-    A pulse is given block, options, wave, what the solver itself has tabulated, the interval it begins in,
+    A pulse is given block, options, wave, the solver's own `Workspace` or `Steps`, the interval it begins in,
     the one in which the next begins (past the last, if none does) and the velocity with which it is entered.
     """
 
     @scalar
     def pulses(
-        block: Block, options: Options, wave: Wave, table: Any, k: int, until: int, velocity: float, known: np.ndarray
+        block: Block,
+        options: Options,
+        wave: Wave,
+        workspace: Any,
+        k: int,
+        until: int,
+        velocity: float,
+        known: np.ndarray,
     ) -> tuple[Pulse, int]:
         """Pulses from interval k on, as long as they begin before piece `until`, as one; the next one's interval."""
         displacement, peak, least, validity = 0.0, velocity, velocity, 0
@@ -62,7 +69,7 @@ def train_of(
             same = wave.same[k]
             now = Pulse(0.0, known[same, 0], known[same, 1], 0.0, 0.0, 0.0, 0)
             if velocity > 0.0 or math.isnan(now.displacement):
-                now = pulse(block, options, wave, table, k, following, velocity)
+                now = pulse(block, options, wave, workspace, k, following, velocity)
                 if velocity == 0.0:
                     keep(wave, k, now, known)
             k, velocity = following, now.velocity
@@ -78,16 +85,17 @@ def train_of(
         return Pulse(velocity, displacement, peak, least, 0.0, 0.0, validity), k
 
     @single
-    def train(block: Block, options: Options, wave: Wave, table: Any, known: np.ndarray) -> Pulse:
-        """All pulses of a stick-slip (or Newmark) block, as one; `known` is a workspace, (intervals, 2).
+    def train(block: Block, options: Options, wave: Wave, workspace: Any) -> Pulse:
+        """All pulses of a stick-slip (or Newmark) block, as one.
 
         Where the map of the repeated cycle returns to a velocity seen before, the cycles in between
         repeat; where the block never rests within it, the velocity changes by the same amount
         each time and W is an arithmetic series.
         """
+        known = workspace.known
         known[:, 0] = math.nan
         k = first_pulse(block, wave, 0)
-        now, k = pulses(block, options, wave, table, k, wave.cycle[wave.lead], 0.0, known)
+        now, k = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead], 0.0, known)
         velocity, displacement, peak, validity = now.velocity, now.displacement, now.peak, now.validity
         # what the cycles before the repeated one (a ramp, say) leave is the first velocity to come back to
         seen_velocity, seen_displacement, seen_at, next_look = velocity, displacement, 0, 1
@@ -95,7 +103,7 @@ def train_of(
         after = k
         while left > 0 and validity & NO_VALUE == 0:
             before = velocity
-            now, after = pulses(block, options, wave, table, k, wave.cycle[wave.lead + 1], before, known)
+            now, after = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead + 1], before, known)
             validity |= now.validity
             if validity & NO_VALUE:
                 break
@@ -127,7 +135,7 @@ def train_of(
                 seen_velocity, seen_displacement, seen_at = velocity, displacement, done
                 next_look *= 2
         if validity & NO_VALUE == 0:
-            now, after = pulses(block, options, wave, table, after, wave.pieces.shape[0], velocity, known)
+            now, _ = pulses(block, options, wave, workspace, after, wave.pieces.shape[0], velocity, known)
             validity |= now.validity
             displacement += now.displacement
             peak = max(peak, now.peak)
@@ -143,21 +151,21 @@ def cell_solver_of(
     slide_continuously: Callable[[Block, Options, Wave, Any], Pulse],
     yield_governs: Callable[[Block, Wave], bool],
 ) -> Callable[[FrictionLaw, Cell, Options, Wave, Any], Motion]:
-    """The jitted response of a cell by a solver's pulses, its continuous sliding and its view of Eq. 4 below Üy."""
+    """The jitted solver of a cell, from a solver's pulse, its continuous sliding, and whether by it yield governs."""
     train = train_of(pulse)
 
     @single
-    def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, table: Any) -> Motion:
+    def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, workspace: Any) -> Motion:
         """The response of a cell of any law that gives what the solver takes of it (`FrictionLaw.missing`)."""
         interface = interface_of(cell, options.rise, options.g)
         block, mode = block_of(law, cell, interface, options.rise, options.g), interface.sliding_mode
         validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
         found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
         if mode == eq.CONTINUOUS:
-            found = slide_continuously(block, options, wave, table)
+            found = slide_continuously(block, options, wave, workspace)
         elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
             validity |= YIELD_GOVERNS if yield_governs(block, wave) else 0
-            found = train(block, options, wave, table, table.known)
+            found = train(block, options, wave, workspace)
         return motion_of(block, mode, validity, found)
 
     return solve_cell
