@@ -503,6 +503,14 @@ def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
     assert np.ptp(canvas[..., :3], axis=-1).max() <= 2
 
 
+@pytest.mark.parametrize("kind", ["contours", "newmark"])
+def test_a_grey_colour_bar_has_the_same_numbers(lined: xr.Dataset, kind: str) -> None:
+    bars = [lined.slipsweep.chart(kind, at={"mu_s": 0.25}, grey=grey).axes[-1] for grey in (False, True)]
+    coloured, grey = ([text.get_text() for text in bar.get_yticklabels()] for bar in bars)
+    assert coloured == grey
+    assert ("30 mm" if kind == "contours" else "3") in grey
+
+
 def _pixels(figure: Figure) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

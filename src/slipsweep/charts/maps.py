@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FixedFormatter
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
@@ -182,9 +183,10 @@ def _fill_panels(
                 _label_contours(panel, lines, dict(zip(places, texts, strict=True)))
     if areas is None:
         return
-    bar = sheet.figure.colorbar(areas, ax=[panel.axes for panel in sheet.panels], ticks=places, pad=0.02)
-    bar.ax.set_yticklabels(texts, fontsize=sheet.options.font)
-    bar.ax.minorticks_off()
+    axes, names = [panel.axes for panel in sheet.panels], FixedFormatter(texts)
+    bar = sheet.figure.colorbar(areas, ax=axes, ticks=places, format=names, pad=0.02)
+    bar.ax.tick_params(labelsize=sheet.options.font)
+    bar.minorticks_off()
     bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
 
 
