@@ -156,6 +156,16 @@ def test_histogram_counts_every_motion_that_slides(result: xr.Dataset) -> None:
     assert f"Zero displacement: {zeros} of {values.size}" in caption(figure)
 
 
+def test_displacements_that_are_rounding_count_as_zero(result: xr.Dataset) -> None:
+    at = {"theta": 5.0, "mu_s": 0.3, "amplitude": 6.0}
+    rounded = result.copy(deep=True)
+    rounded.permanent_displacement.loc[{**at, "motion": result.motion[0]}] = 1e-48
+    figure = rounded.slipsweep.chart("histogram", at=at)
+    assert bars_of(figure)[1][0] > 1e-3
+    assert "Zero displacement: 2 of 16" in caption(figure)
+    assert "below 10⁻⁹ of the largest one count as zero" in caption(figure)
+
+
 def test_fragility_is_the_share_of_motions_that_exceed(result: xr.Dataset) -> None:
     at = {"theta": 5.0, "mu_s": 0.3}
     figure = result.slipsweep.chart("fragility", at=at, levels=["1mm", "5cm"])

@@ -38,6 +38,9 @@ SCALING = {
 #: Displacements of a fragility where none are requested, m.
 _THRESHOLDS = (0.01, 0.1, 1.0)
 
+#: Displacements below this part of the largest of a slice are rounding: they count as zero.
+_ROUNDING = 1e-9
+
 #: Logarithms of an intensity measure within this are one value: motions scaled to it.
 _SAME = 1e-6
 
@@ -185,7 +188,13 @@ def _axes(result: Result) -> list[str]:
 
 
 def _sheet(result: Result, options: style.Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
-    return result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
+    sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
+    size = abs(sheet.data[DISPLACEMENT])
+    rounding = (size > 0) & (size < _ROUNDING * size.max())
+    if rounding.any():
+        sheet.data[DISPLACEMENT] = sheet.data[DISPLACEMENT].where(~rounding, 0.0)
+        sheet.notes.append("Displacements below 10⁻⁹ of the largest one count as zero.")
+    return sheet
 
 
 def draw_suite(
