@@ -162,10 +162,9 @@ class Panel:
         """The values along an axis, in the units that they are drawn in."""
         return axis_numbers(self.data, name) * self.options.scale(name, self.g)
 
-    def grid(self, name: str | xr.DataArray, along: str | None = None) -> Any:
-        """A variable over (y, x), or over (y, `along`); without y of one row."""
-        array = self.data[name] if isinstance(name, str) else name
-        return over(array, self.data, (self.y, along or self.x))
+    def grid(self, name: str | xr.DataArray) -> Any:
+        """A variable over (y, x); without y of one row."""
+        return over(self.data[name] if isinstance(name, str) else name, self.data, (self.y, self.x))
 
     def member(self, index: int) -> str:
         """What a curve is called."""

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from slipsweep.charts import style
-from slipsweep.charts.sheet import Panel, Sheet, curve_looks, log_axis, over, plot_curve
+from slipsweep.charts.sheet import Sheet, curve_looks, log_axis, over, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DRIVES
 from slipsweep.charts.style import BLUE, VERMILION, Options
@@ -128,7 +128,14 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
     totals = over(sheet.data["total_index"], sheet.data, ("input", sheet.across, sheet.down))
     order = np.argsort(np.nan_to_num(totals).reshape(len(symbols), -1).sum(axis=1))
     for panel in sheet.panels:
-        _draw_panel_of_bars(panel, order)
+        for (name, interval, _, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
+            values = over(panel.data[name], panel.data, ("input",))[order]
+            low, high = over(panel.data[interval], panel.data, ("bound", "input"))[:, order]
+            at = np.arange(len(order)) + shift
+            panel.axes.barh(at, values, height=0.36, color=colour)
+            # a bootstrap's interval may, by a hair, not hold the estimate; NaN: there is none
+            ends = np.maximum([values - low, high - values], 0.0)
+            panel.axes.errorbar(values, at, xerr=ends, fmt="none", color="black", capsize=2.5)
         panel.axes.set_yticks(np.arange(len(order)), [symbols[at] for at in order])
         panel.axes.set_ylim(-0.6, len(order) - 0.4)
         panel.axes.set_xlim(*_ends(sheet, intervals=True))
@@ -137,18 +144,6 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
     for _, _, text, colour in _INDICES:
         sheet.legend[text] = Patch(color=colour)
     sheet.legend["95 % interval"] = Line2D([], [], color="black", marker="|", markersize=6)
-
-
-def _draw_panel_of_bars(panel: Panel, order: Any) -> None:
-    for (name, interval, _, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
-        values = over(panel.data[name], panel.data, ("input",))[order]
-        low, high = over(panel.data[interval], panel.data, ("bound", "input"))[:, order]
-        at = np.arange(len(order)) + shift
-        panel.axes.barh(at, values, height=0.36, color=colour)
-        there = np.isfinite(values + low + high)
-        # a bootstrap's interval may, by a hair, not hold the estimate
-        beside = np.maximum([(values - low)[there], (high - values)[there]], 0.0)
-        panel.axes.errorbar(values[there], at[there], xerr=beside, fmt="none", color="black", capsize=2.5)
 
 
 def _note_status(sheet: Sheet) -> None:
