@@ -28,7 +28,7 @@ LINES = {
     "files": 2_190,
     "charts": 2_770,
     "explore": 735,
-    "cli": 1_510,
+    "cli": 1_520,
 }
 
 #: Modules in all, and lines of a function's body.

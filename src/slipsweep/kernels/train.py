@@ -53,15 +53,9 @@ def train_of(
 
     @scalar
     def pulses(
-        block: Block,
-        options: Options,
-        wave: Wave,
-        workspace: Any,
-        k: int,
-        until: int,
-        velocity: float,
+        block: Block, options: Options, wave: Wave, workspace: Any, k: int, until: int, velocity: float,
         known: np.ndarray,
-    ) -> tuple[Pulse, int]:
+    ) -> tuple[Pulse, int]:  # fmt: skip
         """Pulses from interval k on, as long as they begin before piece `until`, as one; the next one's interval."""
         displacement, peak, least, validity = 0.0, velocity, velocity, 0
         while k < wave.height.size and wave.interval[k, 0] < until:
