@@ -132,12 +132,14 @@ def changed(value: float, *at: int) -> Any:
 
 
 OUT = np.r_[:400, 600:1001]
+#: Seconds that are interpolated let the ground drift.
+BOTH = {"gaps": "linear", "implausible": "accept"}
 WRONG: dict[str, tuple[Any, Any, dict[str, Any], str]] = {
-    "gap": (TIMES[OUT], SHAKING[OUT], {"gaps": "linear"}, "no samples from t = 3.99 to 6 s (201 times"),
+    "gap": (TIMES[OUT], SHAKING[OUT], BOTH, "no samples from t = 3.99 to 6 s (201 times"),
     "-999": (TIMES, changed(-999, 500), {"gaps": "linear"}, "1 fill value (-999), first at t = 5 s"),
     "blank": (TIMES, changed(np.nan, 500), {"gaps": "linear"}, "1 fill value (blank), first at t = 5 s"),
     "repeated": (TIMES, changed(-1e5, 500, 700), {"gaps": "linear"}, "2 fill values (-100000), first at t = 5 s"),
-    "held": (TIMES, changed(0.1, *range(500, 600)), {"gaps": "linear"}, "the value 0.1 is held from t = 5 to 5.99 s"),
+    "held": (TIMES, changed(0.1, *range(500, 600)), BOTH, "the value 0.1 is held from t = 5 to 5.99 s"),
     "peak": (TIMES, changed(4.0, 500), {"implausible": "accept"}, "peak acceleration 4 g at t = 5 s"),
     "unit": (TIMES, SHAKING * 980.665, {"implausible": "accept"}, "in cm/s2 it would be 0.299 g"),
     "weak": (TIMES, SHAKING / 980.665, {"implausible": "accept"}, "below 0.001 g, check units"),
@@ -168,6 +170,8 @@ def test_missing_samples_are_interpolated_and_drifts_taken_off(tmp_path: Path) -
         np.testing.assert_array_equal(record.acceleration, whole.acceleration[kept])
     drifting = motion(tmp_path, TIMES, SHAKING + 0.02)
     assert "record_accepted" not in read_record(drifting, units="g", baseline="linear").attrs
+    with pytest.raises(InputError, match="the ground moves 9"):  # a gap excuses no drift
+        read_record(motion(tmp_path, TIMES, changed(-999, 500) + 0.02), units="g", gaps="linear")
 
 
 def test_peaks_of_999_gal_are_no_fill_values(tmp_path: Path) -> None:

@@ -60,19 +60,16 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     return times[~missing], values[~missing], found
 
 
-def check_plausible(record: Motion, unit: str, implausible: str, has_gaps: bool) -> str:
+def check_plausible(record: Motion, unit: str, implausible: str) -> str:
     """What no ground does, in words; empty if the record, read in `unit`, is plausible.
-
-    A drift behind samples that were interpolated (`has_gaps`) is theirs: told, but not refused.
 
     Raises
     ------
     InputError
         Something is implausible, and `implausible` is not "accept": with the time and the value.
     """
-    peak, drift = _odd_peak(record, unit), _drift(record)
-    found = "; ".join(text for text in (peak, drift) if text)
-    if implausible == "refuse" and (peak or (drift and not has_gaps)):
+    found = "; ".join(text for text in (_odd_peak(record, unit), _drift(record)) if text)
+    if found and implausible == "refuse":
         raise InputError(f"{record.name}: {found}; or implausible = 'accept' takes the record as it is")
     return found
 

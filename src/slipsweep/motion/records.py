@@ -259,6 +259,6 @@ def _inspected(name: str, samples: Samples, reading: Reading, attrs: dict[str, s
     times, values, missing = without_fill_values(name, samples.times, samples.values, reading.gaps)
     record = Record(times, values * UNITS[samples.unit], name, attrs | {"record_units": samples.unit})
     record = record.corrected(reading.baseline)
-    odd = check_plausible(record, samples.unit, reading.implausible, has_gaps=bool(missing))
+    odd = check_plausible(record, samples.unit, reading.implausible)
     found = [text for text in (missing, odd) if text]
     return replace(record, attrs=record.attrs | {"record_accepted": "; ".join(found)}) if found else record
