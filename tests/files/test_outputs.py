@@ -98,6 +98,8 @@ def test_complete_or_absent(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     with pytest.raises(RunError, match=r"a\.txt: writing failed: No space left on device \(.* free on the disk\)"):
         write(path, False, OSError(28, "No space left on device"))
+    with pytest.raises(RunError, match=r"failed: Not a directory$"), outputs.writing("/proc/self/a.nc"):  # has no size
+        raise OSError(20, "Not a directory")
     assert not list(tmp_path.iterdir())
     with pytest.raises(RunError, match="was made by another process during the run"):
         write(path, False, theirs="theirs")

@@ -21,6 +21,11 @@ def option_name(text: str) -> str:
     return names.sub(lambda found: "--" + found[0].replace("_", "-").replace("+ ", "+ --"), text, count=1)
 
 
+def as_typed(text: str) -> str:
+    """A message with options as they are typed: ``--gaps linear`` for ``gaps = 'linear'``."""
+    return re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", text)
+
+
 def chooses(**choices: Family[Any] | type[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Replace parameters of a command by the options that are declared for them.
 

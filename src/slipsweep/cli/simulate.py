@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common
 from slipsweep.cli.common import BLOCK, RARE, SHAKING, Overwrite, Quiet, command, echo, written
-from slipsweep.cli.options import chooses, option_name
+from slipsweep.cli.options import as_typed, chooses, option_name
 from slipsweep.errors import InputError, RunError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
@@ -127,7 +127,10 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
         raise InputError(f"--waveform {waveform.name}: not allowed with --record, which is the shaking itself")
     from slipsweep.motion.records import read_record
 
-    return read_record(record, **reading)
+    try:
+        return read_record(record, **reading)
+    except InputError as error:
+        raise InputError(as_typed(str(error))) from None
 
 
 def _write_csv(table: "xr.Dataset", path: Path) -> None:

@@ -90,5 +90,7 @@ def writing(path: Path | str) -> Iterator[None]:
         message = f"{path}: writing failed: {(error.strerror if isinstance(error, OSError) else None) or error}"
         # all that the netCDF library says of a full disk is "HDF error"
         with suppress(OSError):  # the folder itself may be gone
-            message += f" ({size_text(shutil.disk_usage(Path(path).parent).free)} free on the disk)"
+            usage = shutil.disk_usage(Path(path).parent)
+            if usage.total:  # some file systems have no size, and are never full
+                message += f" ({size_text(usage.free)} free on the disk)"
         raise RunError(message) from error

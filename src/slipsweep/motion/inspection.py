@@ -116,7 +116,7 @@ def _odd_peak(record: Motion, unit: str) -> str:
     explains = 0.02 <= in_unit[likely] <= 1.5
     hint = f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)" if explains else ""
     limit = f"above {_STRONGEST:g} g" if abs(peak) > 1.0 else f"below {_WEAKEST:g} g"
-    return f"peak acceleration {peak:.4g} g at t = {record.times[at]:.6g} s{hint}: {limit}, check units"
+    return f"peak acceleration {peak:.4g} g at t = {record.times[at]:.6g} s{hint}: {limit}, check units and header"
 
 
 def _drift(record: Motion) -> str:

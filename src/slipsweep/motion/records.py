@@ -243,7 +243,9 @@ def record_of(path: Path, reading: Reading) -> Record:
     kind, samples = read_samples(path, lines, reading)
     own, given = samples.unit, reading.units
     if own and given and UNITS[own] != UNITS[given]:
-        raise InputError(f"{path}: units = {given!r}: the file itself says {own!r}; leave units out, or give that")
+        raise InputError(
+            f"{path}: units = {given!r}: the file itself says {own!r}; correct its header, or leave units out"
+        )
     if not own and not given:
         known = ", ".join(map(repr, UNITS))
         raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
