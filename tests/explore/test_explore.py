@@ -208,6 +208,12 @@ def test_a_suite_shows_its_motions_and_their_statistics(suite_page: tuple[xr.Dat
     assert meta["histories"] is None
 
 
+def test_friction_angles(tmp_path: Path) -> None:
+    text = SWEEP.replace("[axes.mu_s]\nvalues = [0.3, 0.5]", "[axes.phi]\nvalues = [20, 30]")
+    write_page(make(tmp_path, text), tmp_path / "a.html")
+    assert contents(tmp_path / "a.html")[0]["histories"] is not None
+
+
 @pytest.mark.parametrize("drawn", [False, True])
 def test_records_and_uncertain_inputs(tmp_path: Path, drawn: bool) -> None:
     uncertain = "[uncertainty]\nsamples = 64\n[uncertainty.mu_s]\ndistribution = 'uniform'\nloc = 0.1\nscale = 0.2\n"

@@ -54,11 +54,8 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     motion = WAVEFORMS.from_attributes(table.attrs)
     if motion.cycles > CYCLES and motion.ramp_out > 0.0:
         return None  # the first cycles alone have no ramp at their end
-    inputs = {
-        str(name): coord.variable
-        for name, coord in table.coords.items()
-        if name not in ("frequency", "displacement_amplitude", "structure_frequency", "quantile", "threshold")
-    }
+    others = ("phi", "frequency", "displacement_amplitude", "structure_frequency", "quantile", "threshold")
+    inputs = {str(name): one.variable for name, one in table.coords.items() if name not in others}  # phi: by mu_s
     depends = {str(dim) for variable in inputs.values() for dim in variable.dims}
     sizes = {dim: size for dim, size in excerpt.sizes.items() if dim in depends}
     cycles = min(motion.cycles, CYCLES)
