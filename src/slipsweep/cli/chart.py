@@ -61,14 +61,17 @@ def chart(
     from slipsweep.charts.style import Options
     from slipsweep.files import outputs
     from slipsweep.files.opening import read_result
+    from slipsweep.files.selection import own_names
 
     requested = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
     if levels is not None and requested and {"contours", "fragility"}.isdisjoint(requested):
         raise InputError(f"--levels {levels}: only with --kind contours or fragility")
     across, heights = (text.split(",") if text else () for text in (panels, levels))
-    options = Options(x, y, cuts(at), across, variable, heights, units, show_cautions, width, grey)
+    typed = cuts(at)
     with read_result(file) as data:
         result = Result(data, file)
+        options = Options(x, y, own_names(data, typed), across, variable, heights, units, show_cautions, width, grey)
+        result.places(options.at)
         chosen = requested or kinds.fitting(result, options)
         together = bool(given) and len(chosen) > 1
         for path in given:

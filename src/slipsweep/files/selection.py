@@ -90,6 +90,18 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
     return found
 
 
+def own_names(data: xr.Dataset, at: Mapping[str, At]) -> dict[str, At]:
+    """The same by the names of the axes: `ky` is yield_coefficient, `mu_s` beside an axis phi the angle to it."""
+    found: dict[str, At] = {}
+    for name, cut in at.items():
+        own = "yield_coefficient" if name == "ky" else name
+        if own == "mu_s" and own in data.coords and data[own].dims == ("phi",):
+            places = find(data.swap_dims(phi=own), {own: cut})[own]
+            own, cut = "phi", ",".join(f"{math.degrees(math.atan(one.value)):.10g}" for one in places)
+        found[own] = cut
+    return found
+
+
 def places_at(
     data: xr.Dataset, source: object, at: Mapping[str, At], dims: Collection[str]
 ) -> dict[str, NDArray[np.intp]]:
@@ -97,6 +109,7 @@ def places_at(
 
     InputError: as `find`, or a value lies between those of the result; the message names its neighbours.
     """
+    at = own_names(data, at)
     for name in at:
         if name in data.sizes and name not in dims:
             raise InputError(f"{source}: {name} = {at[name]}: cannot be selected here; {did_you_mean(name, [*dims])}")

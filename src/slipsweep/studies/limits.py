@@ -9,7 +9,7 @@ solved together, by the cycle solver.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -27,6 +27,7 @@ from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.grid.problem import Problem
 from slipsweep.model import parameters, variables
 from slipsweep.model.options import Model, Newmark
+from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
@@ -69,7 +70,7 @@ _SCALES = ("frequency", "time_scale", "structure_frequency")
 
 @datasets.naming_choices
 def limit_amplitude(
-    displacement: Values,
+    displacement: Values | str | Sequence[str],
     theta: Values | None = None,
     mu_s: Values | None = None,
     frequency: Values | None = None,
@@ -107,8 +108,8 @@ def limit_amplitude(
 
     Parameters
     ----------
-    displacement : float, array or DataArray
-        Tolerable permanent displacement, m, > 0.
+    displacement : float, array or DataArray, str or list of str
+        Tolerable permanent displacement, > 0, m or with a unit ("50mm").
     theta, mu_s, frequency : float, array or DataArray
         These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".  A record has no frequency,
         but a `time_scale`.
@@ -176,6 +177,11 @@ def plan_limits(
     amplitude_steps: int = AMPLITUDE_STEPS,
 ) -> Plan:
     """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
+
+    def in_m(given: Any) -> Any:
+        return quantity("displacement", given, "m", math.nan) if isinstance(given, str) else given
+
+    displacement = [in_m(one) for one in displacement] if isinstance(displacement, list) else in_m(displacement)
     values = parameters.check_values("displacement", displacement)
     dims = getattr(displacement, "dims", ("displacement",) * values.ndim)
     if not values.size or len({*dims}) < values.ndim:
