@@ -137,6 +137,7 @@ def test_friction_that_is_uncertain_over_a_suite() -> None:
     chances = pooled.exceedance_probability.transpose("amplitude", "threshold").values
     expected = exceedance_rates(curve, given["amplitude"], chances)
     np.testing.assert_allclose(found.annual_rate, expected["annual_rate"], rtol=1e-12)
+    assert found.attrs["suite_dimensions"] == "motion samples"
     apart = displacement_hazard(slipsweep.sample(**given), curve, ["10cm"])
     np.testing.assert_allclose(apart.annual_rate, expected["annual_rate"][1:], rtol=1e-12)
     with pytest.raises(InputError, match=r"thresholds = 0.03: not among those of the result, 0.01, 0.1 m: add it to"):

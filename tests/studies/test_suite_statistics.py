@@ -26,7 +26,7 @@ def suite_result(displacement: Any, validity: Any, dims: tuple[str, ...]) -> xr.
 def test_by_hand() -> None:
     """Rows: some zeros; all zeros; no values; one value; one non-zero value."""
     nan = np.nan
-    values = [[0.0, 0.1, 0.4, nan, 0.0], [0.0] * 5, [nan] * 5, [nan, 0.2, nan, nan, nan], [0.0, 0.0, 0.0, 0.0, 0.3]]
+    values = [[0.0, 0.1, 0.4, nan, 1e-48], [0.0] * 5, [nan] * 5, [nan, 0.2, nan, nan, nan], [0.0, 0.0, 0.0, 0.0, 0.3]]
     flags = [
         [0, CAUTION, 0, UPLIFT, 0],
         [0] * 5,

@@ -146,6 +146,15 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
     assert [line.split()[:3] for line in lines[at + 2 : at + 5]] == [
         ["m0", "150", "0.01"], ["m1", "80", "0.02"], ["m2", "200", "0.005"],
     ]  # fmt: skip
+    one = command(folder, "info", "a.nc", "--at", "polarity=1", "-d", "5cm")
+    assert "permanent displacement (mm) over 4 motion x 1 polarity:" in one.stdout
+    (folder / "b.toml").write_text(SAMPLES.replace("[uncertainty]", "[uncertainty]\nover = 'motion'"))
+    assert command(folder, "run", "b.toml", "--quiet").returncode == 0
+    with xr.open_dataset(folder / "b.nc") as samples:
+        d, u = (float(samples[name].max()) for name in ("threshold", "displacement_quantile"))
+    told = command(folder, "info", "b.nc", "-d", f"{d}m", "--at", "theta=5").stdout
+    assert f"P(u > {d * 1000:g} mm)" in told
+    assert f"{u * 1000:.3g}" in told
     assert command(folder, "export", "a.nc", "-o", "a.csv", "--quiet").returncode == 0
     header, row = (folder / "a.csv").read_text().splitlines()[:2]
     assert dict(zip(header.split(","), row.split(","), strict=True))["motion"] == "m0"

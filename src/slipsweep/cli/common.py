@@ -261,9 +261,10 @@ def _echo_indices(indices: "Indices") -> None:
 
 
 def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] | None = None) -> None:
-    """Print the statistics of a suite, at each of `most` grid points, with P(u > d) of displacements as typed."""
+    """Print the statistics of a suite or of samples, at each of `most` grid points, with P(u > d) of those typed."""
     stored = {"permanent_displacement", "validity"} <= {*table.data_vars} and "limit_amplitude" not in table
-    if stored and table["permanent_displacement"].sizes.get("motion", 1) > 1:
+    sampled = "displacement_quantile" in table and (typed or "suite" in table.attrs)
+    if sampled or (stored and table["permanent_displacement"].sizes.get("motion", 1) > 1):
         from slipsweep.studies.suite_statistics import summary_lines
 
         lengths = displacements(typed, float(table.attrs["g"])) if typed else None

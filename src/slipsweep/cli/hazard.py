@@ -69,14 +69,14 @@ def hazard(
 def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
     """What is needed of a result, cut where one value of an axis is given."""
     from slipsweep.files.opening import read_result
-    from slipsweep.files.selection import selected
+    from slipsweep.files.selection import own_names, selected
 
     result = read_result(file)
     names = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
     table = result[[name for name in names if name in result]].load()
     if "g" not in table.attrs:
         raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
-    typed = common.cuts(at)
+    typed = own_names(result, common.cuts(at))
     chosen = selected(table, file, typed, ("amplitude", "motion", "threshold"))
     for name in typed:
         if chosen.sizes.get(name, 1) > 1:

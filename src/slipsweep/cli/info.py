@@ -24,7 +24,6 @@ def info(
     from slipsweep.files.storing import nbytes_of
     from slipsweep.grid.resources import size_text
     from slipsweep.motion.records import Record
-    from slipsweep.studies.suite_statistics import SUITE
 
     table = read_result(file)
     echo(f"{Path(file)}  {size_text(nbytes_of(place_of(file)))}")
@@ -39,9 +38,9 @@ def info(
         echo_tally(contents.tally_in(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
-    if displacement and table.sizes.get("motion", 1) < 2:
-        raise InputError(f"{file}: --displacement: is for results of a suite of motions")
-    echo_suite(selected(table, file, cuts(at), SUITE), most=100, typed=displacement)
+    if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
+        raise InputError(f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs")
+    echo_suite(selected(table, file, cuts(at), ("motion", "quantile", "threshold")), most=100, typed=displacement)
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
         if name != RUN:

@@ -24,8 +24,8 @@ from slipsweep.model.units import conversion
 from slipsweep.model.variables import HAZARD_RESULTS
 from slipsweep.motion.columns import read_columns
 from slipsweep.motion.formats import read_lines
-from slipsweep.studies.sampling import Thresholds, check_thresholds
-from slipsweep.studies.suite_statistics import THRESHOLDS, point_names, suite_dims, suite_statistics
+from slipsweep.studies.sampling import Thresholds
+from slipsweep.studies.suite_statistics import THRESHOLDS, at_thresholds, point_names, suite_dims, suite_statistics
 
 Floats = NDArray[np.float64]
 
@@ -231,19 +231,10 @@ def _of_samples(result: xr.Dataset, thresholds: Any, over: Any) -> xr.Dataset:
     """The fragility that `sample` has stored, at some of its thresholds."""
     found = result[["exceedance_probability", "valueless_share"]].load()
     if thresholds is not None:
-        wanted = check_thresholds("thresholds", thresholds, float(result.attrs.get("g", np.nan)))
-        nearest = found.sel(threshold=wanted, method="nearest")
-        for one, there in zip(wanted, nearest["threshold"].values, strict=True):
-            if not np.isclose(there, one, rtol=1e-6):
-                stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
-                raise InputError(
-                    f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
-                    "add it to the thresholds of [uncertainty], and run again"
-                )
-        found = nearest
+        found = at_thresholds(found, thresholds)
     dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
-    pooled = " ".join(dims) or str(result.attrs.get("pooled", "")) or "samples"
-    return found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=pooled)
+    pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
+    return found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=" ".join((*dims, *pooled, "samples")))
 
 
 def openquake_fragility(found: xr.Dataset) -> str:

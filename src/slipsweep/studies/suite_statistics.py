@@ -10,7 +10,7 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
-from slipsweep.model.parameters import check_list, shown
+from slipsweep.model.parameters import check_list, number_text, shown
 from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
 from slipsweep.studies.sampling import Thresholds, check_quantiles, check_thresholds
 
@@ -21,6 +21,9 @@ SUITE = ("motion", "polarity")
 
 #: Flags under which a motion has no value.
 REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
+
+#: Displacements below it are the rounding of zero, m: a block at yield moves 1e-48.
+_ROUNDING = 1e-12
 
 #: The median, and one standard deviation of a normal distribution on either side of it.
 QUANTILES = (0.16, 0.5, 0.84)
@@ -109,6 +112,7 @@ def suite_statistics(
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
 
     moved = result["permanent_displacement"].astype(np.float64).load()
+    moved = moved.where(~(np.abs(moved) < _ROUNDING), 0.0)
     # a reader may have made codes to numbers with NaN
     codes = result["validity"].fillna(0).astype(np.int16).load()
     there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
@@ -200,9 +204,9 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     Parameters
     ----------
     result : Dataset
-        A result of `sweep` with the dimension `motion`.
+        A result of `sweep` with the dimension `motion`, or of `sample`: its quantiles, without the share of zeros.
     displacement : float, str or list of these, optional
-        Displacements d, m or with a unit.
+        Displacements d, m or with a unit; of `sample` among its thresholds.
     most : int
         Of more grid points there is one line, that says how to have those of some.
 
@@ -219,25 +223,33 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     """
     import pandas as pd
 
-    moved = result["permanent_displacement"]
-    dims = suite_dims(moved)
+    is_sampled = "displacement_quantile" in result
+    moved = result["displacement_quantile" if is_sampled else "permanent_displacement"]
+    dims = ("quantile",) if is_sampled else suite_dims(moved)
     grid = {dim: size for dim, size in moved.sizes.items() if dim not in dims}
     points = math.prod(grid.values())
-    suite = grid_text({dim: moved.sizes[dim] for dim in dims})
+    drawn = f"{result.attrs.get('pooled', '')} x {result.attrs.get('samples', '')} samples".removeprefix(" x ")
+    suite = drawn if is_sampled else grid_text({dim: moved.sizes[dim] for dim in dims})
     if points > most:
         how = "slipsweep info OUT.nc --at NAME=VALUE -d 50mm"
         return [f"statistics over {suite} at {points} grid points: {how} prints those of some"]
-    found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    if is_sampled:
+        missing = result["valueless_share"].broadcast_like(moved.isel(quantile=0, drop=True))
+        found = result[["displacement_quantile", "exceedance_probability"]].assign(valueless_share=missing)
+        found = (found if displacement is None else at_thresholds(found, displacement)).transpose(*grid, ...).load()
+    else:
+        found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
     places = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in grid))
     labels = zip(grid.items(), zip(*places, strict=True), strict=True) if grid else ()
     columns: dict[str, Sequence[str]] = {_title_of(found, dim): column for (dim, n), column in labels if n > 1}
     rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
-    for title, column in zip(("16 %", "median", "84 %"), rows["displacement_quantile"], strict=True):
+    for share, column in zip(found["quantile"].values, rows["displacement_quantile"], strict=True):
+        title = "median" if share == 0.5 else f"{100.0 * share:.3g} %"
         columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
-    shares = {"zero": rows["zero_probability"][0]}
-    if displacement is not None:
+    shares = {} if is_sampled else {"zero": rows["zero_probability"][0]}
+    if displacement is not None or is_sampled:
         titles = [f"P(u > {d * 1000.0:.6g} mm)" for d in found["threshold"].values]
         shares |= dict(zip(titles, rows["exceedance_probability"], strict=True))
     if (rows["valueless_share"] > 0.0).any():
@@ -247,6 +259,20 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     }
     table = pd.DataFrame(columns).to_string(index=False).splitlines()
     return [f"permanent displacement (mm) over {suite}:", *table]
+
+
+def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:
+    """What `sample` has stored, at some of its thresholds (InputError: not among them)."""
+    wanted = check_thresholds("thresholds", thresholds, float(found.attrs.get("g", np.nan)))
+    nearest = found.sel(threshold=wanted, method="nearest")
+    for one, there in zip(wanted, nearest["threshold"].values, strict=True):
+        if not np.isclose(there, one, rtol=1e-6):
+            stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
+            raise InputError(
+                f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
+                "add it to the thresholds of [uncertainty], and run again"
+            )
+    return nearest
 
 
 def _title_of(data: xr.Dataset, dim: Hashable) -> str:
