@@ -98,6 +98,25 @@ def test_run_writes_no_file_that_its_name_belies(capsys: pytest.CaptureFixture[s
     )
 
 
+def test_reasons_and_remedies(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))
+    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (out := told(capsys, "run", "a.toml"))
+    assert "did you mean phi = 22?" in out
+    (tmp_path / "a.csv").write_text("0,1\n1,-999\n2,0\n")
+    message = told(capsys, "simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
+    assert "--gaps linear interpolates" in message
+    axes = SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22").replace("[4]", "[2, 4, 6, 8, 10, 12]")
+    (tmp_path / "b.toml").write_text(axes)
+    assert "unsound: the displacement falls with A in " in told(capsys, "run", "b.toml")
+    told(capsys, "chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
+    message = told(capsys, "chart", "b.nc", "--at", "frequncy=2", "-o", "b.png", status=2)
+    assert 'frequncy = 2: no such axis; did you mean "frequency"?' in message
+
+
 def test_limit_says_what_it_took(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     sweep = tmp_path / "a.toml"
     sweep.write_text(SWEEP)

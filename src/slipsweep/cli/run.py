@@ -12,12 +12,16 @@ from slipsweep.cli.common import Large, Overwrite, Panel, Quiet, command, echo, 
 from slipsweep.cli.options import chooses
 from slipsweep.errors import InputError
 from slipsweep.model.options import SOLVERS
-from slipsweep.model.variables import PARAMETERS, SlidingMode
+from slipsweep.model.variables import PARAMETERS, STRENGTHS, VALUELESS, SlidingMode, Validity
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from slipsweep.grid.tally import Tally
+
+
+#: Cells, about, that are looked at for trends that no block has.
+_LOOKED_AT = 5000
 
 
 @command(
@@ -88,8 +92,33 @@ def run(
     common.echo_tally(report.tally)
     if why := _why_nothing_slides(template, report.tally):
         echo(why)
-    common.echo_suite(read_result(report.path), most=20)
+    result = read_result(report.path)
+    if text := _unsound_text(result):
+        echo(text)
+    common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
+
+
+def _unsound_text(table: "xr.Dataset") -> str:
+    """How many sliding cells have a trend that no block has; of many cells some, evenly spaced, are looked at."""
+    from slipsweep.charts import solved
+
+    drive = [name for name in (*STRENGTHS, "displacement_amplitude") if name in table.coords]
+    moved = table.get(solved.DISPLACEMENT)
+    if moved is None or not drive or solved.is_newmark(table):
+        return ""
+    each = math.ceil((moved.size / _LOOKED_AT) ** (1.0 / max(moved.ndim, 1)))
+    some = table.isel({dim: slice(None, None, each) for dim in moved.dims}).load()
+    some = some.sortby([name for name in drive if name in some.dims])
+    if "validity" in some:  # as charts leave out
+        some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(some["validity"] & Validity.NOT_RECOUPLED == 0)
+    trends = dict(
+        zip(("falls with A", "lies below half of Newmark's"), solved.unsound(some, solved.newmark(some)), strict=True)
+    )
+    slides = max(int((some[solved.DISPLACEMENT] > 0).sum()), 1)
+    parts = [f"{text} in {100 * int(one.sum()) / slides:.2g} %" for text, one in trends.items() if one.any()]
+    text = f"unsound: the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has"
+    return text if parts else ""
 
 
 def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
@@ -100,8 +129,11 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
     if not modes[SlidingMode.STUCK]:
-        why = "statically_unstable: theta reaches the friction angle, atan(mu_s)"
-        return f"no cell has a value: the flags above say why; {why}"
+        flags = {flag: count for flag, count in (tally.flags or {}).items() if flag in VALUELESS}
+        why = max(flags, key=lambda flag: flags[flag]).text if flags else "validity is not among the variables"
+        mu_s = float(coords["mu_s"].min()) if "mu_s" in coords else 0.0
+        is_angle = mu_s > 3.0 and "phi" not in coords
+        return f"no cell has a value: {why}" + (f"; did you mean phi = {mu_s:.6g}?" if is_angle else "")
     if not {"amplitude", "theta", "mu_s"} <= {*coords}:
         return "no cell slides"
     coulomb = g * np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max()))
