@@ -90,11 +90,8 @@ def run(
     if "duplicate_motions" in template.attrs:
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
-    if why := _why_nothing_slides(template, report.tally):
-        echo(why)
     result = read_result(report.path)
-    if text := _unsound_text(result):
-        echo(text)
+    echo(*(text for text in (_why_nothing_slides(template, report.tally), _unsound_text(result)) if text))
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
 
@@ -112,10 +109,9 @@ def _unsound_text(table: "xr.Dataset") -> str:
     some = some.sortby([name for name in drive if name in some.dims])
     if "validity" in some:  # as charts leave out
         some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(some["validity"] & Validity.NOT_RECOUPLED == 0)
-    trends = dict(
-        zip(("falls with A", "lies below half of Newmark's"), solved.unsound(some, solved.newmark(some)), strict=True)
-    )
+    falls, below = solved.unsound(some, solved.newmark(some))
     slides = max(int((some[solved.DISPLACEMENT] > 0).sum()), 1)
+    trends = {"falls with A": falls, "lies below half of Newmark's": below}
     parts = [f"{text} in {100 * int(one.sum()) / slides:.2g} %" for text, one in trends.items() if one.any()]
     text = f"unsound: the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has"
     return text if parts else ""

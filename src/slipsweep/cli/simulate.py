@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common
-from slipsweep.cli.common import BLOCK, RARE, SHAKING, Overwrite, Quiet, command, echo, written
+from slipsweep.cli.common import BLOCK, RARE, SHAKING, Overwrite, Quiet, command, echo
 from slipsweep.cli.options import as_typed, chooses, option_name
 from slipsweep.errors import InputError, RunError
 from slipsweep.model import variables
@@ -67,7 +67,9 @@ def simulate(
         Path | None, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", metavar="FILE")
     ] = None,
     reading: Mapping[str, Any],
-    output: Annotated[list[Path] | None, written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")] = None,
+    output: Annotated[
+        list[Path] | None, common.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")
+    ] = None,
     overwrite: Overwrite = False,
     points: Annotated[
         int | None, common.OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)

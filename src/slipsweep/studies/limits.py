@@ -28,7 +28,7 @@ from slipsweep.grid.problem import Problem
 from slipsweep.model import parameters, variables
 from slipsweep.model.options import Model, Newmark
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
+from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.studies import datasets
@@ -245,7 +245,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
     results = replace(request, shape=scan.targets.shape).results()
     for values in results.values():
-        values[:] = math.nan if values.dtype.kind == "f" else SlidingMode.MISSING
+        values[:] = math.nan if values.dtype.kind == "f" else variables.SlidingMode.MISSING
     # without a limit the validity at the maximum amplitude says why
     results["validity"][:] = scan.found["validity"][:, -1]
     valueless = np.isnan(scan.found["permanent_displacement"]).all(axis=1)
