@@ -213,6 +213,25 @@ def test_a_single_record() -> None:
         np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
 
 
+def test_newmarks_block_is_solved_under_the_record_in_the_file(tmp_path: Path) -> None:
+    """A dataset without the record has no curve of it, and no word of it in the legend."""
+    sweep = (SWEEPS / "records.toml").read_text().replace("data/", f"{SWEEPS}/data/")
+    (tmp_path / "r.toml").write_text(sweep.replace("values = [0.5, 1, 2]", "values = [2.0]"))
+    assert main(["run", str(tmp_path / "r.toml"), "-o", str(tmp_path / "r.nc"), "-q"]) == 0
+    at = {"theta": 0, "mu_s": 0.3, "polarity": -1}
+    record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv", units="g", baseline="linear")
+    with slipsweep.open_result(tmp_path / "r.nc") as data:
+        expected = 1000 * slipsweep.sweep(
+            0, 0.3, excitation=record, scale=data.scale.values, time_scale=2.0, polarity=-1, model="newmark"
+        ).permanent_displacement  # fmt: skip
+        (line,) = labelled(data.slipsweep.chart(at=at), "newmark")
+        np.testing.assert_allclose(line.get_ydata(), expected.where(expected > 0), rtol=1e-12)
+        without = data.drop_vars(["record_time", "record_acceleration"]).slipsweep.chart(at=at)
+    texts = [text.get_text() for text in without.legends[0].get_texts()]
+    assert "falls with A" in texts
+    assert not any("Newmark" in text for text in texts)
+
+
 # --------------------------------------------------------------------- drawn as a whole
 
 

@@ -236,7 +236,8 @@ def _underlay(sheet: Sheet, panel: Panel, factor: float) -> None:
     names = [style.flag_name(flag) for flag in CAUTIONS & Validity(int(np.bitwise_or.reduce(codes, axis=None)))]
     marks = [("caution", "caution:\n" + "\n".join(names), _CAUTION, flagged)]
     if "unsound" in panel.data:
-        marks.append(("unsound", style.UNSOUND, _UNSOUND, panel.data["unsound"]))
+        text = style.UNSOUND if "newmark" in panel.data else "falls with A"
+        marks.append(("unsound", text, _UNSOUND, panel.data["unsound"]))
     for gid, text, look, cells in marks:
         for xs, ys in _curves(panel, drawn.where(cells).transpose(*drawn.dims), factor):
             panel.axes.plot(xs, ys, gid=gid, **look)

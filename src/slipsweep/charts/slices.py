@@ -12,9 +12,10 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import DISPLACEMENT, is_recorded, solve, with_amplitude
+from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
 from slipsweep.charts.style import SHOWN, Options, drawn_text
 from slipsweep.errors import InputError, did_you_mean
+from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
 from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
@@ -56,6 +57,7 @@ class Result:
         self.variables = [str(one) for one in data.data_vars if one in SHOWN]
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
+        self.motion = read_embedded(data, Path(name)) if self.sort == "record" else None
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
@@ -98,9 +100,13 @@ class Result:
         return name
 
     def compared(self, name: str) -> list[str]:
-        """A result with its flags, and with Newmark's displacement if the file has it."""
+        """A result with its flags, and with Newmark's displacement if the file has it, or the record to solve it for.
+
+        That of harmonic motion is solved where it is drawn.
+        """
         theirs = "newmark_displacement"
-        return [name, "validity", *([theirs] if name == DISPLACEMENT and theirs in self.variables else [])]
+        known = theirs in self.variables or (self.motion is not None and not is_newmark(self.data))
+        return [name, "validity", *([theirs] if name == DISPLACEMENT and known else [])]
 
     def places(self, at: Mapping[str, At]) -> dict[str, list[Place]]:
         """Where on the axes the values requested are.
@@ -155,10 +161,11 @@ class Result:
             data = data.drop_vars("amplitude", errors="ignore")
         data = with_amplitude(data)
         solved = [name for name in names if exact or name not in there]
-        if solved and self.sort != "sweep":
+        if solved and self.sort != "sweep" and self.motion is None:
             self.result(solved[0])
         if solved:
-            data = data.drop_vars(there if exact else []).assign(solve(data, solved).data_vars)
+            found = solve(data, solved, motion=self.motion)
+            data = data.drop_vars(there if exact else []).assign(found.data_vars)
         return data.assign_attrs(picked=picked)
 
     def _middle(self, dim: str) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
-from slipsweep.model.variables import PARAMETERS, STRENGTHS, WAVEFORM_INPUTS
+from slipsweep.model.variables import PARAMETERS, RECORD_INPUTS, STRENGTHS, WAVEFORM_INPUTS
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
 
@@ -28,7 +28,7 @@ _SMALLER, _ROUNDING = 0.99, 1e-9
 
 
 def is_recorded(data: xr.Dataset) -> bool:
-    """Whether a result is of recorded motions, for which nothing is solved again."""
+    """Whether a result is of recorded motions."""
     return not {"record", "suite"}.isdisjoint(data.attrs)
 
 
@@ -37,21 +37,23 @@ def is_newmark(data: xr.Dataset) -> bool:
     return bool(data.attrs["model"] == "newmark")
 
 
-def solve(data: xr.Dataset, names: Iterable[str], model: Model | None = None, **changed: Any) -> xr.Dataset:
+def solve(
+    data: xr.Dataset, names: Iterable[str], model: Model | None = None, motion: Any = None, **changed: Any
+) -> xr.Dataset:
     """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate.
 
-    The slice gives the parameters and, in its attributes, model, excitation and solver.
+    The slice gives the parameters and, in its attributes, model, solver and excitation where that is no `motion`.
     """
     chosen = model or MODELS.from_attributes(data.attrs)
     block = ("yield_coefficient",) if "yield_coefficient" in data.coords else _BLOCK
-    wanted = [*block, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS]
+    wanted = [*block, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS, *RECORD_INPUTS[1:]]
     given = {name: _bare(data[name]) for name in wanted if name in data.coords} | changed
     if given.get("displacement_amplitude") is not None:
         given["amplitude"] = None
     return sweep(
         **given,
         model=chosen,
-        excitation=WAVEFORMS.from_attributes(data.attrs),
+        excitation=motion or WAVEFORMS.from_attributes(data.attrs),
         solver=SOLVERS.from_attributes(data.attrs) if SOLVERS.attribute in data.attrs else SOLVERS.default,
         variables=list(names),
     )
@@ -96,7 +98,7 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
 
 
 def newmark(data: xr.Dataset) -> xr.DataArray | None:
-    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved; None of records."""
+    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved; None of records without."""
     if "newmark_displacement" in data or is_recorded(data):
         return data.get("newmark_displacement")
     return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])))[DISPLACEMENT]
