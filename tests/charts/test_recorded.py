@@ -289,6 +289,13 @@ def test_annual_rates(result: xr.Dataset) -> None:
     rates = slipsweep.displacement_hazard(result.sel(theta=5.0), curve, [0.001, 0.01, 0.1])
     axes = Figure().subplots()
     assert rates.slipsweep.chart(ax=axes) is axes
+    figure = slipsweep.displacement_hazard(result.sel(mu_s=0.3), curve, [0.001, 0.01, 0.1]).slipsweep.chart()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["θ = 5°", "θ = 20°"]
+    short = slipsweep.HazardCurve(np.array([0.5, 4.0]), np.array([1e-2, 8e-3]))
+    figure = slipsweep.displacement_hazard(result.sel(theta=5.0), short, [0.001, 0.01]).slipsweep.chart()
+    assert "above the end of the hazard curve, where" in caption(figure)
+    figure.draw_without_rendering()
+    assert not any("times" in text.get_text() for text in figure.axes[0].get_xticklabels(which="both"))
     marks = [line for line in axes.lines if line.get_marker() not in ("", "None", None)]
     for line, mu_s in zip(marks, rates.mu_s, strict=True):
         expected = rates.annual_rate.sel(mu_s=mu_s).values

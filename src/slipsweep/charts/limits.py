@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from slipsweep.charts import style
-from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, over, plot_curve
+from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, log_ticks, member_text, over, plot_curve
 from slipsweep.charts.slices import NAMED, Result
 from slipsweep.charts.suites import draw_suite, kept_motions, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import LimitStatus
-from slipsweep.studies.suite_statistics import QUANTILES, SUITE, limit_quantiles, point_names
+from slipsweep.studies.suite_statistics import QUANTILES, SUITE, limit_quantiles
 
 #: What is drawn along the abscissa, and as curves, in order of preference.
 _ABSCISSAE = ("frequency", "mu_s", "theta", "displacement")
@@ -39,9 +39,8 @@ def limit(result: Result, options: style.Options) -> Figure:
     suite = kept_motions(result) if "motion" in result.dims else {}
     along = "motion" if suite and not {*result.wide} - {*SUITE, *options.at} else _ABSCISSAE
     curves = None if suite else _CURVES
-    sheet = result.sheet(
-        replace(options, more_panels=True), ["limit_amplitude", "limit_status"], along, curves=curves, keep=suite
-    )
+    names, shown = ["limit_amplitude", "limit_status"], replace(options, more_panels=True)
+    sheet = result.sheet(shown, names, along, curves=curves, keep=suite)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9", which="both")
         panel.axes.set_ylabel("limit amplitude A / g")
@@ -51,8 +50,8 @@ def limit(result: Result, options: style.Options) -> Figure:
             _draw_curves(sheet, panel)
     if sheet.x in NAMED:
         for panel in sheet.panels:
-            names = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
-            panel.axes.set_xticks(panel.values(sheet.x), names, rotation=40, ha="right")
+            labels = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
+            panel.axes.set_xticks(panel.values(sheet.x), labels, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
     else:
         sheet.set_axis("x", sheet.x)
@@ -62,11 +61,6 @@ def limit(result: Result, options: style.Options) -> Figure:
         sheet.notes.append("No limits to draw: limit_status has the reasons.")
     if suite:
         sheet.notes.append(_suite_text(sheet.data))
-    drawn = sheet.data["limit_amplitude"].sizes
-    shown = {str(dim): (n, result.data.sizes[dim]) for dim, n in drawn.items()}
-    thinned = [f"{n} of {size} {style.SYMBOLS.get(dim, dim)}" for dim, (n, size) in shown.items() if n < size]
-    if thinned:
-        sheet.notes.append(f"Shown: {', '.join(thinned)}.")
     return sheet.done()
 
 
@@ -140,7 +134,9 @@ def hazard(result: Result, options: style.Options) -> Figure:
     dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
-    names = point_names(rates, rates["valueless_share"].sizes)
+    grid = {str(dim): size for dim, size in rates["valueless_share"].sizes.items()}
+    points = [dict(zip(grid, at, strict=True)) for at in np.ndindex(*grid.values())]
+    names = [", ".join(member_text(rates, dim, at, options) for dim, at in one.items()) for one in points]
     if len(names) > _MOST_CURVES:
         raise InputError(
             f"{len(names)} grid points: a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
@@ -163,11 +159,14 @@ def hazard(result: Result, options: style.Options) -> Figure:
         panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
         panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":")
         handle = {**look, "linestyle": "none"} if marks.any() else dashed
-        (drawing.legend[style.plain(name)],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+        (drawing.legend[name],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+    for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
+        log_ticks(axis, high / low)
     if names == [""]:
         drawing.legend.clear()
     texts = [style.model_text(rates.attrs), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
     if (held > 0.5 * lines).any():
-        texts.append("Dotted: more than half of the rate comes from above the largest amplitude of the sweep, "
-                     "where P is held constant.")  # fmt: skip
+        ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
+        what = "the largest amplitude of the sweep" if ends[0] < ends[1] else "the end of the hazard curve"
+        texts.append(f"Dotted: more than half of the rate comes from above {what}, where P is held constant.")
     return drawing.finish(texts)
