@@ -1,5 +1,6 @@
 """Charts of sweeps: what they show is the model's, and nothing is read that they do not show."""
 
+import itertools
 import re
 from pathlib import Path
 from typing import Any
@@ -332,6 +333,27 @@ def test_contours_leave_them_out_too(lined: xr.Dataset, kind: str) -> None:
     for lines in named(figure, "contours"):
         for segment in (one for segments in lines.allsegs for one in segments):
             assert not inside(patch, segment).any()
+
+
+def test_a_single_point_is_barred_too_and_angles_are_not_logarithmic() -> None:
+    result = slipsweep.sweep([8.0, 11.0, 14.0, 18.4], 0.35, 4.905, 1.0, excitation=LINED_SINE)
+    figure = result.slipsweep.chart("curve", x="theta", width="90mm")
+    assert figure.axes[0].get_xscale() == "linear"
+    (line,) = named(figure, "caution")
+    there = np.isfinite(points(line)[1])
+    assert there.any()
+    assert line.get_marker() == "."
+    figure.draw_without_rendering()
+    label = figure.axes[0].yaxis.label.get_window_extent()
+    assert label.y1 <= figure.legends[0].get_window_extent().y0
+    assert [style.percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == ["100 %", "100 %", "5.4 %", "0.31 %"]
+
+
+def test_labels_of_panels_lie_apart(grid: xr.Dataset) -> None:
+    figure = grid.slipsweep.chart("dimensionless", panels=["theta"])
+    figure.draw_without_rendering()
+    boxes = [axes.xaxis.label.get_window_extent() for axes in figure.axes]
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
 
 
 def test_spread_is_between_the_options_there_are(lined: xr.Dataset) -> None:

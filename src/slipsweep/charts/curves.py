@@ -27,8 +27,14 @@ _LEAST_SCALED = 1e-4
 
 _NEWMARK: dict[str, Any] = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
 _JUMP: dict[str, Any] = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
-_CAUTION: dict[str, Any] = {"color": "0.8", "linewidth": 7, "solid_capstyle": "butt", "zorder": 1.5}
-_UNSOUND: dict[str, Any] = {"color": "0.55", "linewidth": 7, "linestyle": (0, (0.15, 0.35)), "zorder": 1.6}
+_CAUTION: dict[str, Any] = {"color": "0.8", "linewidth": 7, "markersize": 14, "solid_capstyle": "butt", "zorder": 1.5}
+_UNSOUND: dict[str, Any] = {
+    "color": "0.55",
+    "linewidth": 7,
+    "markersize": 14,
+    "linestyle": (0, (0.15, 0.35)),
+    "zorder": 1.6,
+}
 
 #: What an engineer has to choose from in `spread`, what is given for it, and how it is drawn: the end of sliding, and
 #: the friction decay, also as the paper measured it on its shaking table, 2.30 and 2.70 (Table 2).
@@ -56,18 +62,16 @@ def families(result: Result, options: style.Options) -> Figure:
 def curve(result: Result, options: style.Options) -> Figure:
     """One curve of a result over one axis, with Newmark's of a displacement."""
     name = result.quantity(options.variable)
-    return _drawn(
-        result.sheet(options, result.compared(name), (*solved.DRIVES, "yield_coefficient", "frequency")), name
-    )
+    first = (*solved.DRIVES, "yield_coefficient", "frequency")
+    return _drawn(result.sheet(options, result.compared(name), first), name)
 
 
 def motions(result: Result, options: style.Options) -> Figure:
     """Displacements under one record over one axis, a curve for each value of another."""
     first = (*STRENGTHS, "yield_acceleration", "yield_coefficient")
     others = [dim for dim in result.wide if dim != "polarity"]
-    return _drawn(
-        result.sheet(options, result.compared(solved.DISPLACEMENT), first, curves=others), solved.DISPLACEMENT
-    )
+    sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), first, curves=others)
+    return _drawn(sheet, solved.DISPLACEMENT)
 
 
 def dimensionless(result: Result, options: style.Options) -> Figure:
@@ -240,7 +244,7 @@ def _underlay(sheet: Sheet, panel: Panel, factor: float) -> None:
         marks.append(("unsound", text, _UNSOUND, panel.data["unsound"]))
     for gid, text, look, cells in marks:
         for xs, ys in _curves(panel, drawn.where(cells).transpose(*drawn.dims), factor):
-            panel.axes.plot(xs, ys, gid=gid, **look)
+            plot_curve(panel.axes, xs, ys, gid=gid, **look)
         if cells.any():
             sheet.remarks[text] = Line2D([], [], **look)
 

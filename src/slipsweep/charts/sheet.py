@@ -34,8 +34,8 @@ Floats = NDArray[np.float64]
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 
-#: Width of a figure of one panel, inches, and characters of a caption in an inch.
-_WIDTH, _CHARACTERS = 7.0, 16
+#: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line of a small panel.
+_WIDTH, _CHARACTERS, _LABEL = 7.0, 15, 26
 
 #: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
 _LINE, _LINES = 0.165, 4
@@ -121,9 +121,10 @@ class Drawing:
         for panel in self.grid.ravel():
             for axes in (panel, *panel.child_axes):
                 axes.tick_params(labelsize=size)
-            if several:
-                panel.xaxis.label.set_fontsize(size)
-                panel.yaxis.label.set_fontsize(size)
+            for label in [panel.yaxis.label, *([panel.xaxis.label] if several else [])]:
+                label.set_fontsize(size)
+                if size < 10 and "\n" not in label.get_text():
+                    label.set_text(textwrap.fill(label.get_text(), _LABEL))
 
 
 def _without_colour(figure: Figure) -> None:
@@ -204,7 +205,7 @@ class Sheet(Drawing):
         for panel in self.panels:
             axes = panel.axes
             axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": label})
-            if is_log(values):
+            if name not in ("theta", "phi") and is_log(values):
                 axes.set(**{f"{side}scale": "log"})
                 log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
             place = axes.get_subplotspec()
@@ -222,11 +223,8 @@ class Sheet(Drawing):
         for flag, text in style.LEFT_OUT_TEXT.items():
             if not any(has_flags(one, flag).any() for one in flags):
                 continue
-            heading = "Left out"
-            if self.options.show_cautions:
-                below_zero = name == DISPLACEMENT and flag == Validity.UPSLOPE
-                heading = "Left out, below zero on a logarithmic scale" if below_zero else "Drawn on request"
-            groups.setdefault(heading, []).append(text)
+            drawn = self.options.show_cautions and not (name == DISPLACEMENT and flag == Validity.UPSLOPE)
+            groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
         self.notes += [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
@@ -254,9 +252,9 @@ class Sheet(Drawing):
         if self.data["unsound"].any():
             slides = int((drawn > 0).sum())
             parts = [("falls with A", falls), ("lies below half of Newmark's", below)]
-            shares = [f"{text} in {100 * int(one.sum()) / slides:.2g} %" for text, one in parts if one.any()]
+            shares = [f"{text} in {style.percent(int(one.sum()) / slides)}" for text, one in parts if one.any()]
             self.notes.append(
-                f"{marked}: {100 * int(self.data['unsound'].sum()) / slides:.2g} % of the sliding cells shown. "
+                f"{marked}: {style.percent(int(self.data['unsound'].sum()) / slides)} of the sliding cells shown. "
                 f"The displacement {' and '.join(shares)}, a trend of the model that no block has."
             )
 
@@ -311,7 +309,7 @@ def over(array: xr.DataArray, data: xr.Dataset, dims: Sequence[str | None]) -> A
 
 def is_log(values: Floats) -> bool:
     """Whether an axis is spaced by a constant factor rather than a constant step."""
-    if values.size < 3 or values[0] <= 0:
+    if values.size < 3 or values[0] <= 0 or values[-1] < 3 * values[0]:
         return False
     steps, factors = np.diff(values), np.diff(np.log(values))
     return bool(np.ptp(factors) / factors.mean() < np.ptp(steps) / steps.mean())

@@ -98,7 +98,7 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
 
 
 def newmark(data: xr.Dataset) -> xr.DataArray | None:
-    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved; None of records without."""
+    """Permanent displacement of Newmark's block on the cells of a slice: the file's, or solved but of records."""
     if "newmark_displacement" in data or is_recorded(data):
         return data.get("newmark_displacement")
     return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])))[DISPLACEMENT]

@@ -294,6 +294,6 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
 def _note_cautions(sheet: Sheet) -> None:
     """Which cautions the statistics have in them."""
     shares = {flag: float(has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
-    texts = [f"{style.flag_name(flag)} {100.0 * share:.2g} %" for flag, share in shares.items() if share]
+    texts = [f"{style.flag_name(flag)} {style.percent(share)}" for flag, share in shares.items() if share]
     if texts:
         sheet.notes.append(f"Statistics are of all values, also those with a caution: {', '.join(texts)}.")

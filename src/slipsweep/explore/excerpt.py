@@ -99,7 +99,7 @@ class Excerpt:
         values = self.values(dim)
         if values.size < 2 or values[0] <= 0.0 or dim in self.labels:
             return False
-        return dim == "frequency" or bool(values[-1] >= 3.0 * values[0] and is_log(values))
+        return dim == "frequency" or is_log(values)
 
 
 def read_excerpt(path: Path, cells: int) -> Excerpt:
