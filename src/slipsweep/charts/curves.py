@@ -94,7 +94,7 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     label, least = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()"), 1.0 if factor > 1 else None
     sheet.show(name, "Barred curves")
     if scaled:
-        label, least, factor = "permanent displacement, u ω² / A", _LEAST_SCALED, 0.0
+        label, least, factor = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", _LEAST_SCALED, 0.0
     else:
         sheet.set_axis("x", sheet.x)
     every = [_curves(panel, panel.data["drawn"], factor) for panel in sheet.panels]
