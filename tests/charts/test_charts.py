@@ -689,3 +689,16 @@ def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path
         assert f"{(flag.name or '').lower()} (" in text
     for one in title.texts:
         assert one.get_window_extent().x1 < 0.95 * title.bbox.width, one.get_text()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda data: data.assign_attrs(rise=7.5), "attributes do not say what was solved"),
+        (lambda data: data.isel(theta=slice(0)), "holds no cells"),
+    ],
+)
+def test_a_spoilt_result_is_refused_in_one_line(spoil: Any, message: str) -> None:
+    data = slipsweep.sweep([5.0, 6.0], [0.3, 0.4], [2.0, 4.0], [1.0, 2.0])
+    with pytest.raises(InputError, match=message):
+        kinds.figure_of(spoil(data), "a.nc", "contours")

@@ -85,7 +85,12 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         if getattr(options, name):
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
     with mpl.rc_context({"font.size": options.font}):
-        return kinds[kind](result, options)
+        try:
+            return kinds[kind](result, options)
+        except KeyError as error:
+            if result.dims:
+                raise
+            raise InputError(f"{result.name}: {error.args[0]}: not there, but {kind} needs it") from None
 
 
 def figure_of(data: xr.Dataset, name: str = "dataset", kind: str | None = None, **chosen: Any) -> Figure:

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
+from slipsweep.charts.solved import DISPLACEMENT, check_attributes, is_newmark, is_recorded, solve, with_amplitude
 from slipsweep.charts.style import SHOWN, Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
@@ -57,6 +57,8 @@ class Result:
             raise InputError(f'{name}: not a result of "slipsweep run"')
         self.motion = read_embedded(data, Path(name)) if self.sort == "record" else None
         data = data[self.variables]
+        if 0 in data.sizes.values():
+            raise InputError(f"{name}: holds no cells")
         check_attributes(data.attrs, self.name)
         for key, one in data.variables.items():
             units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
@@ -273,12 +275,3 @@ def _sort(data: xr.Dataset) -> str:
     if not is_recorded(data):
         return "sweep"
     return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
-
-
-def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
-    """Refuse a result that does not say what was solved (InputError)."""
-    recorded = not {"record", "suite"}.isdisjoint(attrs)
-    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
-    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
-        if key not in attrs:
-            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
