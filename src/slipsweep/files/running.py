@@ -20,7 +20,7 @@ from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
 
 #: Resident memory of a run, and of a worker of this machine, beside its chunks.
-_BASE_MEMORY, _WORKER_MEMORY = 400_000_000, 250_000_000
+_BASE_MEMORY, _WORKER_MEMORY = 430_000_000, 250_000_000
 
 #: Chunks for each worker, so that all end at about the same time, and the least work of one, in cells of a sine.
 _CHUNKS_A_WORKER, _LEAST_WORK = 16, 500_000
