@@ -20,15 +20,15 @@ ORDER = (
 #: whoever takes something away lowers the limit.
 LINES = {
     "jit": 410,
-    "model": 1_490,
+    "model": 1_493,
     "motion": 2_260,
     "kernels": 3_285,
     "grid": 1_450,
-    "studies": 4_710,
+    "studies": 4_716,
     "files": 2_201,
     "charts": 2_790,
     "explore": 735,
-    "cli": 1_552,
+    "cli": 1_559,
 }
 
 #: Modules in all, and lines of a function's body.

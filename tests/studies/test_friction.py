@@ -195,3 +195,14 @@ def test_a_blank_cell_is_a_sample_that_is_not_there(stick_slip: xr.Dataset) -> N
     found = friction(gappy)
     assert np.isnan(found.friction_coefficient.values[100:103]).all()
     assert np.isfinite(found.least_friction).all()
+
+
+def test_the_friction_angle_stands_for_the_coefficient() -> None:
+    path, phi = Path(__file__).parents[2] / "sweeps/data/shaking_test.csv", np.degrees(np.arctan(0.38))
+    xr.testing.assert_allclose(
+        slipsweep.measured_friction(path, 5.0, phi=phi), slipsweep.measured_friction(path, 5.0, 0.38), rtol=1e-12
+    )
+    with pytest.raises(InputError, match=r"^mu_s: must be given$"):
+        slipsweep.measured_friction(path, 5.0)
+    with pytest.raises(InputError, match=r"^phi, mu_s: must not both be given"):
+        slipsweep.calibrate(path, 5.0, 0.38, phi=phi)

@@ -54,7 +54,8 @@ def friction(
     *,
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help=_COLUMNS)],
     theta: common.Theta,
-    mu_s: common.MuS,
+    mu_s: common.MuS = None,
+    phi: common.Phi = None,
     g: Annotated[float, BLOCK("Gravity, m/s².")] = 9.81,
     offset: Offset = None,
     drift: Drift = None,
@@ -68,12 +69,15 @@ def friction(
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
     angle = quantity("--theta", theta, "degree", g)
+    friction_angle = None if phi is None else quantity("--phi", phi, "degree", g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
 
     span, offsets, drifts = None if rest is None else _times(rest), _channels(offset), _channels(drift)
-    table = measured_friction(test, angle, mu_s, g=g, offset=offsets, drift=drifts, rest=span, threshold=least)
+    table = measured_friction(
+        test, angle, mu_s, phi=friction_angle, g=g, offset=offsets, drift=drifts, rest=span, threshold=least
+    )
     attrs = table.attrs
     writers = {".nc": lambda path: common.write_netcdf(table, path, attrs["title"])}
     common.write_outputs(paths, overwrite, lambda: common.figure_of(table), writers)
@@ -102,7 +106,8 @@ def calibrate(
         list[Path], typer.Argument(metavar="TEST.csv...", help=f"{_COLUMNS} One at least of the block's.")
     ],
     theta: common.Theta,
-    mu_s: common.MuS,
+    mu_s: common.MuS = None,
+    phi: common.Phi = None,
     offset: Offset = None,
     drift: Drift = None,
     cycles: Annotated[bool, TEST("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
@@ -113,12 +118,13 @@ def calibrate(
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     angle = quantity("--theta", theta, "degree", model.g)
+    friction_angle = None if phi is None else quantity("--phi", phi, "degree", model.g)
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
     offsets, drifts = _channels(offset), _channels(drift)
-    table = calibrated(tests, angle, mu_s, model=model, offset=offsets, drift=drifts, cycles=cycles)
+    table = calibrated(tests, angle, mu_s, phi=friction_angle, model=model, offset=offsets, drift=drifts, cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
     writers = {
         ".nc": lambda path: common.write_netcdf(table, path, table.attrs["title"]),

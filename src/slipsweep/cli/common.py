@@ -65,7 +65,8 @@ def written(about: str, metavar: str = "FILE") -> Any:
 
 
 Theta = Annotated[str, BLOCK.value("Inclination of the base: 5 (degrees), 0.1rad.")]
-MuS = Annotated[float, BLOCK("Static friction coefficient.")]
+MuS = Annotated[float | None, BLOCK("Static friction coefficient.")]
+Phi = Annotated[str | None, BLOCK.value("Friction angle instead of --mu-s: 21 (degrees).")]
 Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", "--overwrite")]
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", "--quiet", "-q")]
 

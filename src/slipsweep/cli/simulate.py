@@ -26,8 +26,8 @@ class Typed:
     """The parameters of a block and its shaking; text may have a unit."""
 
     theta: Annotated[str | None, BLOCK.value("Inclination of the base: 5 (degrees), 0.1rad.")] = None
-    mu_s: Annotated[float | None, BLOCK("Static friction coefficient.")] = None
-    phi: Annotated[str | None, BLOCK.value("Friction angle instead of --mu-s: 21 (degrees).")] = None
+    mu_s: common.MuS = None
+    phi: common.Phi = None
     yield_acceleration: Annotated[
         str | None, BLOCK.value("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).")
     ] = None

@@ -216,6 +216,13 @@ def with_friction_coefficient(parameters: Mapping[str, Any]) -> dict[str, Any]:
     return given | {"mu_s": friction_coefficient(parameters["phi"])}
 
 
+def single_friction_coefficient(mu_s: Any, phi: Any) -> float:
+    """The friction coefficient of one block, given itself or as the friction angle (InputError: both, or neither)."""
+    given = with_friction_coefficient({"mu_s": mu_s, "phi": phi})
+    check_given(given, ("mu_s",))
+    return check_single("mu_s", given["mu_s"])
+
+
 def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:
     """Refuse to go on without a parameter that has no default; None is none."""
     for name in names:

@@ -29,8 +29,9 @@ _A_CYCLE, _FEWEST_IN_A_CYCLE = 0.1, 12
 def calibrate(
     test: friction.Test | Sequence[friction.Test],
     theta: float,
-    mu_s: float,
+    mu_s: float | None = None,
     *,
+    phi: float | None = None,
     model: options.Model | str = "mendez",
     offset: str | Sequence[str] = (),
     drift: str | Sequence[str] = (),
@@ -50,6 +51,8 @@ def calibrate(
         Several tests of one interface are calibrated together.
     theta, mu_s : float
         Inclination of the plane, degrees, and static friction coefficient, measured by other means.
+    phi : float, optional
+        Friction angle, degrees, instead of mu_s = tan phi.
     model : Mendez or str
         The rules of motion.
     offset, drift : str or list of str
@@ -102,7 +105,7 @@ def calibrate(
     tests = [friction.test_of(one) for one in test] if isinstance(test, list | tuple) else [friction.test_of(test)]
     if not tests:
         raise InputError("test = []: must be one test at least")
-    theta, mu_s = parameters.check_single("theta", theta), parameters.check_single("mu_s", mu_s)
+    theta, mu_s = parameters.check_single("theta", theta), parameters.single_friction_coefficient(mu_s, phi)
     chosen = options.MODELS.of(model)
     if not isinstance(chosen, options.Mendez):
         raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")

@@ -22,7 +22,7 @@ from scipy.stats import t as student
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown
+from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown, single_friction_coefficient
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, removed_text, unit_factor
 from slipsweep.studies.table_motion import noise_of
@@ -190,8 +190,9 @@ def _mean(values: Floats, noise: float, systematic: float) -> Floats:
 def measured_friction(
     test: Test,
     theta: float,
-    mu_s: float,
+    mu_s: float | None = None,
     *,
+    phi: float | None = None,
     g: float = 9.81,
     offset: str | Sequence[str] = (),
     drift: str | Sequence[str] = (),
@@ -211,6 +212,8 @@ def measured_friction(
         in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
     theta, mu_s : float
         Inclination of the plane, degrees, and static friction coefficient.
+    phi : float, optional
+        Friction angle, degrees, instead of mu_s = tan phi.
     g : float
         Gravity, m/s².
     offset, drift : str or list of str
@@ -258,7 +261,7 @@ def measured_friction(
             f"{given.name}: block_acceleration: missing: Eq. 1 needs the accelerations of table and block; calibrate "
             "takes a test without"
         )
-    theta, mu_s, g = (check_single(name, value) for name, value in (("theta", theta), ("mu_s", mu_s), ("g", g)))
+    theta, g, mu_s = check_single("theta", theta), check_single("g", g), single_friction_coefficient(mu_s, phi)
     corrected, removed = given.corrected(offset, drift, rest)
     check_contact(corrected, theta, g)
     times, table, block = corrected.times, corrected.channels[TABLE], corrected.channels["block_acceleration"]
