@@ -249,7 +249,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert "mu_s = 0.3\n" in done.stdout
     assert "above 1.019 g P(u > d) is taken as it is there: to compute it, extend the axis amplitude" in done.stdout
     assert "put more values on the axis amplitude" in done.stdout
-    assert (tmp_path / "h.svg").read_text().count("mu_s = 0.4") == 1
+    assert (tmp_path / "h.svg").read_text(encoding="utf-8").count("μs = 0.4") == 1
     assert (tmp_path / "f.xml").read_text().count("<poes") == 6
     assert command(tmp_path, "export", "a.nc", "-o", "e.xml", "--at", "mu_s=0.4").returncode == 0
     assert (tmp_path / "e.xml").read_text().count("<poes") == 3
