@@ -133,6 +133,7 @@ def test_coulombs_block_is_newmarks(kinetic: float) -> None:
     first = found.attrs["findings"].splitlines()[0]
     assert first.startswith("This is a block of constant friction: by statics ")
     assert first == found.attrs["constant_friction"]
+    assert "contradicts" not in found.attrs["findings"]
     for name, true in (("static", 0.38), ("kinetic", kinetic)):
         low, high = found[f"{name}_friction_interval"].values
         assert low <= true <= high, name
@@ -196,6 +197,7 @@ def test_a_block_that_slips_upslope(clean: dict[str, xr.Dataset]) -> None:
         test.block_acceleration.values[:] += np.where(moves, np.pi * np.cos(np.pi * phase), 0.0)
     found = calibrated(test)
     assert "slipped upslope 2 times" in found.attrs["findings"]
+    assert "contradicts" not in found.attrs["findings"]
     check_intervals(found, CALIBRATED["stick_slip"])
 
 

@@ -157,7 +157,8 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     threshold = threshold_of(one.test.channels[TABLE], block)[0]
     slides = slides_of(times, table, block, threshold)
     onsets = np.array([onset_acceleration(times, table, block, slide, threshold) for slide in slides])
-    if not slides:
+    onsets = onsets[onsets > 0.0]  # downslope
+    if not onsets.size:
         return []
     step = float(np.abs(np.diff(table)).max())
     least, seen = float(found.intervals[0][0]), float(np.median(onsets))
