@@ -24,7 +24,7 @@ LINES = {
     "motion": 2_260,
     "kernels": 3_285,
     "grid": 1_450,
-    "studies": 4_716,
+    "studies": 4_720,
     "files": 2_201,
     "charts": 2_790,
     "explore": 735,

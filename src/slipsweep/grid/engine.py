@@ -237,7 +237,7 @@ def _fill(
         part.count(math.prod(part.shape))
 
     if math.prod(request.shape):
-        # what a first call compiles, seconds long, is compiled on the thread that hears Ctrl-C
+        # what a first call compiles is compiled once, before the threads
         solve_cells(np.empty(0, CELL), np.empty((1 + max(rows.values()), 0)))
         threads.spread(tiles, work)
 

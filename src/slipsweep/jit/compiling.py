@@ -18,6 +18,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,9 @@ class Kernel:
         if self._compiled is None:
             with _first_call:
                 if self._compiled is None:
-                    return self._call_first(args)
+                    # on a thread, which Ctrl-C does not strike: in a callback of LLVM it would be lost
+                    with ThreadPoolExecutor(1) as pool:
+                        return pool.submit(self._call_first, args).result()
         return self._compiled(*args)
 
     def _call_first(self, args: tuple[Any, ...]) -> Any:
