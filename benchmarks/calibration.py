@@ -5,6 +5,7 @@ where the yield acceleration governs, and of continuous sliding; with white nois
 table's among them, or a converter of 12 bits and no other noise.  Writes calibration.md.
 """
 
+import multiprocessing
 import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -108,7 +109,8 @@ def main() -> None:
     else:
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
         one(tasks[0])  # compiled once, for all processes
-        with ProcessPoolExecutor(cores()) as pool:
+        # a fork would take the threads' locks of this process along
+        with ProcessPoolExecutor(cores(), multiprocessing.get_context("spawn")) as pool:
             found = list(pool.map(one, tasks, chunksize=4))
     results = {
         kind: np.array([result for task, result in zip(tasks, found, strict=True) if task[:2] == kind])
