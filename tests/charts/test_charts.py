@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import slipsweep
-from slipsweep.charts import kinds, maps, style
+from slipsweep.charts import kinds, maps, solved, style
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import newmark
 from slipsweep.charts.style import Options
@@ -346,7 +346,7 @@ def test_a_single_point_is_barred_too_and_angles_are_not_logarithmic() -> None:
     figure.draw_without_rendering()
     label = figure.axes[0].yaxis.label.get_window_extent()
     assert label.y1 <= figure.legends[0].get_window_extent().y0
-    assert [style.percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == ["100 %", "100 %", "5.4 %", "0.31 %"]
+    assert [solved.percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == ["100 %", "100 %", "5.4 %", "0.31 %"]
 
 
 def test_labels_of_panels_lie_apart(grid: xr.Dataset) -> None:

@@ -163,7 +163,7 @@ def test_displacements_that_are_rounding_count_as_zero(result: xr.Dataset) -> No
     figure = rounded.slipsweep.chart("histogram", at=at)
     assert bars_of(figure)[1][0] > 1e-3
     assert "Zero displacement: 2 of 16" in caption(figure)
-    assert "below 10⁻⁹ of the largest one count as zero" in caption(figure)
+    assert "below 10⁻¹² m count as zero" in caption(figure)
 
 
 def test_fragility_is_the_share_of_motions_that_exceed(result: xr.Dataset) -> None:

@@ -333,6 +333,12 @@ def test_help_is_there_at_once(tmp_path: Path) -> None:
     assert not heavy & {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
 
 
+def test_run_loads_no_figures(small: Path) -> None:
+    code = "import sys; from slipsweep.cli import main; main(['run', 'small.toml']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=small, capture_output=True, text=True, check=True)
+    assert "matplotlib" not in done.stdout.splitlines()[-1].split()
+
+
 @pytest.mark.parametrize("name", ["", *NAMES])
 def test_help_names_its_examples_and_their_options(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setenv("COLUMNS", "150")

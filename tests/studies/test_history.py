@@ -107,3 +107,14 @@ except KeyboardInterrupt:
 def test_a_history_of_many_cycles_hears_ctrl_c() -> None:
     done = subprocess.run([sys.executable, "-c", ENDLESS], capture_output=True, text=True, timeout=300, check=False)
     assert (done.stdout, done.stderr) == ("heard True\n", "")
+
+
+def test_an_error_in_the_kernel_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It runs on a thread, where an error would be lost and the table left as memory was."""
+
+    def out_of_memory(*_: Any) -> None:
+        raise MemoryError("no room for the workspace")
+
+    monkeypatch.setattr("slipsweep.kernels.history.wave_history", out_of_memory)
+    with pytest.raises(MemoryError, match="workspace"):
+        history(0.3, Sine())

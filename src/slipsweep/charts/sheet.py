@@ -251,11 +251,10 @@ class Sheet(Drawing):
         self.data["unsound"] = (falls | below).transpose(*drawn.dims)
         if self.data["unsound"].any():
             slides = int((drawn > 0).sum())
-            parts = [("falls with A", falls), ("lies below half of Newmark's", below)]
-            shares = [f"{text} in {style.percent(int(one.sum()) / slides)}" for text, one in parts if one.any()]
+            trends = solved.trend_text(falls, below, slides)
             self.notes.append(
-                f"{marked}: {style.percent(int(self.data['unsound'].sum()) / slides)} of the sliding cells shown. "
-                f"The displacement {' and '.join(shares)}, a trend of the model that no block has."
+                f"{marked}: {solved.percent(int(self.data['unsound'].sum()) / slides)} of the sliding cells shown. "
+                f"{trends[0].upper()}{trends[1:]}."
             )
 
     def done(self, beside: bool = True) -> Figure:

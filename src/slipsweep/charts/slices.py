@@ -12,12 +12,14 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import DISPLACEMENT, check_attributes, is_newmark, is_recorded, solve, with_amplitude
-from slipsweep.charts.style import SHOWN, Options
+from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
+from slipsweep.charts.style import SHOWN, Options, drawn_text
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
+from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
@@ -59,7 +61,7 @@ class Result:
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
-        check_attributes(data.attrs, self.name)
+        _check_attributes(data.attrs, self.name)
         for key, one in data.variables.items():
             units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
             if units and one.attrs.get("units", units) != units:
@@ -275,3 +277,19 @@ def _sort(data: xr.Dataset) -> str:
     if not is_recorded(data):
         return "sweep"
     return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
+
+
+def _check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
+    """Refuse a result that does not say what was solved (InputError)."""
+    recorded = not {"record", "suite"}.isdisjoint(attrs)
+    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
+    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
+        if key not in attrs:
+            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
+    try:
+        MODELS.from_attributes(attrs)
+        if not recorded:
+            WAVEFORMS.from_attributes(attrs)
+        drawn_text(attrs)
+    except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{name}: attributes do not say what was solved: {error}") from None

@@ -4,14 +4,12 @@ The accelerations of yield and of the mode limit, Newmark's block, the results o
 the displacement has a trend that no block has.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from slipsweep.charts.style import drawn_text
-from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
 from slipsweep.model.variables import PARAMETERS, RECORD_INPUTS, STRENGTHS, WAVEFORM_INPUTS
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
@@ -123,17 +121,13 @@ def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray
     return (ours < before * (1 - _ROUNDING)) & (ours > 0), below & (ours > 0)
 
 
-def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
-    """Refuse a result that does not say what was solved (InputError)."""
-    recorded = not {"record", "suite"}.isdisjoint(attrs)
-    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
-    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
-        if key not in attrs:
-            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
-    try:
-        MODELS.from_attributes(attrs)
-        if not recorded:
-            WAVEFORMS.from_attributes(attrs)
-        drawn_text(attrs)
-    except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise InputError(f"{name}: attributes do not say what was solved: {error}") from None
+def trend_text(falls: xr.DataArray, below: xr.DataArray, sliding: int) -> str:
+    """What the trends of `unsound` are, and of how many of the `sliding` cells; empty where there is none."""
+    trends = {"falls with A": falls, "lies below half of Newmark's": below}
+    parts = [f"{text} in {percent(int(one.sum()) / sliding)}" for text, one in trends.items() if one.any()]
+    return f"the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has" if parts else ""
+
+
+def percent(share: float) -> str:
+    """A share in percent, in two digits or 100."""
+    return f"{float(f'{100 * share:.2g}'):g} %"

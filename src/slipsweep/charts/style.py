@@ -211,11 +211,6 @@ def length_text(metres: float) -> str:
     return f"{metres * 1000:.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
 
 
-def percent(share: float) -> str:
-    """A share in percent, in two digits or 100."""
-    return f"{float(f'{100 * share:.2g}'):g} %"
-
-
 def value_text(data: xr.Dataset, name: str, value: float, options: Options) -> str:
     """A parameter's value with symbol and unit: ``θ = 5°``."""
     if name == "threshold":

@@ -14,13 +14,13 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy import stats
 
-from slipsweep.charts import statistics, style
+from slipsweep.charts import solved, statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, has_flags, log_axis, log_ticks, over, plot_curve, reliable
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DISPLACEMENT
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
-from slipsweep.studies.suite_statistics import QUANTILES, SUITE, suite_statistics
+from slipsweep.studies.suite_statistics import QUANTILES, SUITE, THRESHOLDS, suite_statistics, without_rounding
 
 Floats = NDArray[np.float64]
 
@@ -34,12 +34,6 @@ SCALING = {
     "significant_duration": (0, 1),
     "mean_period": (0, 1),
 }
-
-#: Displacements of a fragility where none are requested, m.
-_THRESHOLDS = (0.01, 0.1, 1.0)
-
-#: Displacements below this part of the largest of a slice are rounding: they count as zero.
-_ROUNDING = 1e-9
 
 #: Logarithms of an intensity measure within this are one value: motions scaled to it.
 _SAME = 1e-6
@@ -166,7 +160,7 @@ def histogram(result: Result, options: style.Options) -> Figure:
 def fragility(result: Result, options: style.Options) -> Figure:
     """The share of the motions of a suite that exceed a displacement, over one axis."""
     sheet = _sheet(result, options, _axes(result))
-    found = suite_statistics(sheet.data, thresholds=options.heights or _THRESHOLDS, quantiles=QUANTILES)
+    found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS, quantiles=QUANTILES)
     _note_suite(sheet, "P is the share of")
     _note_cautions(sheet)
     drawn = Sheet(found, sheet.x, "threshold", options, sheet.across, sheet.down)
@@ -189,11 +183,10 @@ def _axes(result: Result) -> list[str]:
 
 def _sheet(result: Result, options: style.Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
     sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
-    size = abs(sheet.data[DISPLACEMENT])
-    rounding = (size > 0) & (size < _ROUNDING * size.max())
-    if rounding.any():
-        sheet.data[DISPLACEMENT] = sheet.data[DISPLACEMENT].where(~rounding, 0.0)
-        sheet.notes.append("Displacements below 10⁻⁹ of the largest one count as zero.")
+    given = sheet.data[DISPLACEMENT]
+    sheet.data[DISPLACEMENT] = without_rounding(given)
+    if (sheet.data[DISPLACEMENT] != given).where(given.notnull(), False).any():
+        sheet.notes.append("Displacements below 10⁻¹² m count as zero.")
     return sheet
 
 
@@ -294,6 +287,6 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
 def _note_cautions(sheet: Sheet) -> None:
     """Which cautions the statistics have in them."""
     shares = {flag: float(has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
-    texts = [f"{style.flag_name(flag)} {style.percent(share)}" for flag, share in shares.items() if share]
+    texts = [f"{style.flag_name(flag)} {solved.percent(share)}" for flag, share in shares.items() if share]
     if texts:
         sheet.notes.append(f"Statistics are of all values, also those with a caution: {', '.join(texts)}.")

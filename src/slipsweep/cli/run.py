@@ -111,10 +111,8 @@ def _unsound_text(table: "xr.Dataset") -> str:
         some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(some["validity"] & Validity.NOT_RECOUPLED == 0)
     falls, below = solved.unsound(some, solved.newmark(some))
     slides = max(int((some[solved.DISPLACEMENT] > 0).sum()), 1)
-    trends = {"falls with A": falls, "lies below half of Newmark's": below}
-    parts = [f"{text} in {100 * int(one.sum()) / slides:.2g} %" for text, one in trends.items() if one.any()]
-    text = f"unsound: the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has"
-    return text if parts else ""
+    text = solved.trend_text(falls, below, slides)
+    return text and f"unsound: {text}"
 
 
 def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:

@@ -31,9 +31,6 @@ LAYERS = {
 #: What a page shows of a cell, and its type in the page.
 SHOWN = dict.fromkeys((*LAYERS, "valueless_share"), "<f4") | {"sliding_mode": "<i1", "validity": "<i2"}
 
-#: Over the motions of a suite: median with its band of a standard deviation, and the thresholds of `suite_statistics`.
-_QUANTILES, _THRESHOLDS = (0.16, 0.5, 0.84), (0.01, 0.1, 1.0)
-
 #: Dimensions of which statistics are made, or which are statistics themselves: none of their values is left out.
 _WHOLE = ("polarity", "motion", "quantile", "threshold")
 
@@ -143,7 +140,7 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
 
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
-    found = suite_statistics(table, thresholds=_THRESHOLDS, quantiles=_QUANTILES)
+    found = suite_statistics(table)
     names = [name for name in SHOWN if name in found.data_vars]
     for name in names:
         text = str(found[name].attrs["long_name"])

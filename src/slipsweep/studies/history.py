@@ -2,9 +2,11 @@
 
 import math
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -184,11 +186,7 @@ class _History:
         kernel = kernels.record_history if isinstance(motion, Record) else kernels.wave_history
         workspace = exact.workspace_of(self.wave, keeps_log=True)
         chosen = solvers.options_of(self.problem, wants_peak=True)
-        arguments = self.cell, chosen, self.wave, workspace, phases, kernels.History(*table)
-        # the main thread hears Ctrl-C while it waits; a thread that is a daemon does not hold up the exit
-        thread = threading.Thread(target=kernel, args=arguments, daemon=True)
-        thread.start()
-        thread.join()
+        _interruptible(kernel, self.cell, chosen, self.wave, workspace, phases, kernels.History(*table))
         if self._valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
         return table.T
@@ -263,3 +261,18 @@ class _History:
         # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
         with np.errstate(divide="ignore", over="ignore"):
             return float(velocity / (block - ground)) if velocity != 0.0 else 0.0
+
+
+def _interruptible(kernel: Callable[..., None], *args: Any) -> None:
+    """Run a kernel on a thread: the main thread hears Ctrl-C while it waits, and a daemon does not hold up the exit."""
+    done: Future[None] = Future()
+
+    def run() -> None:
+        try:
+            kernel(*args)
+            done.set_result(None)
+        except BaseException as error:  # raised where the result is waited for
+            done.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    done.result()

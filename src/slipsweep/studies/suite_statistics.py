@@ -111,8 +111,7 @@ def suite_statistics(
     if least.size > 1:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
 
-    moved = result["permanent_displacement"].astype(np.float64).load()
-    moved = moved.where(~(np.abs(moved) < _ROUNDING), 0.0)
+    moved = without_rounding(result["permanent_displacement"].astype(np.float64).load())
     # a reader may have made codes to numbers with NaN
     codes = result["validity"].fillna(0).astype(np.int16).load()
     there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
@@ -143,6 +142,11 @@ def suite_statistics(
     variables = {name: (one.dims, one.values, SUITE_STATISTICS[name]) for name, one in laid.items()}
     coords = {name: one.variable for name, one in result.coords.items() if not {*dims, *own} & {*one.dims, name}}
     return xr.Dataset(variables, coords | own, attrs)
+
+
+def without_rounding(displacements: xr.DataArray) -> xr.DataArray:
+    """Displacements, those that are the rounding of zero as zero."""
+    return displacements.where(~(abs(displacements) < _ROUNDING), 0.0)
 
 
 def _quantiles(values: xr.DataArray, quantiles: np.ndarray, dims: Sequence[str]) -> xr.DataArray:
