@@ -87,7 +87,7 @@ def report(results: dict[tuple[str, str], np.ndarray]) -> str:
         rows.append([KINDS[kind], noise, len(found), *shares])
     return "\n".join(
         [
-            measured_on(("numpy", "scipy", "numba")) + "\n",
+            measured_on(("numpy", "scipy", "numba"), timed=False) + "\n",
             "Share of tests whose 95 % interval holds the true value; in brackets the share whose interval has both "
             "ends. *White*: noise of 1 % of each channel's peak, the table's among them. *12 bits*: a converter of 12 "
             f"bits and no other noise. {CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 "
