@@ -46,7 +46,8 @@ def versions(packages: Iterable[str]) -> str:
 def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray"), timed: bool = True) -> str:
     """The sentence that stands over every table; over times it says so if other processes had the cores, too."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-    busy = f" Other processes used the machine (load {load:.0f}): times are rough." if timed and load > 2 * cores() else ""
+    is_busy = timed and load > 2 * cores()
+    busy = f" Other processes used the machine (load {load:.0f}): times are rough." if is_busy else ""
     return f"Measured on {processor()}; {platform.system()}, {versions(packages)}, slipsweep {__version__}.{busy}"
 
 
