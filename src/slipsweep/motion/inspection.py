@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.motion.formats import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.intensity import Motion, peak_displacement, peak_velocity
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 
 Floats = NDArray[np.float64]
 

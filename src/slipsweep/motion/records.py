@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
-from slipsweep.motion.formats import Samples, read_lines, read_samples
+from slipsweep.motion import formats
+from slipsweep.motion.formats import UNITS, Reading, Samples
 from slipsweep.motion.inspection import check_plausible, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
 Floats = NDArray[np.float64]
 
@@ -94,12 +94,12 @@ class Record:
     def from_obspy(
         cls,
         trace: Any,
-        units: Unit,
+        units: formats.Unit,
         *,
         name: str | None = None,
-        baseline: Baseline = "none",
-        gaps: Gaps = "refuse",
-        implausible: Implausible = "refuse",
+        baseline: formats.Baseline = "none",
+        gaps: formats.Gaps = "refuse",
+        implausible: formats.Implausible = "refuse",
     ) -> "Record":
         """The record in a trace of ObsPy, which reads miniSEED, SAC and some forty other formats.
 
@@ -131,7 +131,7 @@ class Record:
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
         return _inspected(own, Samples(times, values, units), reading, {"record_format": "obspy"})
 
-    def corrected(self, baseline: Baseline) -> "Record":
+    def corrected(self, baseline: formats.Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
         degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
         values = self.acceleration
@@ -152,7 +152,7 @@ class Record:
         read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
         return (
             f"{self.name}: {np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
-            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
+            f"{self.peak / formats.STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
         )
 
 
@@ -173,12 +173,12 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
 def read_record(
     path: str | Path,
     *,
-    units: Unit | None = None,
+    units: formats.Unit | None = None,
     interval: float | None = None,
-    baseline: Baseline = "none",
-    gaps: Gaps = "refuse",
-    implausible: Implausible = "refuse",
-    format: Format = "auto",
+    baseline: formats.Baseline = "none",
+    gaps: formats.Gaps = "refuse",
+    implausible: formats.Implausible = "refuse",
+    format: formats.Format = "auto",
     channel: int | None = None,
 ) -> Record:
     """Read a recorded acceleration from a file.
@@ -239,8 +239,8 @@ def read_record(
 
 def record_of(path: Path, reading: Reading) -> Record:
     """`read_record` of a file, as a `Reading` says."""
-    content, lines = read_lines(path)
-    kind, samples = read_samples(path, lines, reading)
+    content, lines = formats.read_lines(path)
+    kind, samples = formats.read_samples(path, lines, reading)
     own, given = samples.unit, reading.units
     if own and given and UNITS[own] != UNITS[given]:
         raise InputError(
