@@ -34,10 +34,7 @@ _DRIFT, _DRIFT_VELOCITY, _LARGEST_DISPLACEMENT = 2.0, 0.05, 10.0
 def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> tuple[Floats, Floats, str]:
     """Times (s) and values, in any unit, without those that stand for missing samples; and what is missing, in words.
 
-    Raises
-    ------
-    InputError
-        Something is missing, and `gaps` is not "linear": with the time and the value.
+    InputError: something is missing, and `gaps` is not "linear".
     """
     missing, intervals = _is_fill(values), np.diff(times)
     findings = []
@@ -48,9 +45,10 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     if intervals.size >= _FEWEST and (intervals > 0.0).all():
         median = float(np.median(intervals))
         wide = np.flatnonzero(intervals > _GAP * median)
+        more = f", and {wide.size - 1} more" if wide.size > 1 else ""
         findings += [
             f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
-            f"median interval of {median:.4g} s)" + (f", and {wide.size - 1} more" if wide.size > 1 else "")
+            f"median interval of {median:.4g} s){more}"
             for at in wide[:1]
         ]
         findings += _held(times[~missing], values[~missing])
@@ -63,10 +61,7 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
 def check_plausible(record: Motion, unit: str, implausible: str) -> str:
     """What no ground does, in words; empty if the record, read in `unit`, is plausible.
 
-    Raises
-    ------
-    InputError
-        Something is implausible, and `implausible` is not "accept": with the time and the value.
+    InputError: something is not, and `implausible` is not "accept".
     """
     found = "; ".join(text for text in (_odd_peak(record, unit), _drift(record)) if text)
     if found and implausible == "refuse":

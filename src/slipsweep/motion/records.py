@@ -57,11 +57,9 @@ class Record:
     attrs: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        times = check_numbers(f"{self.name}: times", self.times)
-        acceleration = check_numbers(f"{self.name}: acceleration", self.acceleration)
-        check_samples(self.name, times, {"acceleration": acceleration}, least=2)
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "acceleration", acceleration)
+        for name in ("times", "acceleration"):
+            object.__setattr__(self, name, check_numbers(f"{self.name}: {name}", getattr(self, name)))
+        check_samples(self.name, self.times, {"acceleration": self.acceleration}, least=2)
         object.__setattr__(self, "attrs", dict(self.attrs))
 
     def __eq__(self, other: object) -> bool:
@@ -234,25 +232,21 @@ def read_record(
         units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
         channel=channel,
     )  # fmt: skip
-    return record_of(Path(path), reading)
-
-
-def record_of(path: Path, reading: Reading) -> Record:
-    """`read_record` of a file, as a `Reading` says."""
+    path = Path(path)
     content, lines = formats.read_lines(path)
     kind, samples = formats.read_samples(path, lines, reading)
-    own, given = samples.unit, reading.units
-    if own and given and UNITS[own] != UNITS[given]:
+    own = samples.unit
+    if own and units and UNITS[own] != UNITS[units]:
         raise InputError(
-            f"{path}: units = {given!r}: the file itself says {own!r}; correct its header, or leave units out"
+            f"{path}: units = {units!r}: the file itself says {own!r}; correct its header, or leave units out"
         )
-    if not own and not given:
+    if not own and not units:
         known = ", ".join(map(repr, UNITS))
         raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
     attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)
-    return _inspected(str(path), samples._replace(unit=own or given), reading, attrs)
+    return _inspected(str(path), samples._replace(unit=own or units), reading, attrs)
 
 
 def _inspected(name: str, samples: Samples, reading: Reading, attrs: dict[str, str]) -> Record:

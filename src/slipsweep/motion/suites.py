@@ -17,7 +17,7 @@ from slipsweep.model.parameters import check_list, check_single, shown
 from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.formats import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.intensity import intensity_measures
-from slipsweep.motion.records import Record, record_of
+from slipsweep.motion.records import Record, read_record
 
 Floats = NDArray[np.float64]
 
@@ -306,7 +306,7 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
     reasons = {}
     for part in dict.fromkeys(chain.from_iterable(sources)):
         try:
-            records[part] = part if isinstance(part, Record) else record_of(part, reading)
+            records[part] = part if isinstance(part, Record) else read_record(part, **reading.options)
         except InputError as error:
             reasons[part] = str(error).removeprefix(f"{part}: ")
     if reasons:
