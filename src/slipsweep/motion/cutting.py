@@ -138,7 +138,7 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
     return tuple(map(np.concatenate, zip(*found, strict=True)))
 
 
-def _ramped(plain: Derivative, low: float, scale: Exact, rate: Exact) -> Derivative:
+def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
     """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate`."""
 
     def derivative(u: Exact, order: int) -> Exact:
@@ -212,7 +212,7 @@ def _is_sine(waveform: Waveform) -> bool:
 
 
 def _same(wave: Wave) -> NDArray[np.int64]:
-    """The first interval of the same pieces as each up to the interval after it, but for when they come."""
+    """`Wave.same`: pieces may come at other times."""
     shapes = wave.pieces.copy()
     shapes["start"] = shapes["end"] = 0.0
     ways = itertools.pairwise([*wave.interval[:, 0], len(shapes)])
@@ -221,7 +221,7 @@ def _same(wave: Wave) -> NDArray[np.int64]:
 
 
 def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
-    """Ranges of w > 0 passed through or jumped to without falling, joined where they overlap."""
+    """`Wave.rises`: ranges are joined where they overlap."""
     first, last = pieces["first"], pieces["last"]
     rising = (first + last > 0.0) & ((last >= first) | pieces["jumps"])
     joined: list[list[float]] = []
@@ -243,15 +243,13 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
     """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
     times, values = record.times, polarity * record.acceleration
     spacing, change = spacing_of(times), np.diff(values)
-    slope = change / spacing
-    # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
-    own = np.repeat(np.arange(spacing.size), 1 + crosses)
+    own = np.repeat(np.arange(spacing.size), 1 + crosses)  # a line through zero is two pieces
     after = np.concatenate([[False], own[1:] == own[:-1]])
     before = crosses[own] & ~after
     first, last = np.where(after, 0.0, values[own]), np.where(before, 0.0, values[own + 1])
-    length = spacing[own]
-    length[before | after] *= np.abs((last - first)[before | after] / change[own][before | after])
+    part = np.divide(last - first, change[own], out=np.ones(own.size), where=crosses[own])
+    length = spacing[own] * np.abs(part)
     pieces = pieces_of(
         start=np.where(after, times[own + 1] - length, times[own]),
         end=np.where(before, times[own] + length, times[own + 1]),
@@ -259,7 +257,7 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         first=first,
         last=last,
         at_end=np.abs(last) > np.abs(first),
-        coefficients=np.where(first == last, 0.0, slope[own])[:, np.newaxis],
+        coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
         arc=np.zeros(own.size, np.bool_),
     )
     return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])  # each pulse of a record has its own rises

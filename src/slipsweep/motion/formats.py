@@ -1,16 +1,6 @@
 """Files of what was measured: recorded motions in the formats that they come in, and columns that have names.
 
-* **CSV**: a column of times (s) and one of accelerations; separators comma, semicolon, tab or blanks; numbers with
-  decimal points or commas.  Lines that begin with ``#`` and a line of names may stand before the numbers.  The unit
-  comes from the header, in brackets: ``acceleration (m/s2)``.
-* **Values**: accelerations alone, one or several to a line, as SLAMMER reads them; the interval is given, or stands in
-  the header: ``dt = 0.01``.
-* **PEER AT2**: lines of header, one of them with NPTS and DT, then accelerations in g.
-* **ESM / ITACA ASCII**: lines ``KEY: VALUE`` (``SAMPLING_INTERVAL_S``, ``NDATA``, ``UNITS``), then accelerations.
-* **K-NET / KiK-net ASCII**: 17 lines of header, then counts; times the scale factor of the header they are in gal.
-* **COSMOS V1, V2** (Strong Motion Data Format 1.20, 2001): lines of text, 100 integers, 100 reals, comments, then
-  values in a Fortran format, without blanks between them; a file may hold several channels.  Integers 2 and 3 are the
-  physical parameter (1: acceleration) and the code of the unit, real 62 the sampling interval in milliseconds.
+docs/records.md#files describes the formats.
 """
 
 import re
@@ -227,7 +217,12 @@ def _cosmos(path: Path, lines: list[str], reading: Reading) -> Samples:
 
 
 def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
-    """The channel that begins at a line and goes to the last one; None if it is no acceleration."""
+    """The channel that begins at a line and goes to the last one; None if it is no acceleration.
+
+    Lines of text, 100 integers, 100 reals, comments, then values in a Fortran format, without blanks between them.
+    Integers 2 and 3 are the physical parameter (1: acceleration) and the code of the unit, real 62 the sampling
+    interval in milliseconds (Strong Motion Data Format 1.20, 2001).
+    """
 
     def head(what: str, pattern: str) -> list[str]:
         return _fields(path, "".join(lines[at : at + 1]), {what: pattern}, f"line {at + 1}")

@@ -38,36 +38,18 @@ class Wave(NamedTuple):
     """Pieces of the shaking in the order of time, and what else the solvers ask of them.
 
     The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike (none where `repeats`
-    is 0), then the remaining ones; phases are counted as if the plain cycle came once.
-
-    Attributes
-    ----------
-    pieces : record array, shape (pieces,)
-        See `piece_type`.
-    cycle : ndarray of int, shape (cycles in the table + 1,)
-        First piece of every cycle.
-    shape : ndarray of int, shape (cycles in the table,)
-        Cycles of one number have the same pieces.
-    interval : ndarray of int, shape (intervals, 2)
-        Runs of pieces with w > 0: the first piece, and the first after it.
-    height : ndarray, shape (intervals,)
-        Largest w of each.
-    same : ndarray of int, shape (intervals,)
-        The first interval of the same pieces as each, those up to the interval after it among them.
-    rises : ndarray, shape (ranges, 2)
-        Ranges of w > 0 that are passed through, or jumped to, without falling; they do not overlap.
-    highest, lowest : float
-        Largest and least w.
+    is 0), then the remaining ones; phases are counted as if the plain cycle came once.  An interval is a run of pieces
+    with w > 0.
     """
 
-    pieces: np.ndarray
-    cycle: np.ndarray
-    shape: np.ndarray
-    interval: np.ndarray
-    height: np.ndarray
-    same: np.ndarray
-    rises: np.ndarray
-    highest: float
+    pieces: np.ndarray  # of `piece_type`
+    cycle: np.ndarray  # (cycles + 1,) the first piece of each cycle in the table
+    shape: np.ndarray  # (cycles,) cycles of one number have the same pieces
+    interval: np.ndarray  # (intervals, 2) its first piece, and the first after it
+    height: np.ndarray  # (intervals,) its largest w
+    same: np.ndarray  # (intervals,) the first interval of the same pieces, those up to the next interval among them
+    rises: np.ndarray  # (ranges, 2) ranges of w > 0 passed through, or jumped to, without falling; they do not overlap
+    highest: float  # w
     lowest: float
     lead: int
     repeats: int
@@ -131,36 +113,27 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
     )
 
 
-#: Rules by which steps are taken.
+#: Rules by which steps are taken (`kernels.step`).
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 
 
 class Steps(NamedTuple):
     """The steps of a wave: `counts[p]` of one length on piece p, so that they end where it does.
 
-    Attributes
-    ----------
-    rule, per_cycle : int
-        The rule by which they are taken (`kernels.step`), and how many are in 2π of phase, at least.
-    counts, at : ndarray of int, shape (pieces,)
-        ``w[at[p] + 2 * i]`` is w where step i of piece p begins; w at its middle and at its end follow.
-    w : ndarray, shape (values,)
-        −0.0 where a negative piece is 0: Eq. 4 jumps there.
-    rates, known : ndarray
-        Workspaces of the kernel: Üg − Ü by Eq. 4 at the values of w on a piece, and what `kernels.train` keeps.
+    ``w[at[p] + 2 * i]`` is w where step i of piece p begins; w at its middle and at its end follow.
     """
 
     rule: int
-    per_cycle: int
+    per_cycle: int  # steps in 2π of phase, at least
     counts: np.ndarray
     at: np.ndarray
-    w: np.ndarray
-    rates: np.ndarray
-    known: np.ndarray
+    w: np.ndarray  # −0.0 where a negative piece is 0: Eq. 4 jumps there
+    rates: np.ndarray  # workspace of `kernels.step`: Üg − Ü by Eq. 4 at the values of w on a piece
+    known: np.ndarray  # workspace of `kernels.train`
 
 
 def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
-    """The steps of a wave, `steps_per_cycle` at least in 2π of its phase."""
+    """The steps of a wave."""
     pieces, length = wave.pieces, wave.pieces["finish"] - wave.pieces["begin"]
     counts = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
     at = np.cumsum(2 * counts + 1) - (2 * counts + 1)

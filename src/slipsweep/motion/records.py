@@ -13,7 +13,7 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
 from slipsweep.motion.formats import UNITS, Reading, Samples
-from slipsweep.motion.inspection import check_plausible, without_fill_values
+from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
 
 Floats = NDArray[np.float64]
@@ -250,11 +250,15 @@ def read_record(
 
 
 def _inspected(name: str, samples: Samples, reading: Reading, attrs: dict[str, str]) -> Record:
-    """The record of what a file holds, looked at before it is used."""
+    """The record of what a file holds; what is found in it is refused, unless `reading` accepts it."""
     assert samples.unit is not None
-    times, values, missing = without_fill_values(name, samples.times, samples.values, reading.gaps)
+    times, values, missing = without_fill_values(samples.times, samples.values)
+    if missing and reading.gaps == "refuse":
+        raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
     record = Record(times, values * UNITS[samples.unit], name, attrs | {"record_units": samples.unit})
     record = record.corrected(reading.baseline)
-    odd = check_plausible(record, samples.unit, reading.implausible)
-    found = [text for text in (missing, odd) if text]
-    return replace(record, attrs=record.attrs | {"record_accepted": "; ".join(found)}) if found else record
+    odd = "; ".join(filter(None, (odd_peak(record, samples.unit), drift(record))))
+    if odd and reading.implausible == "refuse":
+        raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
+    accepted = "; ".join(filter(None, (missing, odd)))
+    return replace(record, attrs=record.attrs | {"record_accepted": accepted}) if accepted else record
