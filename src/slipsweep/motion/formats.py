@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal, NamedTuple, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,13 +53,8 @@ class Reading(Choice):
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _COUNT = r"(\d{1,9})\b"
 
-
-class Samples(NamedTuple):
-    """What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one."""
-
-    times: Floats
-    values: Floats
-    unit: str | None
+#: What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one.
+Samples: TypeAlias = tuple[Floats, Floats, str | None]
 
 
 def read_lines(path: Path) -> tuple[bytes, list[str]]:
@@ -113,7 +108,7 @@ def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
         return [time, value or "nan"]
 
     times, values = _numbers(path, body, two, "a time and an acceleration").reshape(-1, 2).T
-    return Samples(times, values, _unit_in(header))
+    return times, values, _unit_in(header)
 
 
 def _values(path: Path, lines: list[str], reading: Reading) -> Samples:
@@ -291,7 +286,7 @@ def _even(path: Path, values: Floats, interval: float, unit: str | None, points:
         raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
     if not 0.0 < interval <= LARGEST:
         raise InputError(f"{path}: sampling interval {interval:g}: must be a finite number > 0")
-    return Samples(np.arange(values.size, dtype=np.float64) * interval, values, unit)
+    return np.arange(values.size, dtype=np.float64) * interval, values, unit
 
 
 def read_columns(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
-from slipsweep.motion.formats import UNITS, Reading, Samples
+from slipsweep.motion.formats import UNITS, Reading
 from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
 
@@ -127,7 +127,7 @@ class Record:
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
-        return _inspected(own, Samples(times, values, units), reading, {"record_format": "obspy"})
+        return _inspected(own, times, values, units, reading, {"record_format": "obspy"})
 
     def corrected(self, baseline: formats.Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
@@ -234,30 +234,29 @@ def read_record(
     )  # fmt: skip
     path = Path(path)
     content, lines = formats.read_lines(path)
-    kind, samples = formats.read_samples(path, lines, reading)
-    own = samples.unit
+    kind, (times, values, own) = formats.read_samples(path, lines, reading)
     if own and units and UNITS[own] != UNITS[units]:
         raise InputError(
             f"{path}: units = {units!r}: the file itself says {own!r}; correct its header, or leave units out"
         )
-    if not own and not units:
+    unit = own or units
+    if not unit:
         known = ", ".join(map(repr, UNITS))
         raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
     attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)
-    return _inspected(str(path), samples._replace(unit=own or units), reading, attrs)
+    return _inspected(str(path), times, values, unit, reading, attrs)
 
 
-def _inspected(name: str, samples: Samples, reading: Reading, attrs: dict[str, str]) -> Record:
-    """The record of what a file holds; what is found in it is refused, unless `reading` accepts it."""
-    assert samples.unit is not None
-    times, values, missing = without_fill_values(samples.times, samples.values)
+def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
+    """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
+    times, values, missing = without_fill_values(times, values)
     if missing and reading.gaps == "refuse":
         raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
-    record = Record(times, values * UNITS[samples.unit], name, attrs | {"record_units": samples.unit})
+    record = Record(times, values * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
-    odd = "; ".join(filter(None, (odd_peak(record, samples.unit), drift(record))))
+    odd = "; ".join(filter(None, (odd_peak(record, unit), drift(record))))
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
     accepted = "; ".join(filter(None, (missing, odd)))

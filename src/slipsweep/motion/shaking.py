@@ -23,11 +23,8 @@ from slipsweep.motion.records import check_samples
 
 Floats = NDArray[np.float64]
 
-TABLE = "ground_acceleration"
-
-#: What the block may be measured by.
-RESPONSES = ("block_acceleration", "relative_velocity", "relative_displacement")
-
+#: What is measured of the table, and what the block may be measured by.
+TABLE, RESPONSES = "ground_acceleration", ("block_acceleration", "relative_velocity", "relative_displacement")
 CHANNELS = (TABLE, *RESPONSES)
 
 #: Fewer tell nothing of three parameters and their noise.
