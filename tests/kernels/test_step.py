@@ -18,7 +18,7 @@ from slipsweep.kernels.step import solve_cell, solve_steps
 from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.steps import RECTANGLE, SIMPSON, TRAPEZOID, Steps, own_steps, steps_of
+from slipsweep.motion.pieces import RECTANGLE, SIMPSON, TRAPEZOID, Steps, own_steps, steps_of
 from slipsweep.motion.waveforms import Sine, Square, Triangle, Waveform
 from tests.support.cases import Case, Found, read_cases
 from tests.support.cases import solve as by_sweeps

@@ -16,8 +16,8 @@ from slipsweep.kernels.waves import solve_waves
 from slipsweep.model.options import Mendez, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion import cutting
+from slipsweep.motion.pieces import RECTANGLE, SIMPSON, TRAPEZOID, own_steps, steps_of
 from slipsweep.motion.records import Record
-from slipsweep.motion.steps import RECTANGLE, SIMPSON, TRAPEZOID, own_steps, steps_of
 from slipsweep.motion.waveforms import Sine, Waveform
 
 RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}

@@ -32,8 +32,7 @@ from slipsweep.kernels.series import Gain, series_of
 from slipsweep.kernels.train import cell_solver_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential
-from slipsweep.motion.pieces import Piece, Wave
-from slipsweep.motion.steps import RECTANGLE, TRAPEZOID, Steps
+from slipsweep.motion.pieces import RECTANGLE, TRAPEZOID, Piece, Steps, Wave
 
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
 HELD, FOLLOWED = 3, 4

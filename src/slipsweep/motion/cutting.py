@@ -12,7 +12,7 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,34 +45,27 @@ Exact = NDArray[Any]
 Derivative = Callable[[Exact, int], Exact]
 
 
-class _Period(NamedTuple):
+@functools.lru_cache
+def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], int]:
     """One cycle of a waveform without ramps; phases are parts of the cycle.
 
-    `derivatives[i]` gives those of w by phase, in radians, at places behind `breaks[i]`, where w is smooth; `fastest`
-    is the multiple of the fastest harmonic, 0 where w is straight.
+    Where it breaks; what gives the derivatives of w by phase, in radians, at places behind each break, where w is
+    smooth; the multiple of the fastest harmonic, 0 where w is straight.
     """
-
-    breaks: Sequence[float]
-    derivatives: Sequence[Derivative]
-    fastest: int
-
-
-@functools.lru_cache
-def _period(waveform: Waveform) -> _Period:
+    quarters = (0.0, 0.25, 0.5, 0.75, 1.0)
     if waveform.name == "triangle":
-        lines = [_line(at, w, slope) for at, w, slope in ((0, 0, 4), (0.25, 1, -4), (0.5, 0, -4), (0.75, -1, 4))]
-        return _Period((0.0, 0.25, 0.5, 0.75, 1.0), lines, 0)
+        lines = zip(quarters, (0, 1, 0, -1), (4, -4, -4, 4), strict=False)
+        return quarters, [_line(at, w, slope) for at, w, slope in lines], 0
     if waveform.name == "square":
-        return _Period((0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0)
+        return (0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0
     if not isinstance(waveform, Harmonics):
-        shift = 90.0 if waveform.name == "cosine" else 0.0
-        return _Period((0.0, 0.25, 0.5, 0.75, 1.0), [_sum_of_sines([1.0], [1], [shift])] * 4, 1)
+        return quarters, [_sum_of_sines([1.0], [1], [90.0 if waveform.name == "cosine" else 0.0])] * 4, 1
     assert waveform.phases is not None
     fastest = max(waveform.multiples)
     wave = _sum_of_sines(waveform.amplitudes, waveform.multiples, waveform.phases)
     turns = _sign_changes(wave, 1, _edges(0.0, 1.0, fastest))
     peak = np.abs(wave(np.array([0.0, *turns]), 0)).max()
-    return _Period((0.0, 1.0), [lambda u, order: wave(u, order) / peak], fastest)
+    return (0.0, 1.0), [lambda u, order: wave(u, order) / peak], fastest
 
 
 def _line(start: float, first: float, slope: float) -> Derivative:
@@ -125,22 +118,11 @@ def _sign_changes(derivative: Derivative, order: int, edges: Exact, depth: int =
     return np.asarray(high)
 
 
-class _Piece(NamedTuple):
-    """A piece of one cycle: where it begins and ends (parts of the cycle), and its polynomial about its anchor."""
-
-    start: float
-    end: float
-    first: float
-    last: float
-    at_end: bool  # the anchor
-    coefficients: Exact
-
-
-def _pieces(waveform: Waveform, n: int) -> list[_Piece]:
-    """The pieces of cycle n."""
-    period = _period(waveform.plain)
+def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
+    """The pieces of cycle n, as `_monotone_pieces` gives them."""
+    breaks, derivatives, fastest = _period(waveform.plain)
     rise, fall, left = _Extended(waveform.ramp_in), _Extended(waveform.ramp_out), waveform.cycles - n
-    places = [*period.breaks]
+    places = [*breaks]
     for place in (float(rise - n), float(left - fall)):
         if 0.0 < place < 1.0 and min(abs(place - other) for other in places) > _SAME:
             places.append(place)
@@ -151,23 +133,25 @@ def _pieces(waveform: Waveform, n: int) -> list[_Piece]:
             scale, rate = (n + _Extended(low)) / rise, 1 / (rise * _TURN)
         elif left - 0.5 * (low + high) < fall:
             scale, rate = (left - _Extended(low)) / fall, -1 / (fall * _TURN)
-        derivative = period.derivatives[bisect.bisect(period.breaks, low) - 1]
-        found += _smooth_pieces(derivative, period.fastest, low, high, scale, rate)
-    return found
+        plain = derivatives[bisect.bisect(breaks, low) - 1]
+        found.append(_monotone_pieces(_ramped(plain, low, scale, rate), fastest, low, high))
+    return tuple(map(np.concatenate, zip(*found, strict=True)))
 
 
-def _smooth_pieces(
-    derivative: Derivative, fastest: int, low: float, high: float, scale: Any, rate: Any
-) -> list[_Piece]:
-    """The pieces between two places of a smooth wave times its ramp, `scale` at `low` and of slope `rate`."""
+def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
+    """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate`."""
 
-    def ramped(u: Exact, order: int) -> Exact:
+    def derivative(u: Exact, order: int) -> Exact:
         ramp = scale + rate * (np.asarray(u, _Extended) - low) * _TURN
-        return np.asarray(ramp * derivative(u, order) + order * rate * derivative(u, order - 1))
+        return np.asarray(ramp * plain(u, order) + order * rate * plain(u, order - 1))
 
-    edges, none = _edges(low, high, fastest), np.empty(0)
-    zeros = _sign_changes(derivative, 0, edges) if fastest else none
-    turns = _sign_changes(ramped, 1, edges) if fastest or rate != 0 else none
+    return derivative if rate else plain
+
+
+def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:
+    """The pieces between two places of a smooth wave: fields `start` to `coefficients` of `pieces_of`, by its cycle."""
+    edges = _edges(low, high, fastest)
+    zeros, turns = (_sign_changes(derivative, order, edges) for order in (0, 1))
     points = [low]
     for b in [*sorted(u for u in (*zeros, *turns) if u - low > _SAME and high - u > _SAME), high]:
         a = points[-1]
@@ -176,26 +160,22 @@ def _smooth_pieces(
             points += [a + (b - a) * part / parts for part in range(1, parts)] + [b]
 
     places = np.array(points)
-    orders = range(TERMS + 1) if fastest else range(2)
-    series = np.zeros((TERMS + 2, places.size), _Extended)
-    for order in orders:  # the product with the ramp, a straight line
-        term = derivative(places, order) / math.factorial(order)
-        series[order] += (scale + rate * (places.astype(_Extended) - low) * _TURN) * term
-        series[order + 1] += rate * term
+    series = np.array([derivative(places, order) / math.factorial(order) for order in range(TERMS + 1)])
     for row, exact in zip(series, (zeros, turns), strict=False):
         row[(np.abs(places[:, np.newaxis] - exact) <= _SAME).any(axis=1)] = 0
     values = series[0].astype(np.float64)
     values[np.abs(values) < _ROUNDING] = 0.0
     at_end = np.abs(values[1:]) > np.abs(values[:-1])
-    coefficients = np.where(at_end, series[1:-1, 1:], series[1:-1, :-1]).T.astype(np.float64)
-    return [*map(_Piece, places[:-1], places[1:], values[:-1], values[1:], at_end, coefficients)]
+    coefficients = np.where(at_end, series[1:, 1:], series[1:, :-1]).T.astype(np.float64)
+    return places[:-1], places[1:], values[:-1], values[1:], at_end, coefficients
 
 
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
     cycles, plain = waveform.cycles, _pieces(waveform.plain, 0)
-    wraps = int(plain[0].first > 0.0 and plain[-1].last > 0.0)
+    _, _, first, last, *_ = plain
+    wraps = int(first[0] > 0.0 and last[-1] > 0.0)
     # an interval that runs over from one cycle to the next makes the first cycle differ from the others
     lead = min(math.ceil(waveform.ramp_in) + wraps, cycles)
     # the last plain cycle stands apart, as another does not follow; where intervals run over, so does the one before
@@ -205,17 +185,15 @@ def wave_of(waveform: Waveform) -> Wave:
     ramped = [n < waveform.ramp_in or n + 1 > cycles - waveform.ramp_out for n in numbers]
     rows = [_pieces(waveform, n) if own else plain for n, own in zip(numbers, ramped, strict=True)]
 
-    counts = [len(row) for row in rows]
-    start, end, first, last, at_end, coefficients = map(np.array, zip(*itertools.chain(*rows), strict=True))
+    counts = [len(row[0]) for row in rows]
+    start, end, first, last, at_end, coefficients = map(np.concatenate, zip(*rows, strict=True))
     before = np.concatenate([[0.0], last[:-1]])
-    # two cycles' roundings are no jump
-    first = np.where(np.abs(first - before) < _ROUNDING, before, first)
-    offset = np.repeat(np.arange(len(rows)), counts)
+    cycle = 2.0 * math.pi * np.repeat(np.arange(len(rows)), counts)
     table = pieces_of(
-        start=2.0 * math.pi * offset + 2.0 * math.pi * start,
-        end=2.0 * math.pi * offset + 2.0 * math.pi * end,
+        start=cycle + 2.0 * math.pi * start,
+        end=cycle + 2.0 * math.pi * end,
         length=2.0 * math.pi * (end - start),
-        first=first,
+        first=np.where(np.abs(first - before) < _ROUNDING, before, first),  # two cycles' roundings are no jump
         last=last,
         at_end=at_end,
         coefficients=coefficients,
@@ -234,7 +212,7 @@ def _is_sine(waveform: Waveform) -> bool:
 
 
 def _same(wave: Wave) -> NDArray[np.int64]:
-    """The first interval of the same pieces as each up to the interval after it, but for when they come."""
+    """`Wave.same`: pieces may come at other times."""
     shapes = wave.pieces.copy()
     shapes["start"] = shapes["end"] = 0.0
     ways = itertools.pairwise([*wave.interval[:, 0], len(shapes)])
@@ -243,7 +221,7 @@ def _same(wave: Wave) -> NDArray[np.int64]:
 
 
 def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
-    """Ranges of w > 0 passed through or jumped to without falling, joined where they overlap."""
+    """`Wave.rises`: ranges are joined where they overlap."""
     first, last = pieces["first"], pieces["last"]
     rising = (first + last > 0.0) & ((last >= first) | pieces["jumps"])
     joined: list[list[float]] = []
@@ -265,15 +243,13 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
     """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
     times, values = record.times, polarity * record.acceleration
     spacing, change = spacing_of(times), np.diff(values)
-    slope = change / spacing
-    # a line through zero is two pieces
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
-    own = np.repeat(np.arange(spacing.size), 1 + crosses)
+    own = np.repeat(np.arange(spacing.size), 1 + crosses)  # a line through zero is two pieces
     after = np.concatenate([[False], own[1:] == own[:-1]])
     before = crosses[own] & ~after
     first, last = np.where(after, 0.0, values[own]), np.where(before, 0.0, values[own + 1])
-    length = spacing[own]
-    length[before | after] *= np.abs((last - first)[before | after] / change[own][before | after])
+    part = np.divide(last - first, change[own], out=np.ones(own.size), where=crosses[own])
+    length = spacing[own] * np.abs(part)
     pieces = pieces_of(
         start=np.where(after, times[own + 1] - length, times[own]),
         end=np.where(before, times[own] + length, times[own + 1]),
@@ -281,7 +257,7 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         first=first,
         last=last,
         at_end=np.abs(last) > np.abs(first),
-        coefficients=np.where(first == last, 0.0, slope[own])[:, np.newaxis],
+        coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
         arc=np.zeros(own.size, np.bool_),
     )
     return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])  # each pulse of a record has its own rises

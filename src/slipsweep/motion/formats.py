@@ -1,45 +1,60 @@
-"""Files of recorded motions: what each format has in its header, and where its accelerations stand.
+"""Files of what was measured: recorded motions in the formats that they come in, and columns that have names.
 
-* **CSV**: a column of times (s) and one of accelerations; separators comma, semicolon, tab or blanks; numbers with
-  decimal points or commas.  Lines that begin with ``#`` and a line of names may stand before the numbers.  The unit
-  comes from the header, in brackets: ``acceleration (m/s2)``.
-* **Values**: accelerations alone, one or several to a line, as SLAMMER reads them; the interval is given, or stands in
-  the header: ``dt = 0.01``.
-* **PEER AT2**: lines of header, one of them with NPTS and DT, then accelerations in g.
-* **ESM / ITACA ASCII**: lines ``KEY: VALUE`` (``SAMPLING_INTERVAL_S``, ``NDATA``, ``UNITS``), then accelerations.
-* **K-NET / KiK-net ASCII**: 17 lines of header, then counts; times the scale factor of the header they are in gal.
-* **COSMOS V1, V2** (Strong Motion Data Format 1.20, 2001): lines of text, 100 integers, 100 reals, comments, then
-  values in a Fortran format, without blanks between them; a file may hold several channels.  Integers 2 and 3 are the
-  physical parameter (1: acceleration) and the code of the unit, real 62 the sampling interval in milliseconds.
+docs/records.md#files describes the formats.
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.model.choices import Choice, option
 from slipsweep.model.parameters import LARGEST, shown
-from slipsweep.motion.reading import UNITS, Reading
 
 Floats = NDArray[np.float64]
+
+#: Standard gravity, m/s²: what "g" means in a record, whatever gravity a sweep takes.
+STANDARD_GRAVITY = 9.80665
+
+#: Units of a recorded acceleration, in m/s².
+UNITS: dict[str, float] = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "cm/s2": 0.01, "gal": 0.01}
 
 #: Other spellings of units in headers.
 _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
 
+Unit: TypeAlias = Literal["m/s2", "g", "cm/s2", "gal"]
+Baseline: TypeAlias = Literal["none", "mean", "linear"]
+Gaps: TypeAlias = Literal["refuse", "linear"]
+Implausible: TypeAlias = Literal["refuse", "accept"]
+Format: TypeAlias = Literal["auto", "csv", "values", "at2", "esm", "cosmos", "knet"]
+
+
+@dataclass(frozen=True)
+class Reading(Choice):
+    """How a file of a recorded motion is read."""
+
+    name: ClassVar[str] = "reading"
+    units: Unit | None = option("unit of the file's accelerations, if it does not name it", None)
+    interval: float | None = option("sampling interval of a file without times, s", None)
+    baseline: Baseline = option("what is subtracted from the accelerations", "none")
+    gaps: Gaps = option("missing samples and fill values: refused, or interpolated", "refuse")
+    implausible: Implausible = option(
+        "peak above 3 g or below 0.001 g, ground that drifts by metres: refused, or accepted", "refuse"
+    )
+    format: Format = option("format of the file", "auto")
+    channel: int | None = option("channel of acceleration in a COSMOS file that holds several, from 1", None, least=1)
+
+
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _COUNT = r"(\d{1,9})\b"
 
-
-class Samples(NamedTuple):
-    """What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one."""
-
-    times: Floats
-    values: Floats
-    unit: str | None
+#: What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one.
+Samples: TypeAlias = tuple[Floats, Floats, str | None]
 
 
 def read_lines(path: Path) -> tuple[bytes, list[str]]:
@@ -93,7 +108,7 @@ def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
         return [time, value or "nan"]
 
     times, values = _numbers(path, body, two, "a time and an acceleration").reshape(-1, 2).T
-    return Samples(times, values, _unit_in(header))
+    return times, values, _unit_in(header)
 
 
 def _values(path: Path, lines: list[str], reading: Reading) -> Samples:
@@ -147,20 +162,16 @@ def _at2(path: Path, lines: list[str], reading: Reading) -> Samples:
         raise InputError(f"{path}: its header speaks of velocity or displacement: must be an acceleration (.AT2)")
     # in files of the first database "4096  0.0100  NPTS, DT"
     line = re.sub(rf"(?i)^\s*{_COUNT}\s+{_NUMBER}\s+NPTS,\s*DT", r"NPTS=\1, DT=\2", "".join(lines[at : at + 1]))
-    points, interval = (
-        _found(path, line, f"{name}= in its header", rf"{name}\s*=\s*{number}")[1]
-        for name, number in (("NPTS", _COUNT), ("DT", _NUMBER))
-    )
+    points, interval = _fields(path, line, {"NPTS=": rf"NPTS\s*=\s*{_COUNT}", "DT=": rf"DT\s*=\s*{_NUMBER}"})
     values = _numbers(path, enumerate(lines[at + 1 :], at + 2))
     return _even(path, values, float(interval), "g", int(points))
 
 
 def _esm(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
-    interval, points, unit = (
-        _found(path, "\n".join(lines[:at]), f"{name} in its header", rf"^{name}:\s*{pattern}\s*$")[1]
-        for name, pattern in (("SAMPLING_INTERVAL_S", _NUMBER), ("NDATA", _COUNT), ("UNITS", r"(\S+)"))
-    )
+    known = {"SAMPLING_INTERVAL_S": _NUMBER, "NDATA": _COUNT, "UNITS": r"(\S+)"}
+    patterns = {name: rf"^{name}:\s*{pattern}\s*$" for name, pattern in known.items()}
+    interval, points, unit = _fields(path, "\n".join(lines[:at]), patterns)
     unit = unit.lower().replace("^", "")
     if unit not in UNITS:
         raise InputError(f"{path}: UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
@@ -169,17 +180,9 @@ def _esm(path: Path, lines: list[str], reading: Reading) -> Samples:
 
 def _knet(path: Path, lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
-    frequency, duration, gals, counts = (
-        float(number)
-        for name, pattern in (
-            ("Sampling Freq(Hz)", _NUMBER),
-            ("Duration Time(s)", _NUMBER),
-            ("Scale Factor", rf"{_NUMBER}\(gal\)/{_NUMBER}"),
-        )
-        for number in _found(
-            path, "\n".join(lines[:at]), f"{name} in its header", rf"^{re.escape(name)}\s*{pattern}"
-        ).groups()
-    )
+    known = {"Sampling Freq(Hz)": _NUMBER, "Duration Time(s)": _NUMBER, "Scale Factor": rf"{_NUMBER}\(gal\)/{_NUMBER}"}
+    patterns = {name: rf"^{re.escape(name)}\s*{pattern}" for name, pattern in known.items()}
+    frequency, duration, gals, counts = map(float, _fields(path, "\n".join(lines[:at]), patterns))
     if not (0.0 < frequency < 1e6 and 0.0 < counts <= LARGEST and 0.0 < gals <= LARGEST):
         raise InputError(f"{path}: {frequency:g} Hz, {gals:g} gal, {counts:g} counts: must be > 0")
     values = _numbers(path, enumerate(lines[at + 1 :], at + 2)) * (gals / counts)
@@ -209,16 +212,20 @@ def _cosmos(path: Path, lines: list[str], reading: Reading) -> Samples:
 
 
 def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
-    """The channel that begins at a line and goes to the last one; None if it is no acceleration."""
+    """The channel that begins at a line and goes to the last one; None if it is no acceleration.
 
-    def head(what: str, pattern: str) -> re.Match[str]:
-        return _found(path, "".join(lines[at : at + 1]), f"{what} in line {at + 1}", pattern)
+    Lines of text, 100 integers, 100 reals, comments, then values in a Fortran format, without blanks between them.
+    Integers 2 and 3 are the physical parameter (1: acceleration) and the code of the unit, real 62 the sampling
+    interval in milliseconds (Strong Motion Data Format 1.20, 2001).
+    """
+
+    def head(what: str, pattern: str) -> list[str]:
+        return _fields(path, "".join(lines[at : at + 1]), {what: pattern}, f"line {at + 1}")
 
     def section(what: str, pattern: str) -> tuple[int, Floats]:
         """The line after the values of a section, and these."""
-        found = head(what, pattern)
-        count, each, width = int(found[1]), int(found[2] or 1) or 1, int(found[3]) or 1
-        end = at + 1 + -(-count // each)
+        count, each, width = (int(number or 1) for number in head(what, pattern))
+        end, width = at + 1 + -(-count // (each or 1)), width or 1
 
         def cells(line: str) -> list[str]:
             return [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
@@ -228,12 +235,12 @@ def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
             raise InputError(f"{path}: line {end}: {values.size} values, where {count} are announced")
         return end, values
 
-    at += int(head("number of text lines", _COSMOS_HEAD)[1])
+    at += int(*head("number of text lines", _COSMOS_HEAD))
     at, whole = section("integer header", _COSMOS_HEADER % "Integer")
     at, reals = section("real header", _COSMOS_HEADER % "Real")
     if whole.size < 3 or reals.size < 62:
         raise InputError(f"{path}: line {at}: {whole.size} integers and {reals.size} reals: not enough")
-    at += 1 + int(head("number of comment lines", rf"^\s*{_COUNT}\s+Comment line")[1])
+    at += 1 + int(*head("number of comment lines", rf"^\s*{_COUNT}\s+Comment line"))
     at, values = section("number and format of values", _COSMOS_DATA)
     # what a V2 file may have behind the acceleration is its velocity and displacement
     if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
@@ -246,12 +253,15 @@ def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
     return _even(path, values, reals[61] / 1000.0, _COSMOS_UNITS[int(whole[2])])
 
 
-def _found(path: Path, text: str, what: str, pattern: str) -> re.Match[str]:
-    """What a pattern finds in a header (InputError: nothing)."""
-    found = re.search(pattern, text, re.MULTILINE | re.IGNORECASE | re.ASCII)
-    if found is None:
-        raise InputError(f"{path}: no {what}, or none that can be read: another format, or damaged")
-    return found
+def _fields(path: Path, header: str, patterns: Mapping[str, str], where: str = "its header") -> list[str]:
+    """What patterns, by the names that errors have, find in a header (InputError: nothing)."""
+    fields: list[str] = []
+    for name, pattern in patterns.items():
+        found = re.search(pattern, header, re.MULTILINE | re.IGNORECASE | re.ASCII)
+        if found is None:
+            raise InputError(f"{path}: no {name} in {where}, or none that can be read: another format, or damaged")
+        fields += found.groups()
+    return fields
 
 
 def _numbers(
@@ -276,4 +286,49 @@ def _even(path: Path, values: Floats, interval: float, unit: str | None, points:
         raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
     if not 0.0 < interval <= LARGEST:
         raise InputError(f"{path}: sampling interval {interval:g}: must be a finite number > 0")
-    return Samples(np.arange(values.size, dtype=np.float64) * interval, values, unit)
+    return np.arange(values.size, dtype=np.float64) * interval, values, unit
+
+
+def read_columns(
+    path: Path,
+    lines: Sequence[str],
+    holds: Callable[[str, set[str], str], tuple[str, float] | None],
+    needed: Sequence[str],
+    example: str,
+) -> dict[str, NDArray[np.float64]]:
+    """Columns of numbers, by what they hold and in its unit; a blank cell is NaN (InputError: the line, and why).
+
+    The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
+    or commas: the first of these that is in it.  Commas that do not separate are decimal.
+    ``holds(name, words, unit)`` gives what the column of a name holds, from its words and the unit in brackets behind
+    them, and the factor to its unit; None where the column is left out.  `needed` is what there must be, `example` a
+    line of names for errors.
+    """
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    number, header = rows[0] if rows else (1, "")
+    separator = next((one for one in "\t;," if one in header), ",")
+    names = [cell.strip(' "') for cell in header.split(separator)]
+    columns: dict[str, tuple[int, float]] = {}
+    for at, name in enumerate(names):
+        text, _, unit = name.replace("[", "(").partition("(")
+        found = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]"))
+        if found is None:
+            continue
+        if found[0] in columns:
+            raise InputError(f"{path}: line {number}: two columns are {found[0]}: must be one")
+        columns[found[0]] = at, found[1]
+    for what in needed:
+        if what not in columns:
+            raise InputError(f"{path}: line {number}: no column {what}: must name its columns, such as {example}")
+
+    values = {what: np.empty(len(rows) - 1) for what in columns}
+    for row, (number, line) in enumerate(rows[1:]):
+        cells = [(cell if separator == "," else cell.replace(",", ".")).strip() for cell in line.split(separator)]
+        if len(cells) != len(names):
+            raise InputError(f"{path}: line {number}: {len(cells)} cells, where {len(names)} columns are named")
+        for what, (at, factor) in columns.items():
+            try:
+                values[what][row] = factor * float(cells[at] or "nan")
+            except ValueError:
+                raise InputError(f"{path}: line {number}: {what} = {shown(cells[at])}: must be a number") from None
+    return values

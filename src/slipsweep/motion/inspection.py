@@ -1,15 +1,13 @@
-"""Records are looked at before they are used: samples that are missing, and motions that no ground makes.
+"""What there is to find in a record before it is used: samples that are missing, and motions that no ground makes.
 
-What is found is refused, with the time and the value, unless the user accepts it by a word: `gaps="linear"`,
-`implausible="accept"`.
+Findings are texts, with the time and the value; no text is no finding.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.errors import InputError
+from slipsweep.motion.formats import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.intensity import Motion, peak_displacement, peak_velocity
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 
 Floats = NDArray[np.float64]
 
@@ -31,14 +29,8 @@ _WEAKEST, _STRONGEST = 0.001, 3.0
 _DRIFT, _DRIFT_VELOCITY, _LARGEST_DISPLACEMENT = 2.0, 0.05, 10.0
 
 
-def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> tuple[Floats, Floats, str]:
-    """Times (s) and values, in any unit, without those that stand for missing samples; and what is missing, in words.
-
-    Raises
-    ------
-    InputError
-        Something is missing, and `gaps` is not "linear": with the time and the value.
-    """
+def without_fill_values(times: Floats, values: Floats) -> tuple[Floats, Floats, str]:
+    """Times (s) and values, in any unit, without those that stand for missing samples; and what is missing."""
     missing, intervals = _is_fill(values), np.diff(times)
     findings = []
     if missing.any():
@@ -48,30 +40,14 @@ def without_fill_values(name: str, times: Floats, values: Floats, gaps: str) -> 
     if intervals.size >= _FEWEST and (intervals > 0.0).all():
         median = float(np.median(intervals))
         wide = np.flatnonzero(intervals > _GAP * median)
+        more = f", and {wide.size - 1} more" if wide.size > 1 else ""
         findings += [
             f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
-            f"median interval of {median:.4g} s)" + (f", and {wide.size - 1} more" if wide.size > 1 else "")
+            f"median interval of {median:.4g} s){more}"
             for at in wide[:1]
         ]
         findings += _held(times[~missing], values[~missing])
-    found = "; ".join(findings)
-    if found and gaps == "refuse":
-        raise InputError(f"{name}: {found}: samples are missing; gaps = 'linear' interpolates between the others")
-    return times[~missing], values[~missing], found
-
-
-def check_plausible(record: Motion, unit: str, implausible: str) -> str:
-    """What no ground does, in words; empty if the record, read in `unit`, is plausible.
-
-    Raises
-    ------
-    InputError
-        Something is implausible, and `implausible` is not "accept": with the time and the value.
-    """
-    found = "; ".join(text for text in (_odd_peak(record, unit), _drift(record)) if text)
-    if found and implausible == "refuse":
-        raise InputError(f"{record.name}: {found}; or implausible = 'accept' takes the record as it is")
-    return found
+    return times[~missing], values[~missing], "; ".join(findings)
 
 
 def _is_fill(values: Floats) -> NDArray[np.bool_]:
@@ -91,7 +67,7 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
 
 
 def _held(times: Floats, values: Floats) -> list[str]:
-    """The first value that does not change while the ground shakes, in words."""
+    """The first value that does not change while the ground shakes."""
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     lasts = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
     own, peak = values[starts], np.abs(values).max(initial=0.0)
@@ -105,8 +81,8 @@ def _held(times: Floats, values: Floats) -> list[str]:
     ]
 
 
-def _odd_peak(record: Motion, unit: str) -> str:
-    """A peak that was never recorded, and the unit that would explain it."""
+def odd_peak(record: Motion, unit: str) -> str:
+    """A peak that was never recorded, read in `unit`, and the unit that would explain it."""
     at = int(np.abs(record.acceleration).argmax())
     peak = record.acceleration[at] / STANDARD_GRAVITY
     if (abs(peak) >= _WEAKEST or record.times.size <= _FEWEST) and abs(peak) <= _STRONGEST:
@@ -119,7 +95,7 @@ def _odd_peak(record: Motion, unit: str) -> str:
     return f"peak acceleration {peak:.4g} g at t = {record.times[at]:.6g} s{hint}: {limit}, check units and header"
 
 
-def _drift(record: Motion) -> str:
+def drift(record: Motion) -> str:
     """A ground that moves away, as the integral of an offset does."""
     if record.times.size <= _FEWEST:
         return ""

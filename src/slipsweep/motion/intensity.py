@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.reading import STANDARD_GRAVITY
+from slipsweep.motion.formats import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -24,8 +24,6 @@ Floats = NDArray[np.float64]
 class Motion(Protocol):
     """A record, as far as measures are taken of it."""
 
-    @property
-    def name(self) -> str: ...
     @property
     def times(self) -> Floats: ...
     @property
@@ -53,14 +51,10 @@ def intensity_measures(record: Motion) -> dict[str, float]:
 
 
 def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
-    """What the acceleration of a record is multiplied by, for the strength that is given.
+    """What the acceleration of a record is multiplied by, for the strength that is given, and `time_scale`.
 
-    Parameters
-    ----------
-    record : Record
-    given : mapping of str to array
-        One of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s), and `time_scale`.  The last two
-        grow with the time scale: the target is that of the motion as it shakes the base.
+    The strength is one of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s).  The last two grow with
+    the time scale: the target is that of the motion as it shakes the base.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # of a motion that is zero throughout: refused by name
         if "scale" in given:
@@ -103,11 +97,11 @@ def significant_duration(record: Motion) -> float:
     total = float(energy(last))
     if not total > 0.0:
         return 0.0
-    begin, end = (
-        brentq(lambda time, part=share * total: float(energy(time)) - part, first, last, xtol=1e-15 * (last - first))
-        for share in (0.05, 0.95)
-    )
-    return float(end - begin)
+
+    def reached(share: float) -> float:
+        return brentq(lambda time: float(energy(time)) - share * total, first, last, xtol=1e-15 * (last - first))
+
+    return reached(0.95) - reached(0.05)
 
 
 def mean_period(record: Motion) -> float:
@@ -140,7 +134,7 @@ def spacing_of(times: Floats) -> Floats:
 
 def _lines(record: Motion) -> "PPoly":
     """The straight lines between the samples."""
-    from scipy.interpolate import PPoly  # here: a sweep under a waveform does not wait for it
+    from scipy.interpolate import PPoly  # only here: a sweep under a waveform does not wait for it
 
     slope = np.diff(record.acceleration) / np.diff(record.times)
     return PPoly(np.array([slope, record.acceleration[:-1]]), record.times)

@@ -1,11 +1,13 @@
-"""The table of pieces that every motion of the base ends as: what a piece is, and how the table is put together.
+"""The table of pieces that every motion of the base ends as, and the steps that `kernels.step` takes on them.
 
 `slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.excitation` evaluates them.
 """
 
+import math
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
 #: A piece: a record of the fields of `piece_type`.
@@ -26,55 +28,28 @@ def piece_type(terms: int) -> np.dtype[Any]:
     first and second integral from the anchor, of τ² and τ³ on.
     """
     numbers = ("start", "end", "begin", "finish", "first", "last", "top", "whole", "whole_moment")
-    series = ("coefficients", "once", "twice")
-    return np.dtype(
-        (
-            np.record,
-            [(name, np.float64) for name in numbers]
-            + [("degree", np.int64), ("jumps", np.bool_), ("arc", np.bool_)]
-            + [(name, np.float64, (terms,)) for name in series],
-        ),
-        align=True,
-    )
+    fields: list[Any] = [(name, np.float64) for name in numbers]
+    fields += [("degree", np.int64), ("jumps", np.bool_), ("arc", np.bool_)]
+    fields += [(name, np.float64, (terms,)) for name in ("coefficients", "once", "twice")]
+    return np.dtype((np.record, fields), align=True)
 
 
 class Wave(NamedTuple):
     """Pieces of the shaking in the order of time, and what else the solvers ask of them.
 
-    The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike
-    (none where `repeats` is 0), then the remaining ones; phases are counted as if the plain cycle
-    came once.
-
-    Attributes
-    ----------
-    pieces : record array, shape (pieces,)
-        See `piece_type`.
-    cycle : ndarray of int, shape (cycles in the table + 1,)
-        First piece of every cycle.
-    shape : ndarray of int, shape (cycles in the table,)
-        Cycles of one number have the same pieces.
-    interval : ndarray of int, shape (intervals, 2)
-        Runs of pieces with w > 0: the first piece, and the first after it.
-    height : ndarray, shape (intervals,)
-        Largest w of each.
-    same : ndarray of int, shape (intervals,)
-        The first interval of the same pieces as each, those up to the interval after it among them.
-    rises : ndarray, shape (ranges, 2)
-        Ranges of w > 0 that are passed through, or jumped to, without falling; they do not overlap.
-    highest, lowest : float
-        Largest and least w.
-    lead, repeats : int
-        See above.
+    The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike (none where `repeats`
+    is 0), then the remaining ones; phases are counted as if the plain cycle came once.  An interval is a run of pieces
+    with w > 0.
     """
 
-    pieces: np.ndarray
-    cycle: np.ndarray
-    shape: np.ndarray
-    interval: np.ndarray
-    height: np.ndarray
-    same: np.ndarray
-    rises: np.ndarray
-    highest: float
+    pieces: np.ndarray  # of `piece_type`
+    cycle: np.ndarray  # (cycles + 1,) the first piece of each cycle in the table
+    shape: np.ndarray  # (cycles,) cycles of one number have the same pieces
+    interval: np.ndarray  # (intervals, 2) its first piece, and the first after it
+    height: np.ndarray  # (intervals,) its largest w
+    same: np.ndarray  # (intervals,) the first interval of the same pieces, those up to the next interval among them
+    rises: np.ndarray  # (ranges, 2) ranges of w > 0 passed through, or jumped to, without falling; they do not overlap
+    highest: float  # w
     lowest: float
     lead: int
     repeats: int
@@ -89,27 +64,22 @@ def pieces_of(
     `length` is that of a piece, which the difference of its ends would round; `at_end` is whether |w| is larger
     at its end, its anchor then, and row i of `coefficients` are c₁, c₂, … of piece i from there.
     """
-    degree = np.where(coefficients != 0.0, np.arange(1, coefficients.shape[1] + 1), 0).max(axis=1)
     power = np.arange(1, coefficients.shape[1] + 1)
     top = np.where(at_end, last, first)
     pieces = np.zeros(first.size, piece_type(power.size))
     pieces["start"], pieces["end"] = start, end
     pieces["begin"], pieces["finish"] = np.where(at_end, -length, 0.0), np.where(at_end, 0.0, length)
     pieces["first"], pieces["last"], pieces["top"] = first, last, top
-    pieces["degree"] = degree
+    pieces["degree"] = np.where(coefficients != 0.0, power, 0).max(axis=1)
     pieces["jumps"] = first > np.maximum(np.concatenate([[0.0], last[:-1]]), 0.0)
     pieces["arc"] = arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0)
     pieces["coefficients"] = coefficients
     pieces["once"] = coefficients / (power + 1)
     pieces["twice"] = coefficients / ((power + 1) * (power + 2))
-    # one of the two ends is the anchor
-    tau = np.where(at_end, -length, length)
-    once, moment = np.zeros(first.size), np.zeros(first.size)
+    tau = np.where(at_end, -length, length)  # of the end that is not the anchor
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows here, overflows where it is used
-        for k in range(int(degree.max()) - 1, -1, -1):
-            once = (once + pieces["once"][:, k]) * tau
-            moment = (moment + pieces["twice"][:, k]) * tau
-        once, moment = once * tau, moment * tau * tau
+        once = polyval(tau, pieces["once"].T, tensor=False) * tau * tau
+        moment = polyval(tau, pieces["twice"].T, tensor=False) * tau * tau * tau
         pieces["whole"] = np.where(at_end, -once, once)
         pieces["whole_moment"] = np.where(at_end, -moment - once * length, moment)
     return pieces
@@ -118,8 +88,8 @@ def pieces_of(
 def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
     """The wave of a table of pieces.
 
-    Its intervals are runs of pieces above zero, one that touches zero ends; each is taken as different from all others,
-    and `rises` are left out: what `same` and `rises` save is worth their computation where cycles repeat.
+    Its intervals are runs of pieces above zero; one that touches zero ends.  `same` and `rises` are those of cycles
+    that do not repeat: what they save is not worth their computation there.
     """
     first, last = pieces["first"], pieces["last"]
     above = np.concatenate([[False], first + last > 0.0, [False]])
@@ -141,3 +111,46 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
         lead=lead,
         repeats=repeats,
     )
+
+
+#: Rules by which steps are taken (`kernels.step`).
+RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
+
+
+class Steps(NamedTuple):
+    """The steps of a wave: `counts[p]` of one length on piece p, so that they end where it does.
+
+    ``w[at[p] + 2 * i]`` is w where step i of piece p begins; w at its middle and at its end follow.
+    """
+
+    rule: int
+    per_cycle: int  # steps in 2π of phase, at least
+    counts: np.ndarray
+    at: np.ndarray
+    w: np.ndarray  # −0.0 where a negative piece is 0: Eq. 4 jumps there
+    rates: np.ndarray  # workspace of `kernels.step`: Üg − Ü by Eq. 4 at the values of w on a piece
+    known: np.ndarray  # workspace of `kernels.train`
+
+
+def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
+    """The steps of a wave."""
+    pieces, length = wave.pieces, wave.pieces["finish"] - wave.pieces["begin"]
+    counts = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
+    at = np.cumsum(2 * counts + 1) - (2 * counts + 1)
+    p = np.repeat(np.arange(counts.size), 2 * counts + 1)
+    # counted from the anchor of a piece, so that mirrored pieces have mirrored values
+    halves = np.arange(p.size) - at[p] - np.where(pieces["begin"][p] < 0.0, 2 * counts[p], 0)
+    tau = halves * (length / (2 * counts))[p]
+    w = np.zeros(p.size)
+    for k in range(int(pieces["degree"].max()) - 1, -1, -1):
+        w = (w + pieces["coefficients"][p, k]) * tau
+    w += pieces["top"][p]
+    w[at], w[at + 2 * counts] = pieces["first"], pieces["last"]
+    w = np.copysign(np.maximum(np.copysign(1.0, pieces["top"][p]) * w, 0.0), pieces["top"][p])
+    rates, known = np.empty(2 * int(counts.max()) + 1), np.empty((wave.height.size, 2))
+    return Steps(rule, steps_per_cycle, counts, at, w, rates, known)
+
+
+def own_steps(steps: Steps) -> Steps:
+    """The same steps with workspaces of their own, for another thread."""
+    return steps._replace(rates=np.empty_like(steps.rates), known=np.empty_like(steps.known))

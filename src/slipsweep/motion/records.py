@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
-from slipsweep.motion.formats import Samples, read_lines, read_samples
-from slipsweep.motion.inspection import check_plausible, without_fill_values
+from slipsweep.motion import formats
+from slipsweep.motion.formats import UNITS, Reading
+from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
 Floats = NDArray[np.float64]
 
@@ -57,11 +57,9 @@ class Record:
     attrs: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        times = check_numbers(f"{self.name}: times", self.times)
-        acceleration = check_numbers(f"{self.name}: acceleration", self.acceleration)
-        check_samples(self.name, times, {"acceleration": acceleration}, least=2)
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "acceleration", acceleration)
+        for name in ("times", "acceleration"):
+            object.__setattr__(self, name, check_numbers(f"{self.name}: {name}", getattr(self, name)))
+        check_samples(self.name, self.times, {"acceleration": self.acceleration}, least=2)
         object.__setattr__(self, "attrs", dict(self.attrs))
 
     def __eq__(self, other: object) -> bool:
@@ -94,12 +92,12 @@ class Record:
     def from_obspy(
         cls,
         trace: Any,
-        units: Unit,
+        units: formats.Unit,
         *,
         name: str | None = None,
-        baseline: Baseline = "none",
-        gaps: Gaps = "refuse",
-        implausible: Implausible = "refuse",
+        baseline: formats.Baseline = "none",
+        gaps: formats.Gaps = "refuse",
+        implausible: formats.Implausible = "refuse",
     ) -> "Record":
         """The record in a trace of ObsPy, which reads miniSEED, SAC and some forty other formats.
 
@@ -129,9 +127,9 @@ class Record:
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
-        return _inspected(own, Samples(times, values, units), reading, {"record_format": "obspy"})
+        return _inspected(own, times, values, units, reading, {"record_format": "obspy"})
 
-    def corrected(self, baseline: Baseline) -> "Record":
+    def corrected(self, baseline: formats.Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
         degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
         values = self.acceleration
@@ -152,7 +150,7 @@ class Record:
         read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
         return (
             f"{self.name}: {np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
-            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
+            f"{self.peak / formats.STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
         )
 
 
@@ -173,12 +171,12 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
 def read_record(
     path: str | Path,
     *,
-    units: Unit | None = None,
+    units: formats.Unit | None = None,
     interval: float | None = None,
-    baseline: Baseline = "none",
-    gaps: Gaps = "refuse",
-    implausible: Implausible = "refuse",
-    format: Format = "auto",
+    baseline: formats.Baseline = "none",
+    gaps: formats.Gaps = "refuse",
+    implausible: formats.Implausible = "refuse",
+    format: formats.Format = "auto",
     channel: int | None = None,
 ) -> Record:
     """Read a recorded acceleration from a file.
@@ -234,33 +232,32 @@ def read_record(
         units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
         channel=channel,
     )  # fmt: skip
-    return record_of(Path(path), reading)
-
-
-def record_of(path: Path, reading: Reading) -> Record:
-    """`read_record` of a file, as a `Reading` says."""
-    content, lines = read_lines(path)
-    kind, samples = read_samples(path, lines, reading)
-    own, given = samples.unit, reading.units
-    if own and given and UNITS[own] != UNITS[given]:
+    path = Path(path)
+    content, lines = formats.read_lines(path)
+    kind, (times, values, own) = formats.read_samples(path, lines, reading)
+    if own and units and UNITS[own] != UNITS[units]:
         raise InputError(
-            f"{path}: units = {given!r}: the file itself says {own!r}; correct its header, or leave units out"
+            f"{path}: units = {units!r}: the file itself says {own!r}; correct its header, or leave units out"
         )
-    if not own and not given:
+    unit = own or units
+    if not unit:
         known = ", ".join(map(repr, UNITS))
         raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
     attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)
-    return _inspected(str(path), samples._replace(unit=own or given), reading, attrs)
+    return _inspected(str(path), times, values, unit, reading, attrs)
 
 
-def _inspected(name: str, samples: Samples, reading: Reading, attrs: dict[str, str]) -> Record:
-    """The record of what a file holds, looked at before it is used."""
-    assert samples.unit is not None
-    times, values, missing = without_fill_values(name, samples.times, samples.values, reading.gaps)
-    record = Record(times, values * UNITS[samples.unit], name, attrs | {"record_units": samples.unit})
+def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
+    """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
+    times, values, missing = without_fill_values(times, values)
+    if missing and reading.gaps == "refuse":
+        raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
+    record = Record(times, values * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
-    odd = check_plausible(record, samples.unit, reading.implausible)
-    found = [text for text in (missing, odd) if text]
-    return replace(record, attrs=record.attrs | {"record_accepted": "; ".join(found)}) if found else record
+    odd = "; ".join(filter(None, (odd_peak(record, unit), drift(record))))
+    if odd and reading.implausible == "refuse":
+        raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
+    accepted = "; ".join(filter(None, (missing, odd)))
+    return replace(record, attrs=record.attrs | {"record_accepted": accepted}) if accepted else record

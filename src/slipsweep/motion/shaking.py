@@ -18,18 +18,13 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_choice, check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.columns import read_columns
-from slipsweep.motion.formats import read_lines
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
+from slipsweep.motion.formats import STANDARD_GRAVITY, UNITS, read_columns, read_lines
 from slipsweep.motion.records import check_samples
 
 Floats = NDArray[np.float64]
 
-TABLE = "ground_acceleration"
-
-#: What the block may be measured by.
-RESPONSES = ("block_acceleration", "relative_velocity", "relative_displacement")
-
+#: What is measured of the table, and what the block may be measured by.
+TABLE, RESPONSES = "ground_acceleration", ("block_acceleration", "relative_velocity", "relative_displacement")
 CHANNELS = (TABLE, *RESPONSES)
 
 #: Fewer tell nothing of three parameters and their noise.
@@ -49,23 +44,10 @@ _NAMES: dict[str, tuple[set[str], ...]] = {
 class ShakingTest:
     """What was measured in a test on a shaking table.
 
-    Attributes
-    ----------
-    times : ndarray
-        Times of the samples, s, increasing; the intervals need not be equal.
-    channels : dict of str to ndarray
-        `ground_acceleration` (m/s², of the table), without a gap, and any of `block_acceleration` (m/s²),
-        `relative_velocity` (m/s) and `relative_displacement` (m, downslope positive), NaN where there is no sample.
-    name : str
-        What the test is called in messages.
-    attrs : dict
-        How it was read and what was taken off it, for the attributes of results.
-
-    Raises
-    ------
-    InputError
-        Fewer than 16 samples, times that do not increase, a channel that is not known, or an acceleration of the
-        table that is not finite.
+    `times` (s) increase, at intervals that need not be equal.  `channels` are `ground_acceleration` (m/s², of the
+    table), without a gap, and any of `block_acceleration` (m/s²), `relative_velocity` (m/s) and `relative_displacement`
+    (m, downslope positive), NaN where there is no sample.  `attrs` say how it was read.  InputError: fewer than 16
+    samples, times that do not increase, a channel that is not known, or a table's acceleration that is not finite.
     """
 
     times: Floats
@@ -79,16 +61,14 @@ class ShakingTest:
         if TABLE not in self.channels:
             raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
         times = check_numbers(f"{self.name}: time", self.times)
-        kept = {
-            name: check_numbers(f"{self.name}: {name}", self.channels[name])
-            for name in CHANNELS
-            if name in self.channels
-        }
+        own = [name for name in CHANNELS if name in self.channels]
+        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in own}
         blank = {name: np.isnan(values) & (name != TABLE) for name, values in kept.items()}
         filled = {name: np.where(blank[name], 0.0, values) for name, values in kept.items()}
         check_samples(self.name, times, filled, FEWEST_SAMPLES)
-        for name in (name for name, missing in blank.items() if missing.all()):
-            raise InputError(f"{self.name}: {name}: no sample")
+        for name, missing in blank.items():
+            if missing.all():
+                raise InputError(f"{self.name}: {name}: no sample")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "channels", kept)
 
@@ -100,22 +80,11 @@ class ShakingTest:
     def corrected(
         self, offset: Any = (), drift: Any = (), rest: Sequence[float] | None = None
     ) -> tuple["ShakingTest", dict[str, tuple[float, float]]]:
-        """The test less a constant or a straight line in some channels, and what these are.
+        """The test less a constant (`offset`) or a straight line (`drift`) in some channels, "all" is all of them.
 
-        Parameters
-        ----------
-        offset, drift : str or sequence of str
-            Channels to take a constant, or a straight line, off; "all" is all of them.
-        rest : (float, float), optional
-            From when to when the table and the block were at rest, s: constants and lines are fitted to these
-            samples only.  Without it they are fitted to all samples, which is right for accelerations of a motion
-            that begins and ends at rest.
-
-        Returns
-        -------
-        ShakingTest
-        dict of str to (float, float)
-            Of each channel corrected the constant at the first sample, and the slope in a second.
+        Constants and lines are fitted to the samples between the two times of `rest` (s), when the table and the block
+        were at rest.  Without it they are fitted to all samples, which is right for accelerations of a motion that
+        begins and ends at rest.  Also returns the constant at the first sample of each, and the slope in a second.
         """
         offset, drift = (check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift)))
         chosen = np.ones(self.times.size, dtype=bool)
@@ -163,18 +132,7 @@ def read_test(path: str | Path) -> ShakingTest:
     brackets: ``time (s), table acceleration (g), block acceleration (m/s2), relative displacement (mm)``.  Separators
     are commas, semicolons or tabs.  Columns of other names are left out.  "g" is standard gravity, 9.80665 m/s².
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    ShakingTest
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, a column has no unit, or a line holds no numbers: with the number of the line.
+    InputError: the file cannot be read, a column has no unit, or a line holds no numbers.
     """
     path = Path(path)
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import check_list, check_single, shown
 from slipsweep.model.variables import INTENSITY_MEASURES
+from slipsweep.motion.formats import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.intensity import intensity_measures
-from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
-from slipsweep.motion.records import Record, record_of
+from slipsweep.motion.records import Record, read_record
 
 Floats = NDArray[np.float64]
 
@@ -206,13 +206,9 @@ class Suite:
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
-        cells = [
-            intensity_measures(self.record(int(at), float(azimuth)))
-            for at, azimuth in zip(places.flat, azimuths.flat, strict=True)
-        ]
-        return {
-            f"motion_{name}": np.reshape([cell[name] for cell in cells], azimuths.shape) for name in INTENSITY_MEASURES
-        }
+        both, shape = zip(places.flat, azimuths.flat, strict=True), azimuths.shape
+        cells = [intensity_measures(self.record(int(at), float(azimuth))) for at, azimuth in both]
+        return {f"motion_{name}": np.reshape([cell[name] for cell in cells], shape) for name in INTENSITY_MEASURES}
 
     def record(self, at: int, azimuth: float) -> Record:
         """The motion at a place, of a pair the component at an azimuth."""
@@ -306,7 +302,7 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
     reasons = {}
     for part in dict.fromkeys(chain.from_iterable(sources)):
         try:
-            records[part] = part if isinstance(part, Record) else record_of(part, reading)
+            records[part] = part if isinstance(part, Record) else read_record(part, **reading.options)
         except InputError as error:
             reasons[part] = str(error).removeprefix(f"{part}: ")
     if reasons:
@@ -315,13 +311,14 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         for part, reason in reasons.items():
             refused.add_note(f"{part}: {reason}")
         raise refused
-    names_of = [one if isinstance(one, Path) else Path(one.name) for one, *_ in sources]
-    if pairs is not None:
-        names_of = [one.with_name(one.stem.removesuffix(pairs[0]).rstrip("_-. ") or one.stem) for one in names_of]
     found = [[records[part] for part in source] for source in sources]
     motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
+    labels: tuple[str, ...] = ()
+    if pairs is not None:
+        firsts = [Path(first.name) for first, _ in found]
+        labels = _labels([one.with_name(one.stem.removesuffix(pairs[0]).rstrip("_-. ") or one.stem) for one in firsts])
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
-    return Suite(motions, _labels(names_of), str(entry) if isinstance(entry, (str, Path)) else "suite")
+    return Suite(motions, labels, str(entry) if isinstance(entry, (str, Path)) else "suite")
 
 
 def _components(motion: Motion) -> tuple[Record, ...]:

@@ -1,18 +1,8 @@
 """Waveforms: what the base does, as a user chooses it (`cutting` cuts it into the pieces that the solvers follow).
 
-A waveform w(φ) has the period 2π and the peak max|w| = 1, so that the amplitude A stays the peak
-ground acceleration; φ = ωt counts from the beginning of the shaking.
-
-===========  ================================================================================
-sine         sin φ
-cosine       cos φ: it starts at its peak, to which the base's acceleration jumps at t = 0
-triangle     straight lines through 0, 1 at π/2, −1 at 3π/2, 0
-square       1 on (0, π), −1 on (π, 2π)
-harmonics    Σ aₖ sin(mₖφ + pₖ) over its own largest magnitude
-===========  ================================================================================
-
-A ramp multiplies it by an envelope that grows linearly from 0 over the first `ramp_in` cycles, and
-falls to 0 over the last `ramp_out`; A is the peak without it.
+A waveform w(φ) has the period 2π and the peak max|w| = 1, so that the amplitude A stays the peak ground acceleration;
+φ = ωt counts from the beginning of the shaking.  A ramp multiplies it by an envelope that grows linearly from 0 over
+the first `ramp_in` cycles, and falls to 0 over the last `ramp_out`; A is the peak without it.
 """
 
 import math

@@ -22,8 +22,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HAZARD_RESULTS
-from slipsweep.motion.columns import read_columns
-from slipsweep.motion.formats import read_lines
+from slipsweep.motion.formats import read_columns, read_lines
 from slipsweep.studies.sampling import Thresholds
 from slipsweep.studies.suite_statistics import THRESHOLDS, at_thresholds, point_names, suite_dims, suite_statistics
 
