@@ -100,20 +100,12 @@ class HazardCurve:
 
 
 def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> HazardCurve:
-    """Read a hazard curve of peak ground acceleration from a CSV file.
+    """Read a hazard curve of peak ground acceleration from a CSV file; "g" as a unit is `g` m/s², that of the result.
 
     The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g), annual rate``.
     Separators are commas, semicolons or tabs.  Columns of other names are left out.  Or a file of OpenQuake,
     ``hazard_curve-mean-PGA_12.csv``, whose probabilities of exceedance become annual rates, −ln(1 − p)/T with its
-    investigation time T.
-
-    Parameters
-    ----------
-    path : str or Path
-    g : float
-        What "g" as a unit stands for, m/s²: that of the result.
-    site : int, optional
-        Which site of an OpenQuake file, from 1; needed if it has several.
+    investigation time T; `site` is which of its sites, from 1, and needed if it has several.
 
     Raises
     ------
@@ -240,15 +232,8 @@ def _of_samples(result: xr.Dataset, thresholds: Any, over: Any) -> xr.Dataset:
 def openquake_fragility(found: xr.Dataset) -> str:
     """A fragility as an XML file of OpenQuake (NRML 0.5): a discrete function for each grid point.
 
-    Parameters
-    ----------
-    found : Dataset
-        What `fragility` returns.  Limit states are its thresholds.
-
-    Returns
-    -------
-    str
-        Peak ground accelerations in g, to which no probability is extrapolated: the first is the limit of no damage.
+    `found` is what `fragility` returns; its thresholds are the limit states.  Peak ground accelerations are in g; to
+    them no probability is extrapolated: the first is the limit of no damage.
 
     Raises
     ------
@@ -404,28 +389,32 @@ def displacement_hazard(
         curve = read_hazard_curve(curve, float(result.attrs.get("g", np.nan)))
     found = fragility(result, thresholds, over)
     amplitude = found["amplitude"].values.astype(np.float64)
-    probability = found["exceedance_probability"]
-    chances = probability.values
-    shape = (*chances.shape[:-2], chances.shape[-1])
-    rates = {name: np.full(shape, np.nan) for name in HAZARD_RESULTS if name != "valueless_share"}
-    for index in np.ndindex(chances.shape[:-2]):
-        there = np.isfinite(chances[index][:, 0])
-        if np.count_nonzero(there) < 2:
-            continue
-        own = chances[index][there]
+    names = [name for name in HAZARD_RESULTS if name != "valueless_share"]
+
+    def rates_of(chances: Floats) -> Floats:
+        """The rates of a grid point, (rate, threshold), from its probabilities, (amplitude, threshold)."""
+        there = np.isfinite(chances[:, 0])
+        own = chances[there]
+        if len(own) < 2:
+            return np.full((len(names), chances.shape[1]), np.nan)
         if len(own) == 2 and (own[0] != own[1]).any():
             raise InputError(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
-        for name, values in exceedance_rates(curve, amplitude[there], own).items():
-            rates[name][index] = values
-    if np.isnan(rates["annual_rate"]).all():
+        rates = exceedance_rates(curve, amplitude[there], own)
+        return np.stack([rates[name] for name in names])
+
+    rates = xr.apply_ufunc(
+        rates_of, found["exceedance_probability"].variable, vectorize=True,
+        input_core_dims=[["amplitude", "threshold"]], output_core_dims=[["rate", "threshold"]],
+    )  # fmt: skip
+    if rates[{"rate": 0}].isnull().all():
         raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
-    dims = [dim for dim in probability.dims if dim != "amplitude"]
-    results = {name: xr.Variable(dims, values, HAZARD_RESULTS[name]) for name, values in rates.items()}
-    valueless = found["valueless_share"].max("amplitude").variable
-    valueless.attrs = HAZARD_RESULTS["valueless_share"]
+    results = {name: rates[{"rate": at}] for at, name in enumerate(names)}
+    results["valueless_share"] = found["valueless_share"].max("amplitude").variable
+    for name, one in results.items():
+        one.attrs = HAZARD_RESULTS[name]
     coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}
     attrs = {
         **{name: value for name, value in found.attrs.items() if name != "zero_displacement"},
@@ -435,4 +424,4 @@ def displacement_hazard(
         "hazard_curve_range": curve.amplitude[[0, -1]],
         "amplitude_range": amplitude[[0, -1]],
     }
-    return xr.Dataset({**results, "valueless_share": valueless}, coords, attrs)
+    return xr.Dataset(results, coords, attrs)

@@ -10,7 +10,7 @@ solved together, by the cycle solver.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,7 +24,6 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_sweep
-from slipsweep.grid.problem import Problem
 from slipsweep.model import parameters, variables
 from slipsweep.model.options import Model, Newmark
 from slipsweep.model.units import quantity
@@ -157,13 +156,9 @@ def limit_amplitude(
         structure_frequency=structure_frequency,
     )  # fmt: skip
     plan = plan_limits(
-        displacement,
-        inputs,
-        excitation=excitation,
-        model=model,
-        maximum_amplitude=maximum_amplitude,
-        amplitude_steps=amplitude_steps,
-    )
+        displacement, inputs, excitation=excitation, model=model,
+        maximum_amplitude=maximum_amplitude, amplitude_steps=amplitude_steps,
+    )  # fmt: skip
     return plan.solve(progress).assign_coords(datasets.brought_coordinates(inputs, plan.coords, plan.names))
 
 
@@ -239,7 +234,7 @@ def _solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
 
 def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Arrays:
     """Limit amplitudes of a part of a grid that one motion shakes."""
-    scan = _scan(request, maximum_amplitude, steps)
+    scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
     wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
     before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
@@ -278,27 +273,30 @@ class Steps(NamedTuple):
     high: Floats
 
 
-@dataclass(frozen=True)
 class Scan:
-    """Cells at increasing amplitudes.
+    """Cells that one motion shakes, at increasing amplitudes: those of a part of a grid."""
 
-    Attributes
-    ----------
-    problem : Problem
-    arrays : mapping of str to array
-        Inputs but for the amplitude: one value for each cell, or one for all.
-    targets : array, (cell,)
-        Displacement to be reached, m.
-    amplitudes : array, (cell, amplitude)
-    found : mapping of str to array, (cell, amplitude)
-        `permanent_displacement`, `validity` and, under a record, `number_of_slips`.
-    """
-
-    problem: Problem
-    arrays: Mapping[str, Floats]
-    targets: Floats
-    amplitudes: Floats
-    found: Mapping[str, NDArray[Any]]
+    def __init__(self, request: Request, maximum_amplitude: float, steps: int) -> None:
+        self.problem, arrays = request.problem, dict(request.arrays)
+        displacement = arrays.pop("displacement")
+        amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
+        # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
+        every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
+        lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
+        slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
+        wanted = ("permanent_displacement", "validity", *slips)
+        found = {**engine.solve(Request(self.problem, lengths, every, wanted)), "amplitude": amplitudes}
+        full = (*request.shape, lengths[-1])
+        #: Results and amplitudes, (cell, amplitude).
+        self.found = {name: np.broadcast_to(values, full).reshape(-1, full[-1]) for name, values in found.items()}
+        self.amplitudes = self.found["amplitude"]
+        #: Displacements to be reached, (cell,).
+        self.targets = np.broadcast_to(displacement, request.shape).ravel()
+        #: Inputs but for the amplitude: one value for each cell, or one for all.
+        self.arrays = {
+            name: (values if values.size == 1 else np.broadcast_to(values, request.shape)).ravel()
+            for name, values in arrays.items()
+        }
 
     def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> Arrays:
         """Results of some cells, each at its own amplitudes (rows of the array)."""
@@ -315,32 +313,6 @@ class Scan:
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
 
-def _scan(request: Request, maximum_amplitude: float, steps: int) -> Scan:
-    """The cells of a part of a grid at the amplitudes of the scan."""
-    problem, arrays = request.problem, dict(request.arrays)
-    displacement = arrays.pop("displacement")
-    amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
-    # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
-    every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
-    lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
-    slips = ("number_of_slips",) if isinstance(problem.excitation, Record) else ()
-    found = engine.solve(Request(problem, lengths, every, ("permanent_displacement", "validity", *slips)))
-
-    def in_rows(values: NDArray[Any]) -> NDArray[Any]:
-        return np.broadcast_to(values, (*request.shape, lengths[-1])).reshape(-1, lengths[-1])
-
-    def in_cells(values: NDArray[Any]) -> NDArray[Any]:
-        return values.ravel() if values.size == 1 else np.broadcast_to(values, request.shape).ravel()
-
-    return Scan(
-        problem,
-        {name: in_cells(values) for name, values in arrays.items()},
-        np.broadcast_to(displacement, request.shape).ravel(),
-        in_rows(amplitudes),
-        {name: in_rows(values) for name, values in found.items()},
-    )
-
-
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> Floats:
     """Amplitudes to try, increasing along the last dimension, with both sides of every change of mode.
 
@@ -354,8 +326,9 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     rest = np.zeros((1,) * len(shape))
     wanted = ("yield_acceleration", *limited)
     found = engine.friction_parameters(Request(problem, shape, {**blocks, "amplitude": rest}, wanted))
-    known = {name: values.reshape(-1, 1) for name, values in found.items()}
-    yields = known["yield_acceleration"]
+    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
+    thresholds = np.stack([found[name].ravel() for name in wanted], axis=1)
+    yields = thresholds[:, :1]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
     with np.errstate(over="ignore"):
@@ -363,8 +336,6 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     amplitudes = start * ratio ** np.linspace(0.0, 1.0, steps + 1)
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
-    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
-    thresholds = np.hstack([known[name] for name in wanted])
     with np.errstate(over="ignore", invalid="ignore"):
         places = (thresholds[:, :, None] / _heights(request)).reshape(len(thresholds), -1)
         changes = np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])

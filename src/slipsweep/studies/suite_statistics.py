@@ -12,7 +12,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
 from slipsweep.model.parameters import check_list, number_text, shown
 from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
-from slipsweep.studies.sampling import Thresholds, check_quantiles, check_thresholds
+from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
 
 TITLE = "Statistics of the permanent displacement over a suite of motions"
 
@@ -106,7 +106,7 @@ def suite_statistics(
             raise InputError(f"result: {name}: missing: must be there, of all motions")
     dims = suite_dims(result["permanent_displacement"], over)
     g = float(result.attrs.get("g", np.nan))
-    limits, wanted = check_thresholds("thresholds", thresholds, g), check_quantiles("quantiles", quantiles)
+    limits, wanted = check_thresholds("thresholds", thresholds, g), check_increasing("quantiles", quantiles, "quantile")
     least = check_thresholds("zero", zero, g)
     if least.size > 1:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
@@ -188,7 +188,7 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
     # so large that whatever is interpolated towards it is above all limits
     largest = np.finfo(np.float64).max / 4.0
     values = limits["limit_amplitude"].where(~beyond, largest)
-    wanted = check_quantiles("quantiles", quantiles)
+    wanted = check_increasing("quantiles", quantiles, "quantile")
     found = _quantiles(values, wanted, dims)
     highest = values.where(~beyond).max()
     return xr.Dataset(
@@ -243,24 +243,24 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         found = (found if displacement is None else at_thresholds(found, displacement)).transpose(*grid, ...).load()
     else:
         found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
-    places = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in grid))
-    labels = zip(grid.items(), zip(*places, strict=True), strict=True) if grid else ()
-    columns: dict[str, Sequence[str]] = {_title_of(found, dim): column for (dim, n), column in labels if n > 1}
+    labels = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in varying))
+    titles = [_title_of(found, dim) for dim in varying]
+    columns: dict[str, Sequence[str]] = dict(zip(titles, zip(*labels, strict=True), strict=True))
     rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
     for share, column in zip(found["quantile"].values, rows["displacement_quantile"], strict=True):
         title = "median" if share == 0.5 else f"{100.0 * share:.3g} %"
         columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
     shares = {} if is_sampled else {"zero": rows["zero_probability"][0]}
     if displacement is not None or is_sampled:
-        titles = [f"P(u > {d * 1000.0:.6g} mm)" for d in found["threshold"].values]
-        shares |= dict(zip(titles, rows["exceedance_probability"], strict=True))
+        for d, column in zip(found["threshold"].values, rows["exceedance_probability"], strict=True):
+            shares[f"P(u > {d * 1000.0:.6g} mm)"] = column
     if (rows["valueless_share"] > 0.0).any():
         shares["no value"] = rows["valueless_share"][0]
-    columns |= {
-        title: ["none" if np.isnan(one) else f"{one:.1%}" for one in column] for title, column in shares.items()
-    }
+    for title, column in shares.items():
+        columns[title] = ["none" if np.isnan(one) else f"{one:.1%}" for one in column]
     table = pd.DataFrame(columns).to_string(index=False).splitlines()
     return [f"permanent displacement (mm) over {suite}:", *table]
 
