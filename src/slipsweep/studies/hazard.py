@@ -106,11 +106,7 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     Separators are commas, semicolons or tabs.  Columns of other names are left out.  Or a file of OpenQuake,
     ``hazard_curve-mean-PGA_12.csv``, whose probabilities of exceedance become annual rates, −ln(1 − p)/T with its
     investigation time T; `site` is which of its sites, from 1, and needed if it has several.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
+    InputError: the file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
     """
     try:
         path = Path(path)
@@ -174,33 +170,10 @@ def _openquake_curve(
 def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: Any = None) -> xr.Dataset:
     """Probability of exceeding displacements along `amplitude`, of a suite, of uncertain inputs, or of both.
 
-    Parameters
-    ----------
-    result : Dataset
-        A result of `sweep` under a suite, or of `sample`.  Motions of a suite that were not pooled are equally likely.
-    thresholds : float, str or list of these, optional
-        Increasing displacements, m or with a unit.  Of uncertain inputs they must be among those of the result.
-    over : str or list of str, optional
-        Dimensions that make up the suite, as in `suite_statistics`.
-
-    Returns
-    -------
-    Dataset
-        `exceedance_probability` (dimensions of the grid, amplitude, threshold) and `valueless_share`.
-
-    Raises
-    ------
-    InputError
-        There is no dimension `amplitude` of two values or more, no suite and nothing uncertain, or no such threshold.
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> friction = {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}}
-    >>> result = slipsweep.sample(5, amplitude=[3.0, 5.0], frequency=2.0, uncertain=friction, thresholds=["50mm"])
-    >>> fragility(result).exceedance_probability.round(2).values
-    array([[0.02],
-           [1.  ]])
+    `result` is one of `sweep` under a suite, or of `sample`, whose thresholds those wanted must be among.  Motions that
+    were not pooled are equally likely; `over` is as in `suite_statistics`.  The result has `exceedance_probability`
+    (dimensions of the grid, amplitude, threshold) and `valueless_share`.  InputError: there is no dimension `amplitude`
+    of two values or more, no suite and nothing uncertain, or no such threshold.
     """
     name = "exceedance_probability" if "exceedance_probability" in result else "permanent_displacement"
     if name in result and result[name].sizes.get("amplitude", 1) < 2:
@@ -211,22 +184,18 @@ def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: An
     if name == "permanent_displacement":
         wanted = THRESHOLDS if thresholds is None else thresholds
         found = suite_statistics(result, thresholds=wanted, quantiles=0.5, over=over)
-        found = found[["exceedance_probability", "valueless_share"]].drop_vars(["quantile", "flag"], errors="ignore")
+        found = found[["exceedance_probability", "valueless_share"]]
     else:
-        found = _of_samples(result, thresholds, over)
+        found = result[["exceedance_probability", "valueless_share"]].load()
+        if thresholds is not None:
+            found = at_thresholds(found, thresholds)
+        dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
+        pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
+        suite = " ".join((*dims, *pooled, "samples"))
+        found = found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=suite)
     # none exceeds anything at 0, which has no logarithm
     found = found.isel(amplitude=np.flatnonzero(found["amplitude"].values > 0.0)).sortby("amplitude")
     return found.transpose(..., "amplitude", "threshold")
-
-
-def _of_samples(result: xr.Dataset, thresholds: Any, over: Any) -> xr.Dataset:
-    """The fragility that `sample` has stored, at some of its thresholds."""
-    found = result[["exceedance_probability", "valueless_share"]].load()
-    if thresholds is not None:
-        found = at_thresholds(found, thresholds)
-    dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
-    pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
-    return found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=" ".join((*dims, *pooled, "samples")))
 
 
 def openquake_fragility(found: xr.Dataset) -> str:
@@ -234,20 +203,7 @@ def openquake_fragility(found: xr.Dataset) -> str:
 
     `found` is what `fragility` returns; its thresholds are the limit states.  Peak ground accelerations are in g; to
     them no probability is extrapolated: the first is the limit of no damage.
-
-    Raises
-    ------
-    InputError
-        A probability is missing: the model gives no value there.
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
-    >>> result = slipsweep.sweep(5, 0.3, amplitude=[2.0, 4.0, 6.0], excitation=suite)
-    >>> text = openquake_fragility(fragility(result, "50mm"))
-    >>> [line.strip() for line in text.splitlines() if "poes" in line]
-    ['<poes ls="u_above_50_mm">0 0.25 0.75</poes>']
+    InputError: a probability is missing, as the model gives no value there.
     """
     g = float(found.attrs["g"])
     probability = found["exceedance_probability"].transpose(..., "threshold", "amplitude")

@@ -222,7 +222,12 @@ class _History:
         advice = "take fewer cycles or points_per_cycle, or give times"
         resources.check_memory(f"a history of {count + most:.4g} points", needed, advice)
         shaken = motion.times if isinstance(motion, Record) else step * np.arange(count, dtype=np.float64)
-        after = self._runs_on(float(shaken[-1]))
+        after, is_wave = 0.0, isinstance(motion, Waveform)
+        if not self.valueless and not (is_wave and self.summary["sliding_mode"] != variables.SlidingMode.STICK_SLIP):
+            ground, block, _, velocity, _ = self.sampled(shaken[-1:])[:, 0]
+            # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
+            with np.errstate(divide="ignore", over="ignore"):
+                after = float(velocity / (block - ground)) if velocity != 0.0 else 0.0
         if not math.isfinite(after):
             raise InputError(
                 "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
@@ -233,16 +238,6 @@ class _History:
         # a hair further than the end, which is rounded
         rest = np.linspace(0.0, max(after * (1.0 + 1e-12), beyond * step), beyond + 1)[1:]
         return np.concatenate([shaken, shaken[-1] + rest])
-
-    def _runs_on(self, end: float) -> float:
-        """How long the block slides on after the `end` of the shaking."""
-        is_wave = isinstance(self.problem.excitation, Waveform)
-        if self.valueless or (is_wave and self.summary["sliding_mode"] != variables.SlidingMode.STICK_SLIP):
-            return 0.0
-        ground, block, _, velocity, _ = self.sampled(np.array([end]))[:, 0]
-        # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
-        with np.errstate(divide="ignore", over="ignore"):
-            return float(velocity / (block - ground)) if velocity != 0.0 else 0.0
 
 
 def _interruptible(kernel: Callable[..., None], *args: Any) -> None:

@@ -248,21 +248,16 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     for name, values in after.items():
         results[name][cell] = values
     results["limit_amplitude"][cell] = high
-    results["limit_status"][cell] = _status(before, after)
-    return {name: values.reshape(request.shape) for name, values in results.items()}
-
-
-def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
-    """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
     below, above = before["permanent_displacement"], after["permanent_displacement"]
     jumps = above - below > JUMP * above
     modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
-    status = np.full(above.shape, LimitStatus.REACHED, np.int8)
-    status[jumps] = LimitStatus.AT_JUMP
-    status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP
-    status[np.isnan(below)] = LimitStatus.AFTER_GAP
-    return status
+    results["limit_status"][cell] = np.select(
+        [np.isnan(below), jumps & other_mode, jumps],
+        [LimitStatus.AFTER_GAP, LimitStatus.AT_MODE_JUMP, LimitStatus.AT_JUMP],
+        LimitStatus.REACHED,
+    )
+    return {name: values.reshape(request.shape) for name, values in results.items()}
 
 
 class Steps(NamedTuple):

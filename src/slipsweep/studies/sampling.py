@@ -90,12 +90,8 @@ class Distribution:
 class Sampling:
     """How inputs are sampled and which statistics are wanted: the arguments of `slipsweep.sample`, checked.
 
-    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.
-
-    Raises
-    ------
-    InputError
-        The first thing that is not allowed.
+    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.  InputError: the
+    first thing that is not allowed.
     """
 
     def __init__(

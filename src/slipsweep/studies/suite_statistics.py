@@ -205,25 +205,9 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
 def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
     """What a designer asks first of a suite, a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
 
-    Parameters
-    ----------
-    result : Dataset
-        A result of `sweep` with the dimension `motion`, or of `sample`: its quantiles, without the share of zeros.
-    displacement : float, str or list of these, optional
-        Displacements d, m or with a unit; of `sample` among its thresholds.
-    most : int
-        Of more grid points there is one line, that says how to have those of some.
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
-    >>> result = slipsweep.sweep(5, 0.3, amplitude=[4.0, 6.0], excitation=suite)
-    >>> print(*summary_lines(result, "50mm"), sep="\\n")
-    permanent displacement (mm) over 4 motion:
-    PGA (g) 16 % median     84 % zero P(u > 50 mm)
-     0.4077  8.7   18.8     71.5 0.0%        25.0%
-     0.6116 89.3    188 1.34e+03 0.0%        75.0%
+    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without the share of zeros.
+    Displacements d have a unit or are in m; of `sample` they are among its thresholds.  Of more grid points than `most`
+    there is one line, that says how to have those of some.
     """
     import pandas as pd
 

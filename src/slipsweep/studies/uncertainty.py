@@ -206,20 +206,9 @@ def sample(
 
 
 def plan_samples(
-    sampling: Sampling,
-    inputs: grid_inputs.Inputs,
-    *,
-    excitation: Any = "sine",
-    model: Any = "mendez",
-    solver: Any = "auto",
+    sampling: Sampling, inputs: grid_inputs.Inputs, *, excitation: Any, model: Any, solver: Any
 ) -> "SamplePlan":
-    """Plan of the samples of a grid, drawn and checked; as `plans.plan_sweep`.
-
-    Raises
-    ------
-    InputError
-        As `slipsweep.sample`.
-    """
+    """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
     # friction may be given, or drawn about, by its angle
     given = ["phi" if name == "mu_s" and inputs.phi is not None else name for name in inputs.given]
     problem = problems.check_problem(excitation, model, solver)
@@ -247,11 +236,11 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Pro
             "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
         )
     recorded = not isinstance(problem.excitation, Waveform)
-    kinds = variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS
-    own, other = reversed(kinds) if recorded else kinds
+    kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
+    foreign = {*kinds[not recorded]} - {*kinds[recorded]}
     for name, one in sampling.distributions.items():
         friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
-        if name in other and name not in own:
+        if name in foreign:
             raise InputError(f"{sampling.key(name)}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
             raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
@@ -271,9 +260,8 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Pro
 class SamplePlan:
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
-    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.
-
-    A plan as all others are (`anyplan.AnyPlan`).  Under a record there is no sliding mode.
+    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.  A plan as all
+    others are (`anyplan.AnyPlan`).
     """
 
     cell_memory = 0
@@ -318,8 +306,8 @@ class SamplePlan:
             inputs[clock] = xr.Variable((), 1.0)
         self.inputs = inputs
         self.attrs = attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {})
-        #: Runs of a grid point, all draws with all that is pooled; and how many points are solved together.
-        self.runs = sampling.runs * math.prod(self.pooled.values())
+        #: Samples and runs of a grid point, all draws with all that is pooled; how many points are solved together.
+        self.samples, self.runs = (n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs))
         self.points = max(_CELLS // self.runs, 1)
         # as in `anyplan.AnyPlan`
         self.cells = math.prod(self.solved.values()) * self.runs
@@ -333,7 +321,8 @@ class SamplePlan:
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
-        return SamplePlan(self.sampling, self.problem, _cut(self.coords, chunk), self.attrs)
+        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
+        return SamplePlan(self.sampling, self.problem, coords, self.attrs)
 
     def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
@@ -350,12 +339,10 @@ class SamplePlan:
         lengths = self.sizes | {dim: one.size for dim, one in own_coords.items()}
         results = {}
         for name, own in self.results.items():
-            grid = self.sizes if name in _BY_FREQUENCY else self.solved
-            dims = (*grid, *own)
+            dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *own)
             zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
             results[name] = (dims, np.broadcast_to(zero, [lengths[dim] for dim in dims]), variables.STATISTICS[name])
-        coords = {name: one for name, one in self.coords.items() if not {*self.pooled} & {*one.dims}}
-        return xr.Dataset(results, coords | own_coords, self.attrs)
+        return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
         """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns.
@@ -371,7 +358,7 @@ class SamplePlan:
         )
         table = xr.zeros_like(table)
         for chunk in chunks.grid_chunks(self.solved, self.points):
-            for name, values in self._reduced(chunk, progress).items():
+            for name, values in self._statistics(chunk, progress).items():
                 target = table[name].variable
                 sizes = target[chunk].sizes
                 scaled = self.scaled if name in _BY_FREQUENCY else {}
@@ -379,27 +366,60 @@ class SamplePlan:
                 target[chunk] = xr.Variable(dims, values.reshape([sizes[dim] for dim in dims]))
         return table
 
-    def _reduced(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
-        """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
-        sizes = {dim: cut.stop - cut.start for dim, cut in chunk.items()}
-        rows = math.prod(sizes.values())
+    def _statistics(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
+        """The results at the grid points of a chunk, (solved, frequencies, own dimension).
+
+        Quantiles, mean, probabilities and shares are of the samples that have a value; probabilities also count the
+        statically unstable ones, as exceeding every threshold.
+        """
+        sampling, sizes = self.sampling, {dim: cut.stop - cut.start for dim, cut in chunk.items()}
         arrays, shape = self._drawn(chunk, sizes)
-        names = ("permanent_displacement", *(["sliding_mode"] if "mode_share" in self.names else []), "validity")
+        names = ("permanent_displacement", "validity", *(["sliding_mode"] if "mode_share" in self.names else []))
         solved = engine.solve(engine.Request(self.problem, shape, arrays, names, progress))
-        runs = {name: values.reshape(rows, -1) for name, values in solved.items()}
+        runs = {name: values.reshape(math.prod(sizes.values()), -1) for name, values in solved.items()}
         # of Sobol indices the first runs are the samples
-        samples = self.runs // self.sampling.runs * self.sampling.samples
-        frequency = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
-        found = statistics_of_samples(
-            self.sampling, {name: one[:, :samples] for name, one in runs.items()}, frequency.values.reshape(rows, -1)
-        )
-        if self.sampling.sensitivity:
-            found |= sobol_indices(self.sampling, runs["permanent_displacement"])
+        samples = {name: values[:, : self.samples] for name, values in runs.items()}
+        displacement, flags = samples["permanent_displacement"], samples["validity"]
+        clocks = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
+        frequency = clocks.values.reshape(len(displacement), -1)
+        squares = frequency[..., np.newaxis] ** 2
+        quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
+        means = np.full((*frequency.shape, 1), np.nan)
+        exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
+
+        def reduce(point: int) -> None:
+            values = np.sort(displacement[point])
+            values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
+            # these slide without any shaking: their displacement has no value and exceeds every threshold
+            unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
+            if values.size + unstable:
+                above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
+                exceeding[point] = (above + unstable) / (values.size + unstable)
+            if values.size:
+                with np.errstate(over="ignore"):  # refused below
+                    quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
+                    means[point] = values.mean() / squares[point]
+
+        threads.spread(range(len(displacement)), reduce)
+        for wrong in frequency[(np.isinf(quantiles) | np.isinf(means)).any(axis=-1)][:1]:
+            text = parameters.number_text(float(wrong))
+            raise InputError(f"frequency or 1 / time_scale = {text}: must be nearer to 1")
+        found = {
+            "displacement_quantile": quantiles,
+            "mean_displacement": means,
+            "exceedance_probability": exceeding,
+            "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
+            "valueless_share": np.isnan(displacement).mean(axis=-1),
+        }
+        if "sliding_mode" in samples:
+            found["mode_share"] = np.stack([np.mean(samples["sliding_mode"] == mode, axis=-1) for mode in _MODES], -1)
+        if sampling.sensitivity:
+            found |= sobol_indices(sampling, runs["permanent_displacement"])
         return found
 
     def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, Floats], tuple[int, ...]]:
         """Inputs of the runs of a chunk, and their shape, (solved, pooled, draw): a sweep with one more dimension."""
-        inputs = _cut(self.inputs, chunk)
+        inputs = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.inputs.items()}
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}
         about_estimates = []
@@ -425,14 +445,13 @@ class SamplePlan:
 
     def tally(self, results: Mapping[str, NDArray[Any]]) -> tally.Tally:
         """Samples by sliding mode and by flag, from their shares; grid points by what moves the displacement."""
-        samples = self.sampling.samples * math.prod(self.pooled.values())
 
         def counts(name: str, codes: Sequence[Any]) -> dict[Any, int]:
             shares = results[name].reshape(-1, len(codes)).astype(np.float64)
-            return dict(zip(codes, np.rint(shares * samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
+            return dict(zip(codes, np.rint(shares * self.samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
 
         found = tally.Tally(flags=counts("flag_share", tuple(variables.Validity)))
-        found.counted = results["valueless_share"].size * samples
+        found.counted = results["valueless_share"].size * self.samples
         if "mode_share" in results:
             found.modes = counts("valueless_share", (variables.SlidingMode.MISSING,)) | counts("mode_share", _MODES)
         if self.sampling.sensitivity:
@@ -441,53 +460,3 @@ class SamplePlan:
                 *(results[name] for name in ("first_order_index", "total_index", "sensitivity_status")),
             )
         return found
-
-
-def _cut(coords: Mapping[str, xr.Variable], chunk: chunks.Chunk) -> dict[str, xr.Variable]:
-    return {name: one.isel(chunk, missing_dims="ignore") for name, one in coords.items()}
-
-
-def statistics_of_samples(
-    sampling: Sampling, solved: Mapping[str, NDArray[Any]], frequency: Floats
-) -> dict[str, NDArray[Any]]:
-    """`STATISTICS` of the samples of grid points, (point, own dimension), at each frequency where they depend on it.
-
-    Quantiles, mean, probabilities and shares are of the samples that have a value; probabilities also count the
-    statically unstable ones, as exceeding every threshold.  `solved` has results of samples, (point, sample);
-    displacements are divided by the square of `frequency`, (point, frequency).
-    """
-    displacement, flags = solved["permanent_displacement"], solved["validity"]
-    squares = frequency[..., np.newaxis] ** 2
-    quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
-    means = np.full((*frequency.shape, 1), np.nan)
-    exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
-
-    def reduce(point: int) -> None:
-        values = np.sort(displacement[point])
-        values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-        # these slide without any shaking: their displacement has no value and exceeds every threshold
-        unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
-        if values.size + unstable:
-            above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
-            exceeding[point] = (above + unstable) / (values.size + unstable)
-        if values.size:
-            with np.errstate(over="ignore"):  # refused below
-                quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
-                means[point] = values.mean() / squares[point]
-
-    threads.spread(range(len(displacement)), reduce)
-    wrong = (np.isinf(quantiles) | np.isinf(means)).any(axis=-1)
-    if wrong.any():
-        first = parameters.number_text(float(frequency[wrong][0]))
-        raise InputError(f"frequency or 1 / time_scale = {first}: must be nearer to 1")
-    found = {
-        "displacement_quantile": quantiles,
-        "mean_displacement": means,
-        "exceedance_probability": exceeding,
-        "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
-        "valueless_share": np.isnan(displacement).mean(axis=-1),
-    }
-    if "sliding_mode" in solved:
-        modes = solved["sliding_mode"]
-        found["mode_share"] = np.stack([np.mean(modes == mode.value, axis=-1) for mode in _MODES], axis=-1)
-    return found
