@@ -372,8 +372,9 @@ def displacement_hazard(
     for name, one in results.items():
         one.attrs = HAZARD_RESULTS[name]
     coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}
+    found.attrs.pop("zero_displacement", None)
     attrs = {
-        **{name: value for name, value in found.attrs.items() if name != "zero_displacement"},
+        **found.attrs,
         "title": TITLE,
         "hazard_curve": curve.name,
         **curve.attrs,

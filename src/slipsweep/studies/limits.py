@@ -24,9 +24,7 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_sweep
-from slipsweep.model import parameters, variables
-from slipsweep.model.options import Model, Newmark
-from slipsweep.model.units import quantity
+from slipsweep.model import options, parameters, units, variables
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
@@ -35,6 +33,9 @@ from slipsweep.studies.datasets import Values
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+#: Whether something has changed at amplitudes, for intervals by their indices.
+Changed = Callable[[Floats, Indices], NDArray[np.bool_]]
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
 
@@ -76,7 +77,7 @@ def limit_amplitude(
     *,
     phi: Values | None = None,
     excitation: datasets.Excitation = "sine",
-    model: Model | str = "mendez",
+    model: options.Model | str = "mendez",
     time_scale: Values | None = None,
     polarity: datasets.Signs | None = None,
     azimuth: Values | None = None,
@@ -174,7 +175,7 @@ def plan_limits(
     """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
 
     def in_m(given: Any) -> Any:
-        return quantity("displacement", given, "m", math.nan) if isinstance(given, str) else given
+        return units.quantity("displacement", given, "m", math.nan) if isinstance(given, str) else given
 
     displacement = [in_m(one) for one in displacement] if isinstance(displacement, list) else in_m(displacement)
     values = parameters.check_values("displacement", displacement)
@@ -221,13 +222,12 @@ def _solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
     results = request.results()
     for where, motion in engine.motions(request):
         # two thresholds of a pulse, and two sides of each, in addition to the steps
-        changes = 4 * _heights(motion).size
-        for slab in slabs(motion.shape, max(1, SCANNED // (steps + changes))):
+        scanned = steps + 4 * _heights(motion).size
+        for slab in slabs(motion.shape, max(1, SCANNED // scanned)):
             part = motion.part(slab)
-            solved = _solve_part(part, maximum_amplitude, steps)
-            for name, values in results.items():
-                own: Any = values[(*where, ...)]  # type: ignore[arg-type]
-                own[(*slab, ...)] = solved[name]
+            for name, values in _solve_part(part, maximum_amplitude, steps).items():
+                own: Any = results[name][(*where, ...)]  # type: ignore[arg-type]
+                own[(*slab, ...)] = values
             request.count(math.prod(part.shape))
     return results
 
@@ -317,10 +317,10 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     blocks = _block_inputs(request.arrays)
     shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
-    limited = ("limiting_acceleration",) if not isinstance(problem.model, Newmark) else ()
-    rest = np.zeros((1,) * len(shape))
+    limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
     wanted = ("yield_acceleration", *limited)
-    found = engine.friction_parameters(Request(problem, shape, {**blocks, "amplitude": rest}, wanted))
+    blocks["amplitude"] = np.zeros((1,) * len(shape))
+    found = engine.friction_parameters(Request(problem, shape, blocks, wanted))
     # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
     thresholds = np.stack([found[name].ravel() for name in wanted], axis=1)
     yields = thresholds[:, :1]
@@ -421,15 +421,10 @@ def _at_change(
     return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
 
 
-def _bisected(
-    low: Floats,
-    high: Floats,
-    changed: Callable[[Floats, Indices], NDArray[np.bool_]],
-    width: Floats | float = 0.0,
-) -> tuple[Floats, Floats]:
+def _bisected(low: Floats, high: Floats, changed: Changed, width: Floats | float = 0.0) -> tuple[Floats, Floats]:
     """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
 
-    ``changed(amplitudes, which)``, for intervals by their indices, holds at `high` and not at `low`.
+    `changed` holds at `high` and not at `low`.
     """
     low, high = low.copy(), high.copy()
     active, width = np.arange(low.size), np.broadcast_to(width, low.shape)

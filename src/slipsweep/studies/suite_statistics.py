@@ -117,8 +117,9 @@ def suite_statistics(
     there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
     bits = np.array(REASONS, np.int16)
     about = {"flag_values": bits.tolist(), "flag_meanings": " ".join((flag.name or "").lower() for flag in REASONS)}
-    flag = xr.DataArray(bits, dims="flag", attrs={**STATISTIC_COORDINATES["flag"], **about})
-    threshold = xr.DataArray(limits, dims="threshold", attrs=STATISTIC_COORDINATES["threshold"])
+    flag = xr.Variable("flag", bits, {**STATISTIC_COORDINATES["flag"], **about})
+    threshold = xr.Variable("threshold", limits, STATISTIC_COORDINATES["threshold"])
+    quantile = xr.Variable("quantile", wanted, STATISTIC_COORDINATES["quantile"])
     count = there.sum(dims)
     slid = moved.where(moved > least[0])
     logs: xr.DataArray = np.log(slid)  # type: ignore[assignment]
@@ -134,8 +135,7 @@ def suite_statistics(
         "displacement_quantile": _quantiles(moved, wanted, dims),
         "exceedance_probability": (moved > threshold).where(there).mean(dims),
     }
-    quantile = xr.Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"])
-    own = {"flag": flag.variable, "threshold": threshold.variable, "quantile": quantile}
+    own = {"flag": flag, "threshold": threshold, "quantile": quantile}
     attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
     grid = [dim for dim in moved.dims if dim not in dims]
     laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
@@ -253,13 +253,12 @@ def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:
     """What `sample` has stored, at some of its thresholds (InputError: not among them)."""
     wanted = check_thresholds("thresholds", thresholds, float(found.attrs.get("g", np.nan)))
     nearest = found.sel(threshold=wanted, method="nearest")
-    for one, there in zip(wanted, nearest["threshold"].values, strict=True):
-        if not np.isclose(there, one, rtol=1e-6):
-            stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
-            raise InputError(
-                f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
-                "add it to the thresholds of [uncertainty], and run again"
-            )
+    for one in wanted[~np.isclose(nearest["threshold"], wanted, rtol=1e-6)][:1]:
+        stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
+        raise InputError(
+            f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
+            "add it to the thresholds of [uncertainty], and run again"
+        )
     return nearest
 
 
