@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import itertools
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
@@ -33,14 +34,13 @@ def naming_choices(function: Function) -> Function:
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
-        for name, value in options.items():
-            for family in (WAVEFORMS, MODELS, SOLVERS):
-                if name not in known and name in family.options:
-                    owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
-                    raise TypeError(
-                        f"{function.__name__}() has no argument {name!r}: give "
-                        f"{family.keyword}={owner.__name__}({name}={shown(value)})"
-                    )
+        for name, family in itertools.product(options, (WAVEFORMS, MODELS, SOLVERS)):
+            if name not in known and name in family.options:
+                owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
+                raise TypeError(
+                    f"{function.__name__}() has no argument {name!r}: give "
+                    f"{family.keyword}={owner.__name__}({name}={shown(options[name])})"
+                )
         return function(*arguments, **options)
 
     return cast(Function, call)

@@ -225,6 +225,8 @@ class Sampling:
 
 def _distribution(key: str, parameter: str, given: Any, g: float) -> Distribution:
     """One entry of `uncertain`, called `key` in errors."""
+    from scipy import stats
+
     entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
     chosen = entries.pop("distribution", None)
     kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
@@ -234,7 +236,18 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
             f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to {own}"
         )
     if isinstance(chosen, str):
-        frozen = _frozen(key, chosen, entries)
+        family = getattr(stats, chosen, None)
+        if not isinstance(family, stats.rv_continuous):
+            raise InputError(
+                f'{key}.distribution = "{chosen}": must be a continuous one of scipy.stats, such as {_USUAL}'
+            )
+        allowed = _arguments(family)
+        if not {*allowed[:-2]} <= {*entries} <= {*allowed}:
+            raise InputError(
+                f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes {', '.join(allowed)}, "
+                "of which loc and scale may be left out (and the keys kind and units)"
+            )
+        frozen = family(**{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()})
     elif callable(getattr(chosen, "ppf", None)) and not entries:
         frozen = chosen
     else:
@@ -253,22 +266,6 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
     factor = conversion(f"{key}.units", own, units, g)
     about |= {"units": units, "kind": kind} if units is not None else {"kind": kind}
     return Distribution(kind, frozen, factor, about)
-
-
-def _frozen(key: str, name: str, given: Mapping[str, Any]) -> Any:
-    """A distribution of scipy.stats with its parameters."""
-    from scipy import stats
-
-    family = getattr(stats, name, None)
-    if not isinstance(family, stats.rv_continuous):
-        raise InputError(f'{key}.distribution = "{name}": must be a continuous one of scipy.stats, such as {_USUAL}')
-    allowed = _arguments(family)
-    if not {*allowed[:-2]} <= {*given} <= {*allowed}:
-        raise InputError(
-            f"{key}: has {', '.join(map(str, given)) or 'no parameters'}: {name} takes {', '.join(allowed)}, of which "
-            "loc and scale may be left out (and the keys kind and units)"
-        )
-    return family(**{parameter: check_finite(f"{key}.{parameter}", value) for parameter, value in given.items()})
 
 
 def _arguments(family: Any) -> tuple[str, ...]:

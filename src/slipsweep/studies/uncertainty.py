@@ -239,14 +239,14 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Pro
     kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
     foreign = {*kinds[not recorded]} - {*kinds[recorded]}
     for name, one in sampling.distributions.items():
-        friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
+        key, friction_law = sampling.key(name), name in ("decay_rate", "delta_mu", "minimum_friction")
         if name in foreign:
-            raise InputError(f"{sampling.key(name)}: not allowed with {'a Record' if recorded else 'a waveform'}")
+            raise InputError(f"{key}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
-            raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
+            raise InputError(f"{key}: not allowed with Newmark's block, which has no friction law")
         if one.kind == "absolute" and name in given:
             raise InputError(
-                f'{sampling.key(name)}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
+                f'{key}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
                 'or "offset" to draw about what is given'
             )
         # under a record each pulse has estimates of its own, but for Coulomb's yield acceleration
@@ -254,7 +254,7 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Pro
         if name == "yield_acceleration":
             estimated = "yield_coefficient" not in {*given, *sampling.distributions}
         if one.kind != "absolute" and name not in given and not estimated:
-            raise InputError(f'{sampling.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
+            raise InputError(f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative')
 
 
 class SamplePlan:
