@@ -202,8 +202,8 @@ def openquake_fragility(found: xr.Dataset) -> str:
     """A fragility as an XML file of OpenQuake (NRML 0.5): a discrete function for each grid point.
 
     `found` is what `fragility` returns; its thresholds are the limit states.  Peak ground accelerations are in g; to
-    them no probability is extrapolated: the first is the limit of no damage.
-    InputError: a probability is missing, as the model gives no value there.
+    them no probability is extrapolated: the first is the limit of no damage.  InputError: a probability is missing, as
+    the model gives no value there.
     """
     g = float(found.attrs["g"])
     probability = found["exceedance_probability"].transpose(..., "threshold", "amplitude")

@@ -9,7 +9,7 @@ solved together, by the cycle solver.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -64,8 +64,8 @@ _ROUNDING = 1e-15
 #: Pulses of a record whose changes of mode a scan includes: noise has thousands.
 _MOST_PULSES = 128
 
-#: Inputs that only scale the result, or only flag it.
-_SCALES = ("frequency", "time_scale", "structure_frequency")
+#: Inputs on which no scan depends: those that only scale its result, or only flag it, and the target.
+_AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
 
 
 @datasets.naming_choices
@@ -196,7 +196,7 @@ def plan_limits(
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
     arrays = dict(task.inputs)
     arrays["displacement"] = arrays.pop("amplitude")
-    blocks = np.broadcast_shapes(*(one.shape for one in _block_inputs(arrays).values()))
+    blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in _AFTER_SCAN))
     scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
     # in which mode a block slides, or in how many pulses of a record
     codes = variables.RECORD_COUNTS if "time_scale" in arrays else ("sliding_mode",)
@@ -314,7 +314,7 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
     """
     problem = request.problem
-    blocks = _block_inputs(request.arrays)
+    blocks = {name: values for name, values in request.arrays.items() if name not in _AFTER_SCAN}
     shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
@@ -337,11 +337,6 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
     scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
     return scanned.reshape(*shape, -1)
-
-
-def _block_inputs(arrays: Mapping[str, Floats]) -> Arrays:
-    """The inputs on which a scan depends: neither those that only scale its result, nor the target."""
-    return {name: one for name, one in arrays.items() if name not in (*_SCALES, "displacement")}
 
 
 def _heights(request: Request) -> Floats:

@@ -231,8 +231,11 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
     labels = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in varying))
-    titles = [_title_of(found, dim) for dim in varying]
-    columns: dict[str, Sequence[str]] = dict(zip(titles, zip(*labels, strict=True), strict=True))
+    columns: dict[str, Sequence[str]] = {}
+    for dim, texts in zip(varying, zip(*labels, strict=True), strict=True):
+        units = found[dim].attrs.get("units", "1") if dim in found.variables else "1"
+        title = str(dim) if units == "1" else f"{dim} ({units})"
+        columns[{"amplitude": "PGA (g)", "yield_coefficient": "ky"}.get(str(dim), title)] = texts
     rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
     for share, column in zip(found["quantile"].values, rows["displacement_quantile"], strict=True):
         title = "median" if share == 0.5 else f"{100.0 * share:.3g} %"
@@ -260,13 +263,6 @@ def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:
             "add it to the thresholds of [uncertainty], and run again"
         )
     return nearest
-
-
-def _title_of(data: xr.Dataset, dim: Hashable) -> str:
-    """A dimension as the title of a column."""
-    units = data[dim].attrs.get("units", "1") if dim in data.variables else "1"
-    titles = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
-    return titles.get(str(dim), str(dim) if units == "1" else f"{dim} ({units})")
 
 
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:

@@ -429,8 +429,7 @@ class SamplePlan:
             else:
                 about_estimates.append(name)
         if "phi" in inputs:
-            angles = inputs.pop("phi")
-            inputs["mu_s"] = angles.copy(data=np.tan(np.radians(angles.values)))
+            inputs["mu_s"] = parameters.friction_coefficient(inputs.pop("phi"))
         arrays = grid_inputs.aligned(inputs, sizes)
         for name in sorted(about_estimates, key=_ESTIMATED.index):
             one, draws = self.sampling.distributions[name], grid_inputs.aligned({name: drawn[name]}, sizes)[name]
