@@ -9,7 +9,7 @@ import xarray as xr
 
 from slipsweep import InputError, Record, Suite, sample, sweep
 from slipsweep.model.variables import Validity
-from slipsweep.studies.sampling import check_sampling
+from slipsweep.studies.sampling import Sampling
 
 SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 SAMPLES = 64
@@ -27,10 +27,10 @@ def shaking() -> Record:
 
 def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
     """The draws along a dimension."""
-    sampling = check_sampling(
+    sampling = Sampling(
         uncertain, samples=SAMPLES, method="sobol", seed=0, quantiles=[0.5], thresholds=[0.1], correlation=(), g=9.81
     )
-    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws().items()}
+    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws.items()}
 
 
 NORMAL = {"distribution": "norm", "loc": 0.45, "scale": 0.04}

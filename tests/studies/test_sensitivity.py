@@ -12,7 +12,7 @@ import slipsweep
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.model.variables import SensitivityStatus
-from slipsweep.studies.sampling import MOST_SAMPLES, RESAMPLES, Sampling, check_sampling, sobol_indices
+from slipsweep.studies.sampling import MOST_SAMPLES, RESAMPLES, Sampling, sobol_indices
 
 FACTOR: dict[str, Any] = {"distribution": "lognorm", "s": 0.3, "kind": "factor"}
 
@@ -26,7 +26,7 @@ def sampling_of(uncertain: dict[str, Any], **options: Any) -> Sampling:
         "samples": 4096, "method": "sobol", "seed": 0, "quantiles": 0.5, "thresholds": 0.1, "correlation": (),
         "sensitivity": True, "g": 9.81,
     }  # fmt: skip
-    return check_sampling(uncertain, **{**settings, **options})
+    return Sampling(uncertain, **{**settings, **options})
 
 
 def ishigami(draws: Any) -> np.ndarray:
@@ -55,7 +55,7 @@ def reduced(sampling: Sampling, values: np.ndarray) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("seed", [0, 1])
 def test_ishigamis_function(seed: int) -> None:
     sampling = sampling_of(ANGLES, samples=2**14, seed=seed)
-    found = reduced(sampling, ishigami(sampling.draws()))
+    found = reduced(sampling, ishigami(sampling.draws))
     for name, exact in zip(("first_order", "total"), closed_form(), strict=True):
         np.testing.assert_allclose(found[f"{name}_index"], exact, rtol=0.01, atol=0.003)
         low, high = found[f"{name}_interval"]
@@ -65,7 +65,7 @@ def test_ishigamis_function(seed: int) -> None:
 def test_estimates_are_those_of_scipy() -> None:
     """The estimators of scipy.stats.sobol_indices, and its bootstrap's percentiles but for what chance does to them."""
     sampling = sampling_of(ANGLES, samples=512)
-    runs = ishigami(sampling.draws()).reshape(5, 1, 512)
+    runs = ishigami(sampling.draws).reshape(5, 1, 512)
     found = reduced(sampling, runs.ravel())
     theirs = stats.sobol_indices(func={"f_A": runs[0], "f_B": runs[1], "f_AB": runs[2:]}, n=512)
     np.testing.assert_allclose(found["first_order_index"], theirs.first_order, atol=1e-12)
@@ -92,7 +92,7 @@ def test_intervals_of_random_numbers_hold_the_truth_as_often_as_they_say() -> No
     held = []
     for seed in range(60):
         sampling = sampling_of(ANGLES, samples=2048, seed=seed, method="random")
-        found = reduced(sampling, ishigami(sampling.draws()))
+        found = reduced(sampling, ishigami(sampling.draws))
         for name, exact in zip(("first_order", "total"), closed_form(), strict=True):
             low, high = found[f"{name}_interval"]
             held.append((low <= exact) & (exact <= high))
@@ -141,7 +141,7 @@ def test_correlated_inputs_are_one() -> None:
     pairs = [("delta_mu", "decay_rate", 0.9), ("mu_s", "delta_mu", 0.1)]
     sampling = sampling_of(uncertain, correlation=pairs, samples=4096)
     assert sampling.independent == (("mu_s", "decay_rate", "delta_mu"), ("amplitude",))
-    drawn = sampling.draws()
+    drawn = sampling.draws
     draws = {name: values.reshape(4, -1) for name, values in drawn.items()}
     for name in ("mu_s", "decay_rate", "delta_mu"):
         np.testing.assert_array_equal(draws[name][2:], [draws[name][1], draws[name][0]])

@@ -12,7 +12,7 @@ import slipsweep
 from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.model.variables import Validity
-from slipsweep.studies.sampling import check_sampling
+from slipsweep.studies.sampling import Sampling
 from tests.support.commands import command
 
 G = 9.81
@@ -28,7 +28,7 @@ def drawn(uncertain: dict[str, Any], **options: Any) -> dict[str, np.ndarray]:
     settings: dict[str, Any] = {
         "samples": 4096, "method": "sobol", "seed": 0, "quantiles": 0.5, "thresholds": 0.1, "correlation": (), "g": G
     }  # fmt: skip
-    return check_sampling(uncertain, **{**settings, **options}).draws()
+    return Sampling(uncertain, **{**settings, **options}).draws
 
 
 # ----------------------------------------------------------------------------- closed forms

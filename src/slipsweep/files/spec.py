@@ -247,13 +247,13 @@ def _chosen(family: choices.Family[Any], table: _Table) -> Any:
 
 
 def _sampling(table: _Table, g: float) -> "Sampling":
-    from slipsweep.studies.sampling import check_sampling  # imports scipy: only for sweeps that need it
+    from slipsweep.studies.sampling import Sampling  # imports scipy: only for sweeps that need it
 
     settings = {
         name: table.get(name, default) for name, default in KEYS["uncertainty"].items() if name not in variables.DRAWN
     }
     drawn = {name: value for name, value in table.items() if name in variables.DRAWN}
-    return check_sampling(drawn, **settings, g=g, keys="uncertainty.")
+    return Sampling(drawn, **settings, g=g, keys="uncertainty.")
 
 
 def _inputs(axes: _Table, rows: list[dict[str, Any]], numbers: _Table, g: float) -> dict[str, Any]:

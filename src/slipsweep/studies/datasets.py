@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import itertools
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
@@ -33,14 +34,13 @@ def naming_choices(function: Function) -> Function:
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
-        for name, value in options.items():
-            for family in (WAVEFORMS, MODELS, SOLVERS):
-                if name not in known and name in family.options:
-                    owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
-                    raise TypeError(
-                        f"{function.__name__}() has no argument {name!r}: give "
-                        f"{family.keyword}={owner.__name__}({name}={shown(value)})"
-                    )
+        for name, family in itertools.product(options, (WAVEFORMS, MODELS, SOLVERS)):
+            if name not in known and name in family.options:
+                owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
+                raise TypeError(
+                    f"{function.__name__}() has no argument {name!r}: give "
+                    f"{family.keyword}={owner.__name__}({name}={shown(options[name])})"
+                )
         return function(*arguments, **options)
 
     return cast(Function, call)
@@ -264,10 +264,8 @@ def brought_coordinates(
     for parameter, array in inputs.given.items():
         if not isinstance(array, xr.DataArray):
             continue
-        stacked = [name for name, index in array.xindexes.items() if isinstance(index, PandasMultiIndex)]
-        for name, coordinate in array.coords.items():
-            if name in stacked and name in array.dims:
-                continue
+        stacked = [dim for dim in array.dims if isinstance(array.xindexes.get(dim), PandasMultiIndex)]
+        for name, coordinate in array.reset_index(stacked).coords.items():
             variable = coordinate.variable.to_base_variable()
             known = brought.get(name)
             # a parameter of that name is the coordinate, and labels the dimension of that name
@@ -289,19 +287,17 @@ def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
 
     from slipsweep.grid.graph import lazy_dataset
 
-    refusal = InputError(f"chunks = {shown(chunks)}: must be whole numbers > 0 along {', '.join(plan.sizes)}")
-    wanted: Any = chunks
+    dims, wanted = ", ".join(plan.sizes), chunks
     if isinstance(chunks, str) and chunks == "auto":
         wanted = dict.fromkeys(plan.sizes, "auto") | {"frequency": -1}
     if isinstance(wanted, Mapping):
         for dim in {*wanted} - {*plan.sizes, "frequency"}:
-            known = ", ".join(plan.sizes)
-            raise InputError(f"chunks = {shown(chunks)}: {dim!r} is not a dimension; they are {known}")
+            raise InputError(f"chunks = {shown(chunks)}: {dim!r} is not a dimension; they are {dims}")
         wanted = tuple(wanted.get(dim, -1) for dim in plan.sizes)
     try:
         lengths = normalize_chunks(wanted, tuple(plan.sizes.values()), dtype=np.dtype("f8"))
+        if (isinstance(chunks, int) and chunks == 0) or any(one <= 0 for own in lengths for one in own):
+            raise ValueError
     except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError):
-        raise refusal from None
-    if (isinstance(chunks, int) and chunks == 0) or any(one <= 0 for own in lengths for one in own):
-        raise refusal
+        raise InputError(f"chunks = {shown(chunks)}: must be whole numbers > 0 along {dims}") from None
     return lazy_dataset(plan, dict(zip(plan.sizes, lengths, strict=True)))

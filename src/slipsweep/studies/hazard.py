@@ -99,25 +99,13 @@ class HazardCurve:
 
 
 def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> HazardCurve:
-    """Read a hazard curve of peak ground acceleration from a CSV file.
+    """Read a hazard curve of peak ground acceleration from a CSV file; "g" as a unit is `g` m/s², that of the result.
 
     The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g), annual rate``.
     Separators are commas, semicolons or tabs.  Columns of other names are left out.  Or a file of OpenQuake,
     ``hazard_curve-mean-PGA_12.csv``, whose probabilities of exceedance become annual rates, −ln(1 − p)/T with its
-    investigation time T.
-
-    Parameters
-    ----------
-    path : str or Path
-    g : float
-        What "g" as a unit stands for, m/s²: that of the result.
-    site : int, optional
-        Which site of an OpenQuake file, from 1; needed if it has several.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
+    investigation time T; `site` is which of its sites, from 1, and needed if it has several.
+    InputError: the file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
     """
     try:
         path = Path(path)
@@ -181,33 +169,10 @@ def _openquake_curve(
 def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: Any = None) -> xr.Dataset:
     """Probability of exceeding displacements along `amplitude`, of a suite, of uncertain inputs, or of both.
 
-    Parameters
-    ----------
-    result : Dataset
-        A result of `sweep` under a suite, or of `sample`.  Motions of a suite that were not pooled are equally likely.
-    thresholds : float, str or list of these, optional
-        Increasing displacements, m or with a unit.  Of uncertain inputs they must be among those of the result.
-    over : str or list of str, optional
-        Dimensions that make up the suite, as in `suite_statistics`.
-
-    Returns
-    -------
-    Dataset
-        `exceedance_probability` (dimensions of the grid, amplitude, threshold) and `valueless_share`.
-
-    Raises
-    ------
-    InputError
-        There is no dimension `amplitude` of two values or more, no suite and nothing uncertain, or no such threshold.
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> friction = {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}}
-    >>> result = slipsweep.sample(5, amplitude=[3.0, 5.0], frequency=2.0, uncertain=friction, thresholds=["50mm"])
-    >>> fragility(result).exceedance_probability.round(2).values
-    array([[0.02],
-           [1.  ]])
+    `result` is one of `sweep` under a suite, or of `sample`, whose thresholds those wanted must be among.  Motions that
+    were not pooled are equally likely; `over` is as in `suite_statistics`.  The result has `exceedance_probability`
+    (dimensions of the grid, amplitude, threshold) and `valueless_share`.  InputError: there is no dimension `amplitude`
+    of two values or more, no suite and nothing uncertain, or no such threshold.
     """
     name = "exceedance_probability" if "exceedance_probability" in result else "permanent_displacement"
     if name in result and result[name].sizes.get("amplitude", 1) < 2:
@@ -218,50 +183,26 @@ def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: An
     if name == "permanent_displacement":
         wanted = THRESHOLDS if thresholds is None else thresholds
         found = suite_statistics(result, thresholds=wanted, quantiles=0.5, over=over)
-        found = found[["exceedance_probability", "valueless_share"]].drop_vars(["quantile", "flag"], errors="ignore")
+        found = found[["exceedance_probability", "valueless_share"]]
     else:
-        found = _of_samples(result, thresholds, over)
+        found = result[["exceedance_probability", "valueless_share"]].load()
+        if thresholds is not None:
+            found = at_thresholds(found, thresholds)
+        dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
+        pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
+        suite = " ".join((*dims, *pooled, "samples"))
+        found = found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=suite)
     # none exceeds anything at 0, which has no logarithm
     found = found.isel(amplitude=np.flatnonzero(found["amplitude"].values > 0.0)).sortby("amplitude")
     return found.transpose(..., "amplitude", "threshold")
 
 
-def _of_samples(result: xr.Dataset, thresholds: Any, over: Any) -> xr.Dataset:
-    """The fragility that `sample` has stored, at some of its thresholds."""
-    found = result[["exceedance_probability", "valueless_share"]].load()
-    if thresholds is not None:
-        found = at_thresholds(found, thresholds)
-    dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
-    pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
-    return found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=" ".join((*dims, *pooled, "samples")))
-
-
 def openquake_fragility(found: xr.Dataset) -> str:
     """A fragility as an XML file of OpenQuake (NRML 0.5): a discrete function for each grid point.
 
-    Parameters
-    ----------
-    found : Dataset
-        What `fragility` returns.  Limit states are its thresholds.
-
-    Returns
-    -------
-    str
-        Peak ground accelerations in g, to which no probability is extrapolated: the first is the limit of no damage.
-
-    Raises
-    ------
-    InputError
-        A probability is missing: the model gives no value there.
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
-    >>> result = slipsweep.sweep(5, 0.3, amplitude=[2.0, 4.0, 6.0], excitation=suite)
-    >>> text = openquake_fragility(fragility(result, "50mm"))
-    >>> [line.strip() for line in text.splitlines() if "poes" in line]
-    ['<poes ls="u_above_50_mm">0 0.25 0.75</poes>']
+    `found` is what `fragility` returns; its thresholds are the limit states.  Peak ground accelerations are in g; to
+    them no probability is extrapolated: the first is the limit of no damage.  InputError: a probability is missing, as
+    the model gives no value there.
     """
     g = float(found.attrs["g"])
     probability = found["exceedance_probability"].transpose(..., "threshold", "amplitude")
@@ -403,35 +344,40 @@ def displacement_hazard(
         curve = read_hazard_curve(curve, float(result.attrs.get("g", np.nan)))
     found = fragility(result, thresholds, over)
     amplitude = found["amplitude"].values.astype(np.float64)
-    probability = found["exceedance_probability"]
-    chances = probability.values
-    shape = (*chances.shape[:-2], chances.shape[-1])
-    rates = {name: np.full(shape, np.nan) for name in HAZARD_RESULTS if name != "valueless_share"}
-    for index in np.ndindex(chances.shape[:-2]):
-        there = np.isfinite(chances[index][:, 0])
-        if np.count_nonzero(there) < 2:
-            continue
-        own = chances[index][there]
+    names = [name for name in HAZARD_RESULTS if name != "valueless_share"]
+
+    def rates_of(chances: Floats) -> Floats:
+        """The rates of a grid point, (rate, threshold), from its probabilities, (amplitude, threshold)."""
+        there = np.isfinite(chances[:, 0])
+        own = chances[there]
+        if len(own) < 2:
+            return np.full((len(names), chances.shape[1]), np.nan)
         if len(own) == 2 and (own[0] != own[1]).any():
             raise InputError(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
-        for name, values in exceedance_rates(curve, amplitude[there], own).items():
-            rates[name][index] = values
-    if np.isnan(rates["annual_rate"]).all():
+        rates = exceedance_rates(curve, amplitude[there], own)
+        return np.stack([rates[name] for name in names])
+
+    rates = xr.apply_ufunc(
+        rates_of, found["exceedance_probability"].variable, vectorize=True,
+        input_core_dims=[["amplitude", "threshold"]], output_core_dims=[["rate", "threshold"]],
+    )  # fmt: skip
+    if rates[{"rate": 0}].isnull().all():
         raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
-    dims = [dim for dim in probability.dims if dim != "amplitude"]
-    results = {name: xr.Variable(dims, values, HAZARD_RESULTS[name]) for name, values in rates.items()}
-    valueless = found["valueless_share"].max("amplitude").variable
-    valueless.attrs = HAZARD_RESULTS["valueless_share"]
+    results = {name: rates[{"rate": at}] for at, name in enumerate(names)}
+    results["valueless_share"] = found["valueless_share"].max("amplitude").variable
+    for name, one in results.items():
+        one.attrs = HAZARD_RESULTS[name]
     coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}
+    found.attrs.pop("zero_displacement", None)
     attrs = {
-        **{name: value for name, value in found.attrs.items() if name != "zero_displacement"},
+        **found.attrs,
         "title": TITLE,
         "hazard_curve": curve.name,
         **curve.attrs,
         "hazard_curve_range": curve.amplitude[[0, -1]],
         "amplitude_range": amplitude[[0, -1]],
     }
-    return xr.Dataset({**results, "valueless_share": valueless}, coords, attrs)
+    return xr.Dataset(results, coords, attrs)

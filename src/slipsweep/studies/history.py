@@ -4,8 +4,6 @@ import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from slipsweep.kernels import history as kernels
 from slipsweep.kernels.block import Cell
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion import cutting, pieces
+from slipsweep.motion import cutting
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
@@ -145,51 +143,35 @@ def simulate(
     return found.assign_attrs(title="Time history of a rigid block")
 
 
-@dataclass(frozen=True)
 class _History:
     """One case, its results as a sweep gives them, and its history.
 
     Phases are ωt; under a record the times at time scale 1 take their place.
     """
 
-    problem: problems.Problem
-    inputs: Mapping[str, Floats]
-    summary: xr.Dataset
-
-    @cached_property
-    def cell(self) -> Cell:
-        """The case as kernels take it."""
-        given = engine.cell_inputs(self.problem, self.inputs)
-        return Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
-
-    @cached_property
-    def wave(self) -> pieces.Wave:
-        """The motion of the base as a table of pieces."""
-        motion = self.problem.excitation
+    def __init__(self, problem: problems.Problem, inputs: Mapping[str, Floats], summary: xr.Dataset) -> None:
+        self.problem, self.inputs, self.summary = problem, inputs, summary
+        given, motion = engine.cell_inputs(problem, inputs), problem.excitation
+        self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
         if isinstance(motion, Record):
-            return cutting.wave_of_record(motion, float(self.inputs["polarity"]))
-        assert isinstance(motion, Waveform)
-        return cutting.wave_of(motion)
-
-    @property
-    def unit(self) -> float:
-        """Seconds that a phase takes: 1/ω, or the factor on the time of a record."""
-        return float(engine.phase_seconds(self.problem, self.inputs))
-
-    @property
-    def _valueless(self) -> bool:
-        return bool(int(self.summary["validity"]) & variables.VALUELESS)
+            self.wave = cutting.wave_of_record(motion, float(inputs["polarity"]))
+        else:
+            assert isinstance(motion, Waveform)
+            self.wave = cutting.wave_of(motion)
+        #: Seconds that a phase takes: 1/ω, or the factor on the time of a record.
+        self.unit = float(engine.phase_seconds(problem, inputs))
+        self.valueless = bool(int(summary["validity"]) & variables.VALUELESS)
 
     def sampled(self, phases: Floats) -> Floats:
-        """The columns of `HISTORY` at phases, velocity and displacement in units of phase."""
-        motion, table = self.problem.excitation, np.empty((len(HISTORY), phases.size))
-        kernel = kernels.record_history if isinstance(motion, Record) else kernels.wave_history
+        """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
+        is_recorded, table = isinstance(self.problem.excitation, Record), np.empty((len(HISTORY), phases.size))
+        kernel = kernels.record_history if is_recorded else kernels.wave_history
         workspace = exact.workspace_of(self.wave, keeps_log=True)
         chosen = solvers.options_of(self.problem, wants_peak=True)
         _interruptible(kernel, self.cell, chosen, self.wave, workspace, phases, kernels.History(*table))
-        if self._valueless:  # from the beginning on, also where the flag is raised later
+        if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
-        return table.T
+        return table
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """The variables of a history."""
@@ -197,12 +179,12 @@ class _History:
         # Eq. 1 needs θ and μs
         known = {name: at for at, name in enumerate(HISTORY) if name != "friction_coefficient" or "mu_s" in self.inputs}
         with np.errstate(over="ignore"):
-            table[:, 3] *= self.unit
-            table[:, 4] *= self.unit * self.unit
-        if not self._valueless and not np.isfinite(table[:, list(known.values())]).all():
+            table[3] *= self.unit
+            table[4] *= self.unit * self.unit
+        if not self.valueless and not np.isfinite(table[[*known.values()]]).all():
             given = ", ".join(f"{name} = {parameters.number_text(float(one))}" for name, one in self.inputs.items())
             raise InputError(f"{given}: the history is then no finite number in double precision; must be nearer to 1")
-        return {name: xr.Variable(("time",), table[:, at].copy(), HISTORY[name]) for name, at in known.items()}
+        return {name: xr.Variable(("time",), table[at].copy(), HISTORY[name]) for name, at in known.items()}
 
     def half_waves(self) -> dict[str, xr.Variable]:
         """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
@@ -214,7 +196,7 @@ class _History:
         given = {**{name: np.atleast_1d(values) for name, values in self.inputs.items()}, "amplitude": peak}
         request = engine.Request(self.problem, peak.shape, given, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"]
-        if self._valueless:
+        if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
         first, after = self.wave.interval.T
         found = {
@@ -240,7 +222,12 @@ class _History:
         advice = "take fewer cycles or points_per_cycle, or give times"
         resources.check_memory(f"a history of {count + most:.4g} points", needed, advice)
         shaken = motion.times if isinstance(motion, Record) else step * np.arange(count, dtype=np.float64)
-        after = self._runs_on(float(shaken[-1]))
+        after, is_wave = 0.0, isinstance(motion, Waveform)
+        if not self.valueless and not (is_wave and self.summary["sliding_mode"] != variables.SlidingMode.STICK_SLIP):
+            ground, block, _, velocity, _ = self.sampled(shaken[-1:])[:, 0]
+            # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
+            with np.errstate(divide="ignore", over="ignore"):
+                after = float(velocity / (block - ground)) if velocity != 0.0 else 0.0
         if not math.isfinite(after):
             raise InputError(
                 "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
@@ -251,16 +238,6 @@ class _History:
         # a hair further than the end, which is rounded
         rest = np.linspace(0.0, max(after * (1.0 + 1e-12), beyond * step), beyond + 1)[1:]
         return np.concatenate([shaken, shaken[-1] + rest])
-
-    def _runs_on(self, end: float) -> float:
-        """How long the block slides on after the `end` of the shaking."""
-        is_wave = isinstance(self.problem.excitation, Waveform)
-        if self._valueless or (is_wave and self.summary["sliding_mode"] != variables.SlidingMode.STICK_SLIP):
-            return 0.0
-        ground, block, _, velocity, _ = self.sampled(np.array([end]))[0]
-        # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
-        with np.errstate(divide="ignore", over="ignore"):
-            return float(velocity / (block - ground)) if velocity != 0.0 else 0.0
 
 
 def _interruptible(kernel: Callable[..., None], *args: Any) -> None:

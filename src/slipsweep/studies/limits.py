@@ -9,8 +9,8 @@ solved together, by the cycle solver.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,10 +24,7 @@ from slipsweep.grid.chunks import slabs
 from slipsweep.grid.engine import Arrays, Request
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_sweep
-from slipsweep.grid.problem import Problem
-from slipsweep.model import parameters, variables
-from slipsweep.model.options import Model, Newmark
-from slipsweep.model.units import quantity
+from slipsweep.model import options, parameters, units, variables
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
@@ -36,6 +33,9 @@ from slipsweep.studies.datasets import Values
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+#: Whether something has changed at amplitudes, for intervals by their indices.
+Changed = Callable[[Floats, Indices], NDArray[np.bool_]]
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
 
@@ -64,8 +64,8 @@ _ROUNDING = 1e-15
 #: Pulses of a record whose changes of mode a scan includes: noise has thousands.
 _MOST_PULSES = 128
 
-#: Inputs that only scale the result, or only flag it.
-_SCALES = ("frequency", "time_scale", "structure_frequency")
+#: Inputs on which no scan depends: those that only scale its result, or only flag it, and the target.
+_AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
 
 
 @datasets.naming_choices
@@ -77,7 +77,7 @@ def limit_amplitude(
     *,
     phi: Values | None = None,
     excitation: datasets.Excitation = "sine",
-    model: Model | str = "mendez",
+    model: options.Model | str = "mendez",
     time_scale: Values | None = None,
     polarity: datasets.Signs | None = None,
     azimuth: Values | None = None,
@@ -157,13 +157,9 @@ def limit_amplitude(
         structure_frequency=structure_frequency,
     )  # fmt: skip
     plan = plan_limits(
-        displacement,
-        inputs,
-        excitation=excitation,
-        model=model,
-        maximum_amplitude=maximum_amplitude,
-        amplitude_steps=amplitude_steps,
-    )
+        displacement, inputs, excitation=excitation, model=model,
+        maximum_amplitude=maximum_amplitude, amplitude_steps=amplitude_steps,
+    )  # fmt: skip
     return plan.solve(progress).assign_coords(datasets.brought_coordinates(inputs, plan.coords, plan.names))
 
 
@@ -179,7 +175,7 @@ def plan_limits(
     """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
 
     def in_m(given: Any) -> Any:
-        return quantity("displacement", given, "m", math.nan) if isinstance(given, str) else given
+        return units.quantity("displacement", given, "m", math.nan) if isinstance(given, str) else given
 
     displacement = [in_m(one) for one in displacement] if isinstance(displacement, list) else in_m(displacement)
     values = parameters.check_values("displacement", displacement)
@@ -200,7 +196,7 @@ def plan_limits(
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
     arrays = dict(task.inputs)
     arrays["displacement"] = arrays.pop("amplitude")
-    blocks = np.broadcast_shapes(*(one.shape for one in _block_inputs(arrays).values()))
+    blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in _AFTER_SCAN))
     scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
     # in which mode a block slides, or in how many pulses of a record
     codes = variables.RECORD_COUNTS if "time_scale" in arrays else ("sliding_mode",)
@@ -226,20 +222,19 @@ def _solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
     results = request.results()
     for where, motion in engine.motions(request):
         # two thresholds of a pulse, and two sides of each, in addition to the steps
-        changes = 4 * _heights(motion).size
-        for slab in slabs(motion.shape, max(1, SCANNED // (steps + changes))):
+        scanned = steps + 4 * _heights(motion).size
+        for slab in slabs(motion.shape, max(1, SCANNED // scanned)):
             part = motion.part(slab)
-            solved = _solve_part(part, maximum_amplitude, steps)
-            for name, values in results.items():
-                own: Any = values[(*where, ...)]  # type: ignore[arg-type]
-                own[(*slab, ...)] = solved[name]
+            for name, values in _solve_part(part, maximum_amplitude, steps).items():
+                own: Any = results[name][(*where, ...)]  # type: ignore[arg-type]
+                own[(*slab, ...)] = values
             request.count(math.prod(part.shape))
     return results
 
 
 def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Arrays:
     """Limit amplitudes of a part of a grid that one motion shakes."""
-    scan = _scan(request, maximum_amplitude, steps)
+    scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
     wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
     before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
@@ -253,21 +248,16 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     for name, values in after.items():
         results[name][cell] = values
     results["limit_amplitude"][cell] = high
-    results["limit_status"][cell] = _status(before, after)
-    return {name: values.reshape(request.shape) for name, values in results.items()}
-
-
-def _status(before: Mapping[str, NDArray[Any]], after: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
-    """What the displacement does at a limit, from the last amplitude below it and from the limit itself."""
     below, above = before["permanent_displacement"], after["permanent_displacement"]
     jumps = above - below > JUMP * above
     modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
-    status = np.full(above.shape, LimitStatus.REACHED, np.int8)
-    status[jumps] = LimitStatus.AT_JUMP
-    status[jumps & other_mode] = LimitStatus.AT_MODE_JUMP
-    status[np.isnan(below)] = LimitStatus.AFTER_GAP
-    return status
+    results["limit_status"][cell] = np.select(
+        [np.isnan(below), jumps & other_mode, jumps],
+        [LimitStatus.AFTER_GAP, LimitStatus.AT_MODE_JUMP, LimitStatus.AT_JUMP],
+        LimitStatus.REACHED,
+    )
+    return {name: values.reshape(request.shape) for name, values in results.items()}
 
 
 class Steps(NamedTuple):
@@ -278,27 +268,30 @@ class Steps(NamedTuple):
     high: Floats
 
 
-@dataclass(frozen=True)
 class Scan:
-    """Cells at increasing amplitudes.
+    """Cells that one motion shakes, at increasing amplitudes: those of a part of a grid."""
 
-    Attributes
-    ----------
-    problem : Problem
-    arrays : mapping of str to array
-        Inputs but for the amplitude: one value for each cell, or one for all.
-    targets : array, (cell,)
-        Displacement to be reached, m.
-    amplitudes : array, (cell, amplitude)
-    found : mapping of str to array, (cell, amplitude)
-        `permanent_displacement`, `validity` and, under a record, `number_of_slips`.
-    """
-
-    problem: Problem
-    arrays: Mapping[str, Floats]
-    targets: Floats
-    amplitudes: Floats
-    found: Mapping[str, NDArray[Any]]
+    def __init__(self, request: Request, maximum_amplitude: float, steps: int) -> None:
+        self.problem, arrays = request.problem, dict(request.arrays)
+        displacement = arrays.pop("displacement")
+        amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
+        # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
+        every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
+        lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
+        slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
+        wanted = ("permanent_displacement", "validity", *slips)
+        found = {**engine.solve(Request(self.problem, lengths, every, wanted)), "amplitude": amplitudes}
+        full = (*request.shape, lengths[-1])
+        #: Results and amplitudes, (cell, amplitude).
+        self.found = {name: np.broadcast_to(values, full).reshape(-1, full[-1]) for name, values in found.items()}
+        self.amplitudes = self.found["amplitude"]
+        #: Displacements to be reached, (cell,).
+        self.targets = np.broadcast_to(displacement, request.shape).ravel()
+        #: Inputs but for the amplitude: one value for each cell, or one for all.
+        self.arrays = {
+            name: (values if values.size == 1 else np.broadcast_to(values, request.shape)).ravel()
+            for name, values in arrays.items()
+        }
 
     def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> Arrays:
         """Results of some cells, each at its own amplitudes (rows of the array)."""
@@ -315,47 +308,22 @@ class Scan:
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
 
-def _scan(request: Request, maximum_amplitude: float, steps: int) -> Scan:
-    """The cells of a part of a grid at the amplitudes of the scan."""
-    problem, arrays = request.problem, dict(request.arrays)
-    displacement = arrays.pop("displacement")
-    amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
-    # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
-    every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
-    lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
-    slips = ("number_of_slips",) if isinstance(problem.excitation, Record) else ()
-    found = engine.solve(Request(problem, lengths, every, ("permanent_displacement", "validity", *slips)))
-
-    def in_rows(values: NDArray[Any]) -> NDArray[Any]:
-        return np.broadcast_to(values, (*request.shape, lengths[-1])).reshape(-1, lengths[-1])
-
-    def in_cells(values: NDArray[Any]) -> NDArray[Any]:
-        return values.ravel() if values.size == 1 else np.broadcast_to(values, request.shape).ravel()
-
-    return Scan(
-        problem,
-        {name: in_cells(values) for name, values in arrays.items()},
-        np.broadcast_to(displacement, request.shape).ravel(),
-        in_rows(amplitudes),
-        {name: in_rows(values) for name, values in found.items()},
-    )
-
-
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> Floats:
     """Amplitudes to try, increasing along the last dimension, with both sides of every change of mode.
 
     The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
     """
     problem = request.problem
-    blocks = _block_inputs(request.arrays)
+    blocks = {name: values for name, values in request.arrays.items() if name not in _AFTER_SCAN}
     shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
-    limited = ("limiting_acceleration",) if not isinstance(problem.model, Newmark) else ()
-    rest = np.zeros((1,) * len(shape))
+    limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
     wanted = ("yield_acceleration", *limited)
-    found = engine.friction_parameters(Request(problem, shape, {**blocks, "amplitude": rest}, wanted))
-    known = {name: values.reshape(-1, 1) for name, values in found.items()}
-    yields = known["yield_acceleration"]
+    blocks["amplitude"] = np.zeros((1,) * len(shape))
+    found = engine.friction_parameters(Request(problem, shape, blocks, wanted))
+    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
+    thresholds = np.stack([found[name].ravel() for name in wanted], axis=1)
+    yields = thresholds[:, :1]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
     with np.errstate(over="ignore"):
@@ -363,19 +331,12 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     amplitudes = start * ratio ** np.linspace(0.0, 1.0, steps + 1)
     amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
-    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
-    thresholds = np.hstack([known[name] for name in wanted])
     with np.errstate(over="ignore", invalid="ignore"):
         places = (thresholds[:, :, None] / _heights(request)).reshape(len(thresholds), -1)
         changes = np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
     scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
     return scanned.reshape(*shape, -1)
-
-
-def _block_inputs(arrays: Mapping[str, Floats]) -> Arrays:
-    """The inputs on which a scan depends: neither those that only scale its result, nor the target."""
-    return {name: one for name, one in arrays.items() if name not in (*_SCALES, "displacement")}
 
 
 def _heights(request: Request) -> Floats:
@@ -455,15 +416,10 @@ def _at_change(
     return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
 
 
-def _bisected(
-    low: Floats,
-    high: Floats,
-    changed: Callable[[Floats, Indices], NDArray[np.bool_]],
-    width: Floats | float = 0.0,
-) -> tuple[Floats, Floats]:
+def _bisected(low: Floats, high: Floats, changed: Changed, width: Floats | float = 0.0) -> tuple[Floats, Floats]:
     """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
 
-    ``changed(amplitudes, which)``, for intervals by their indices, holds at `high` and not at `low`.
+    `changed` holds at `high` and not at `low`.
     """
     low, high = low.copy(), high.copy()
     active, width = np.arange(low.size), np.broadcast_to(width, low.shape)

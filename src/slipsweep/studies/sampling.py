@@ -54,32 +54,21 @@ ENDS = (0.025, 0.975)
 #: Most parts that a bootstrap resamples: of more samples, neighbours are resampled together.
 _PARTS = 1024
 
+#: Bytes that the bootstrap of a grid point takes.
+SOBOL_MEMORY = 8 * RESAMPLES * _PARTS
+
 #: Displacements that differ by less, relative to the largest, differ by rounding.
 _SAME = 1e-12
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """What an uncertain parameter is drawn from.
+    """What an uncertain parameter is drawn from."""
 
-    Attributes
-    ----------
-    parameter : str
-    kind : {"absolute", "factor", "offset"}
-        Whether a draw is the value, multiplies the grid point's, or is added to it.
-    frozen : object
-        A frozen distribution of scipy.stats, or anything else with a ``ppf``.
-    unit : float
-        What to multiply draws by, to have them in the parameter's own unit.
-    about : dict
-        The distribution in words and numbers, as it was given.
-    """
-
-    parameter: str
-    kind: str
-    frozen: Any
-    unit: float
-    about: dict[str, Any]
+    kind: str  # whether a draw is the value ("absolute"), multiplies the grid point's, or is added to it
+    frozen: Any  # a frozen distribution of scipy.stats, or anything else with a ``ppf``
+    unit: float  # what to multiply draws by, to have them in the parameter's own unit
+    about: dict[str, Any]  # the distribution in words and numbers, as it was given
 
     def __str__(self) -> str:
         numbers = [f"{name}={value}" for name, value in self.about.items() if name not in ("distribution", "kind")]
@@ -98,108 +87,108 @@ class Distribution:
             return base * draws if self.kind == "factor" else base + draws
 
 
-@dataclass(frozen=True)
 class Sampling:
-    """How inputs are sampled and which statistics are wanted, checked.
+    """How inputs are sampled and which statistics are wanted: the arguments of `slipsweep.sample`, checked.
 
-    Attributes
-    ----------
-    distributions : dict of str to Distribution
-    samples : int
-    method : str
-    seed : int
-    quantiles, thresholds : ndarray
-    correlation : tuple of (str, str, float)
-        Correlations of normal scores, by pairs of parameters.
-    sensitivity : bool
-        Whether Sobol indices are wanted.
-    over : tuple of str
-        Dimensions of the grid whose values are equally likely draws.
-    keys : str
-        What stands before the names of these options in errors.
+    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.  InputError: the
+    first thing that is not allowed.
     """
 
-    distributions: dict[str, Distribution]
-    samples: int
-    method: str
-    seed: int
-    quantiles: Floats
-    thresholds: Floats
-    correlation: tuple[tuple[str, str, float], ...]
-    sensitivity: bool
-    over: tuple[str, ...]
-    keys: str
+    def __init__(
+        self,
+        uncertain: Any,
+        *,
+        samples: Any,
+        method: Any,
+        seed: Any,
+        quantiles: Any,
+        thresholds: Any,
+        correlation: Any,
+        g: float,
+        sensitivity: Any = False,
+        over: Any = (),
+        keys: str = "",
+    ) -> None:
+        from scipy.sparse.csgraph import connected_components
 
-    @property
-    def absolute(self) -> tuple[str, ...]:
-        """Parameters whose draws are their values."""
-        return tuple(name for name, one in self.distributions.items() if one.kind == "absolute")
+        self.keys = keys
+        if not isinstance(uncertain, Mapping) or not uncertain:
+            raise InputError(
+                f"{self.key('').removesuffix('.')}: must give the distribution of one parameter at least: "
+                f"{', '.join(DRAWN)}"
+            )
+        for name in uncertain:
+            if name not in DRAWN:
+                raise InputError(f"{self.key(name)}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
+        # in one order, whatever that of the caller: the draws are then the same
+        names = [name for name in DRAWN if name in uncertain]
+        self.distributions = {name: _distribution(self.key(name), name, uncertain[name], g) for name in names}
+        self.method = check_choice(f"{keys}method", method, METHODS)
+        self.samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
+        if method == "sobol" and self.samples & (self.samples - 1):
+            below = 1 << (self.samples.bit_length() - 1)
+            raise InputError(
+                f'{keys}samples = {self.samples}: must be a power of 2 with method = "sobol", such as {below} or '
+                f"{2 * below}; latin_hypercube takes any number"
+            )
+        if not isinstance(sensitivity, (bool, np.bool_)):
+            raise InputError(f"{keys}sensitivity = {shown(sensitivity)}: must be true or false")
+        self.sensitivity = bool(sensitivity)
+        pooled = [over] if isinstance(over, str) else check_list(f"{keys}over", over, "dimensions")
+        if pooled and sensitivity:
+            raise InputError(f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only")
+        self.over = tuple(map(str, pooled))
+        self.seed = check_whole(f"{keys}seed", seed, 0, _MOST_SEED)
+        self.quantiles = check_increasing(f"{keys}quantiles", quantiles, "quantile")
+        self.thresholds = check_thresholds(f"{keys}thresholds", thresholds, g)
+        self.correlation = _pairs(f"{keys}correlation", correlation, names)
+        #: Correlations of the normal scores of all parameters.
+        self.matrix = np.eye(len(names))
+        for first, second, value in self.correlation:
+            i, j = names.index(first), names.index(second)
+            self.matrix[i, j] = self.matrix[j, i] = value
+        if np.linalg.eigvalsh(self.matrix).min() < 1e-12:
+            raise InputError(f"{keys}correlation: no such correlations exist together (their matrix is not positive)")
+        number, group = connected_components(self.matrix, directed=False)
+        #: The parameters, those that are correlated with one another together.
+        self.independent = tuple(tuple(np.array(names)[group == k].tolist()) for k in range(number))
+        #: Runs of a grid point: the samples, or all that its Sobol indices take.
+        self.runs = self.samples * (number + 2 if sensitivity else 1)
+        if self.runs > MOST_SAMPLES:
+            raise InputError(
+                f"{keys}samples = {self.samples}: Sobol indices take {self.runs} runs a grid point with these; "
+                f"must be {MOST_SAMPLES} at most"
+            )
 
-    def key(self, parameter: str) -> str:
+    def key(self, parameter: Any) -> str:
         """What a distribution is called in errors."""
         return f"{self.keys or 'uncertain.'}{parameter}"
 
-    @property
-    def matrix(self) -> Floats:
-        """Correlations of all parameters."""
-        names = list(self.distributions)
-        matrix = np.eye(len(names))
-        for first, second, value in self.correlation:
-            i, j = names.index(first), names.index(second)
-            matrix[i, j] = matrix[j, i] = value
-        return matrix
-
-    @property
-    def independent(self) -> tuple[tuple[str, ...], ...]:
-        """The parameters, those that are correlated with one another together, in the order of `distributions`."""
-        from scipy.sparse.csgraph import connected_components
-
-        number, group = connected_components(self.matrix, directed=False)
-        names = [*self.distributions]
-        return tuple(tuple(name for name, own in zip(names, group, strict=True) if own == k) for k in range(number))
-
-    @property
-    def runs(self) -> int:
-        """Runs of a grid point: the samples, or all that its Sobol indices take."""
-        return self.samples * (len(self.independent) + 2 if self.sensitivity else 1)
-
+    @functools.cached_property
     def draws(self) -> dict[str, Floats]:
         """Draws of each parameter for all runs: A; for Sobol indices also B, and A with each input from B."""
-        number = len(self.distributions)
-        if not self.sensitivity:
-            return self._drawn(self._uniform(number))
-        uniform = self._uniform(2 * number)
-        first, second = self._drawn(uniform[:number]), self._drawn(uniform[number:])
-        return {
-            name: np.concatenate(
-                [first[name], second[name], *((second if name in one else first)[name] for one in self.independent)]
-            )
-            for name in first
-        }
+        from scipy.stats import norm, qmc
 
-    def _uniform(self, dimensions: int) -> Floats:
-        """Numbers from 0 to 1 that fill a cube of so many dimensions: (dimension, sample)."""
-        from scipy.stats import qmc
-
+        sets, number = 2 if self.sensitivity else 1, len(self.distributions)
         # a generator of its own: the numbers depend only on the seed
         generator = np.random.default_rng(self.seed)
         if self.method == "random":
-            uniform = generator.random((self.samples, dimensions))
+            uniform = generator.random((self.samples, sets * number))
         else:
             engines = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}
-            uniform = engines[self.method](dimensions, rng=generator).random(self.samples)
-        return np.maximum(uniform.T, _LEAST)
-
-    def _drawn(self, uniform: Floats) -> dict[str, Floats]:
-        """Turn a row of numbers from 0 to 1 for each parameter into draws."""
-        from scipy.stats import norm
-
+            uniform = engines[self.method](sets * number, rng=generator).random(self.samples)
+        uniform = np.maximum(uniform.T, _LEAST).reshape(sets, number, -1)
         if self.correlation:
             uniform = norm.cdf(np.linalg.cholesky(self.matrix) @ norm.ppf(uniform))
             uniform = np.clip(uniform, _LEAST, 1.0 - 2.0**-53)
-        return {name: one.draws(row) for (name, one), row in zip(self.distributions.items(), uniform, strict=True)}
+        drawn = {}
+        for at, (name, one) in enumerate(self.distributions.items()):
+            first, *others = (one.draws(row) for row in uniform[:, at])
+            mixed = [second if name in group else first for second in others for group in self.independent]
+            drawn[name] = np.concatenate([first, *others, *mixed])
+        return drawn
 
-    def check_draws(self, draws: Mapping[str, Floats], coords: Mapping[str, xr.Variable]) -> None:
+    def check_draws(self, coords: Mapping[str, xr.Variable]) -> None:
         """Refuse draws that no physics allows, anywhere on a grid of these coordinates."""
         for name, one in self.distributions.items():
             bound = parameters.BOUNDS[name]
@@ -208,18 +197,13 @@ class Sampling:
             bases = [1.0 if one.kind == "factor" else 0.0]
             if name in coords:
                 bases = [float(coords[name].values.min()), float(coords[name].values.max())]
-            outside, base = max((float(np.mean(~bound.holds(one.applied(at, draws[name])))), at) for at in bases)
+            outside, base = max((float(np.mean(~bound.holds(one.applied(at, self.draws[name])))), at) for at in bases)
             if outside:
                 about = f" as {one.kind} on {name} = {base:.6g}" if name in coords else ""
                 raise InputError(
                     f"{self.key(name)} = {one}{about}: {outside:.2%} of the draws are not {bound.text}: "
                     "take a distribution that has none there, such as lognorm, or truncate it (truncnorm)"
                 )
-
-    @property
-    def memory(self) -> int:
-        """Bytes that the Sobol indices of a grid point take."""
-        return 8 * RESAMPLES * _PARTS + 64 * self.runs if self.sensitivity else 0
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -239,76 +223,10 @@ class Sampling:
         return found
 
 
-def check_sampling(
-    uncertain: Any,
-    *,
-    samples: Any,
-    method: Any,
-    seed: Any,
-    quantiles: Any,
-    thresholds: Any,
-    correlation: Any,
-    g: float,
-    sensitivity: Any = False,
-    over: Any = (),
-    keys: str = "",
-) -> Sampling:
-    """Check what is uncertain and how it is sampled: the arguments of `slipsweep.sample`.
-
-    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.
-
-    Raises
-    ------
-    InputError
-        The first thing that is not allowed.
-    """
-    before = keys or "uncertain."
-    if not isinstance(uncertain, Mapping) or not uncertain:
-        raise InputError(
-            f"{before.removesuffix('.')}: must give the distribution of one parameter at least: {', '.join(DRAWN)}"
-        )
-    for name in uncertain:
-        if name not in DRAWN:
-            raise InputError(f"{before}{name}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
-    # in one order, whatever that of the caller: the draws are then the same
-    drawn = {name: _distribution(f"{before}{name}", name, uncertain[name], g) for name in DRAWN if name in uncertain}
-    method = check_choice(f"{keys}method", method, METHODS)
-    samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
-    if method == "sobol" and samples & (samples - 1):
-        below = 1 << (samples.bit_length() - 1)
-        raise InputError(
-            f'{keys}samples = {samples}: must be a power of 2 with method = "sobol", such as {below} or {2 * below}; '
-            "latin_hypercube takes any number"
-        )
-    if not isinstance(sensitivity, (bool, np.bool_)):
-        raise InputError(f"{keys}sensitivity = {shown(sensitivity)}: must be true or false")
-    pooled = [over] if isinstance(over, str) else check_list(f"{keys}over", over, "dimensions")
-    if pooled and sensitivity:
-        raise InputError(f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only")
-    sampling = Sampling(
-        distributions=drawn,
-        samples=samples,
-        method=method,
-        seed=check_whole(f"{keys}seed", seed, 0, _MOST_SEED),
-        quantiles=check_quantiles(f"{keys}quantiles", quantiles),
-        thresholds=check_thresholds(f"{keys}thresholds", thresholds, g),
-        correlation=_pairs(f"{keys}correlation", correlation, drawn),
-        sensitivity=bool(sensitivity),
-        over=tuple(map(str, pooled)),
-        keys=keys,
-    )
-    if np.linalg.eigvalsh(sampling.matrix).min() < 1e-12:
-        raise InputError(f"{keys}correlation: no such correlations exist together (their matrix is not positive)")
-    if sampling.runs > MOST_SAMPLES:
-        raise InputError(
-            f"{keys}samples = {samples}: Sobol indices take {sampling.runs} runs a grid point with these; "
-            f"must be {MOST_SAMPLES} at most"
-        )
-    return sampling
-
-
 def _distribution(key: str, parameter: str, given: Any, g: float) -> Distribution:
     """One entry of `uncertain`, called `key` in errors."""
+    from scipy import stats
+
     entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
     chosen = entries.pop("distribution", None)
     kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
@@ -318,7 +236,18 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
             f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to {own}"
         )
     if isinstance(chosen, str):
-        frozen = _frozen(key, chosen, entries)
+        family = getattr(stats, chosen, None)
+        if not isinstance(family, stats.rv_continuous):
+            raise InputError(
+                f'{key}.distribution = "{chosen}": must be a continuous one of scipy.stats, such as {_USUAL}'
+            )
+        allowed = _arguments(family)
+        if not {*allowed[:-2]} <= {*entries} <= {*allowed}:
+            raise InputError(
+                f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes {', '.join(allowed)}, "
+                "of which loc and scale may be left out (and the keys kind and units)"
+            )
+        frozen = family(**{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()})
     elif callable(getattr(chosen, "ppf", None)) and not entries:
         frozen = chosen
     else:
@@ -336,23 +265,7 @@ def _distribution(key: str, parameter: str, given: Any, g: float) -> Distributio
         raise InputError(f"{key}: parameters that scipy.stats does not allow for one distribution: {about}")
     factor = conversion(f"{key}.units", own, units, g)
     about |= {"units": units, "kind": kind} if units is not None else {"kind": kind}
-    return Distribution(parameter, kind, frozen, factor, about)
-
-
-def _frozen(key: str, name: str, given: Mapping[str, Any]) -> Any:
-    """A distribution of scipy.stats with its parameters."""
-    from scipy import stats
-
-    family = getattr(stats, name, None)
-    if not isinstance(family, stats.rv_continuous):
-        raise InputError(f'{key}.distribution = "{name}": must be a continuous one of scipy.stats, such as {_USUAL}')
-    allowed = _arguments(family)
-    if not {*allowed[:-2]} <= {*given} <= {*allowed}:
-        raise InputError(
-            f"{key}: has {', '.join(map(str, given)) or 'no parameters'}: {name} takes {', '.join(allowed)}, of which "
-            "loc and scale may be left out (and the keys kind and units)"
-        )
-    return family(**{parameter: check_finite(f"{key}.{parameter}", value) for parameter, value in given.items()})
+    return Distribution(kind, frozen, factor, about)
 
 
 def _arguments(family: Any) -> tuple[str, ...]:
@@ -360,20 +273,15 @@ def _arguments(family: Any) -> tuple[str, ...]:
     return (*(family.shapes or "").replace(",", " ").split(), "loc", "scale")
 
 
-def check_quantiles(key: str, given: Any) -> Floats:
-    """Quantiles, one at least, as an increasing coordinate."""
-    return _increasing(key, given, "quantile")
-
-
 def check_thresholds(key: str, given: Any, g: float) -> Floats:
     """Displacements, m or with a unit, one at least, as an increasing coordinate."""
     entries = np.atleast_1d(np.asarray(parameters.computed(given), object)).tolist()
     values = [quantity(key, one, "m", g) if isinstance(one, str) else one for one in entries]
-    return _increasing(key, values, "threshold")
+    return check_increasing(key, values, "threshold")
 
 
-def _increasing(key: str, given: Any, bound: str) -> Floats:
-    """A list of numbers, one at least, as an increasing coordinate."""
+def check_increasing(key: str, given: Any, bound: str) -> Floats:
+    """Numbers within the bounds of a parameter, one at least, as an increasing coordinate."""
     values = np.atleast_1d(parameters.check_values(bound, given, key))
     if values.ndim > 1 or not values.size:
         raise InputError(f"{key} = {shown(given)}: must be a list of one number or more")
@@ -383,7 +291,7 @@ def _increasing(key: str, given: Any, bound: str) -> Floats:
     return values
 
 
-def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tuple[str, str, float], ...]:
+def _pairs(key: str, given: Any, known: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
     """Correlations: pairs of drawn parameters with a number between -1 and 1."""
     pairs: dict[frozenset[str], tuple[str, str, float]] = {}
     for entry in check_list(key, given, '["NAME", "OTHER", NUMBER]'):
@@ -401,25 +309,13 @@ def _pairs(key: str, given: Any, known: Mapping[str, Distribution]) -> tuple[tup
 
 
 def sobol_indices(sampling: Sampling, displacement: Floats) -> dict[str, NDArray[Any]]:
-    """Sobol indices of grid points, their intervals and their status.
+    """Sobol indices, their intervals and their status, from displacements (point, run) of the runs of `Sampling.draws`.
 
-    Parameters
-    ----------
-    sampling : Sampling
-    displacement : array, (point, run)
-        Of the runs of `Sampling.draws`.  The indices do not depend on the frequency, as u = W/ω².
-
-    Returns
-    -------
-    dict of str to array
-        `first_order_index`, `first_order_interval`, `total_index`, `total_interval` and `sensitivity_status`; the first
-        dimension is that of the grid points.  NaN where the status says why.
+    The first dimension is that of the grid points.  They do not depend on the frequency, as u = W/ω².
     """
-    inputs = len(sampling.independent)
-    runs = displacement.reshape(-1, inputs + 2, sampling.samples)
+    runs = displacement.reshape(-1, len(sampling.independent) + 2, sampling.samples)
     status, values = zip(*(_of_point(one, sampling.seed) for one in runs), strict=True)
-    # (point, index and ends of its interval, kind, input)
-    found = np.stack(values)
+    found = np.stack(values)  # (point, index and ends of its interval, kind, input)
     return {
         "first_order_index": found[:, 0, 0],
         "first_order_interval": found[:, 1:, 0],

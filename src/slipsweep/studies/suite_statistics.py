@@ -12,7 +12,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
 from slipsweep.model.parameters import check_list, number_text, shown
 from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
-from slipsweep.studies.sampling import Thresholds, check_quantiles, check_thresholds
+from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
 
 TITLE = "Statistics of the permanent displacement over a suite of motions"
 
@@ -106,7 +106,7 @@ def suite_statistics(
             raise InputError(f"result: {name}: missing: must be there, of all motions")
     dims = suite_dims(result["permanent_displacement"], over)
     g = float(result.attrs.get("g", np.nan))
-    limits, wanted = check_thresholds("thresholds", thresholds, g), check_quantiles("quantiles", quantiles)
+    limits, wanted = check_thresholds("thresholds", thresholds, g), check_increasing("quantiles", quantiles, "quantile")
     least = check_thresholds("zero", zero, g)
     if least.size > 1:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
@@ -117,8 +117,9 @@ def suite_statistics(
     there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
     bits = np.array(REASONS, np.int16)
     about = {"flag_values": bits.tolist(), "flag_meanings": " ".join((flag.name or "").lower() for flag in REASONS)}
-    flag = xr.DataArray(bits, dims="flag", attrs={**STATISTIC_COORDINATES["flag"], **about})
-    threshold = xr.DataArray(limits, dims="threshold", attrs=STATISTIC_COORDINATES["threshold"])
+    flag = xr.Variable("flag", bits, {**STATISTIC_COORDINATES["flag"], **about})
+    threshold = xr.Variable("threshold", limits, STATISTIC_COORDINATES["threshold"])
+    quantile = xr.Variable("quantile", wanted, STATISTIC_COORDINATES["quantile"])
     count = there.sum(dims)
     slid = moved.where(moved > least[0])
     logs: xr.DataArray = np.log(slid)  # type: ignore[assignment]
@@ -134,8 +135,7 @@ def suite_statistics(
         "displacement_quantile": _quantiles(moved, wanted, dims),
         "exceedance_probability": (moved > threshold).where(there).mean(dims),
     }
-    quantile = xr.Variable(("quantile",), wanted, STATISTIC_COORDINATES["quantile"])
-    own = {"flag": flag.variable, "threshold": threshold.variable, "quantile": quantile}
+    own = {"flag": flag, "threshold": threshold, "quantile": quantile}
     attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
     grid = [dim for dim in moved.dims if dim not in dims]
     laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
@@ -188,7 +188,7 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
     # so large that whatever is interpolated towards it is above all limits
     largest = np.finfo(np.float64).max / 4.0
     values = limits["limit_amplitude"].where(~beyond, largest)
-    wanted = check_quantiles("quantiles", quantiles)
+    wanted = check_increasing("quantiles", quantiles, "quantile")
     found = _quantiles(values, wanted, dims)
     highest = values.where(~beyond).max()
     return xr.Dataset(
@@ -205,25 +205,9 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
 def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
     """What a designer asks first of a suite, a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
 
-    Parameters
-    ----------
-    result : Dataset
-        A result of `sweep` with the dimension `motion`, or of `sample`: its quantiles, without the share of zeros.
-    displacement : float, str or list of these, optional
-        Displacements d, m or with a unit; of `sample` among its thresholds.
-    most : int
-        Of more grid points there is one line, that says how to have those of some.
-
-    Examples
-    --------
-    >>> import slipsweep
-    >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
-    >>> result = slipsweep.sweep(5, 0.3, amplitude=[4.0, 6.0], excitation=suite)
-    >>> print(*summary_lines(result, "50mm"), sep="\\n")
-    permanent displacement (mm) over 4 motion:
-    PGA (g) 16 % median     84 % zero P(u > 50 mm)
-     0.4077  8.7   18.8     71.5 0.0%        25.0%
-     0.6116 89.3    188 1.34e+03 0.0%        75.0%
+    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without the share of zeros.
+    Displacements d have a unit or are in m; of `sample` they are among its thresholds.  Of more grid points than `most`
+    there is one line, that says how to have those of some.
     """
     import pandas as pd
 
@@ -243,24 +227,27 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         found = (found if displacement is None else at_thresholds(found, displacement)).transpose(*grid, ...).load()
     else:
         found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
-    places = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in grid))
-    labels = zip(grid.items(), zip(*places, strict=True), strict=True) if grid else ()
-    columns: dict[str, Sequence[str]] = {_title_of(found, dim): column for (dim, n), column in labels if n > 1}
+    labels = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in varying))
+    columns: dict[str, Sequence[str]] = {}
+    for dim, texts in zip(varying, zip(*labels, strict=True), strict=True):
+        units = found[dim].attrs.get("units", "1") if dim in found.variables else "1"
+        title = str(dim) if units == "1" else f"{dim} ({units})"
+        columns[{"amplitude": "PGA (g)", "yield_coefficient": "ky"}.get(str(dim), title)] = texts
     rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
     for share, column in zip(found["quantile"].values, rows["displacement_quantile"], strict=True):
         title = "median" if share == 0.5 else f"{100.0 * share:.3g} %"
         columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
     shares = {} if is_sampled else {"zero": rows["zero_probability"][0]}
     if displacement is not None or is_sampled:
-        titles = [f"P(u > {d * 1000.0:.6g} mm)" for d in found["threshold"].values]
-        shares |= dict(zip(titles, rows["exceedance_probability"], strict=True))
+        for d, column in zip(found["threshold"].values, rows["exceedance_probability"], strict=True):
+            shares[f"P(u > {d * 1000.0:.6g} mm)"] = column
     if (rows["valueless_share"] > 0.0).any():
         shares["no value"] = rows["valueless_share"][0]
-    columns |= {
-        title: ["none" if np.isnan(one) else f"{one:.1%}" for one in column] for title, column in shares.items()
-    }
+    for title, column in shares.items():
+        columns[title] = ["none" if np.isnan(one) else f"{one:.1%}" for one in column]
     table = pd.DataFrame(columns).to_string(index=False).splitlines()
     return [f"permanent displacement (mm) over {suite}:", *table]
 
@@ -269,21 +256,13 @@ def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:
     """What `sample` has stored, at some of its thresholds (InputError: not among them)."""
     wanted = check_thresholds("thresholds", thresholds, float(found.attrs.get("g", np.nan)))
     nearest = found.sel(threshold=wanted, method="nearest")
-    for one, there in zip(wanted, nearest["threshold"].values, strict=True):
-        if not np.isclose(there, one, rtol=1e-6):
-            stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
-            raise InputError(
-                f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
-                "add it to the thresholds of [uncertainty], and run again"
-            )
+    for one in wanted[~np.isclose(nearest["threshold"], wanted, rtol=1e-6)][:1]:
+        stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
+        raise InputError(
+            f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
+            "add it to the thresholds of [uncertainty], and run again"
+        )
     return nearest
-
-
-def _title_of(data: xr.Dataset, dim: Hashable) -> str:
-    """A dimension as the title of a column."""
-    units = data[dim].attrs.get("units", "1") if dim in data.variables else "1"
-    titles = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
-    return titles.get(str(dim), str(dim) if units == "1" else f"{dim} ({units})")
 
 
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:

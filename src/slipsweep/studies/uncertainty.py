@@ -22,10 +22,9 @@ from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
 from slipsweep.studies.datasets import Values
-from slipsweep.studies.sampling import ENDS, Sampling, Thresholds, check_sampling, sobol_indices
+from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Sampling, Thresholds, sobol_indices
 
 Floats = NDArray[np.float64]
-Arrays = Mapping[str, NDArray[Any]]
 
 TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
@@ -194,18 +193,10 @@ def sample(
         yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
         minimum_friction=minimum_friction,
     )  # fmt: skip
-    sampling = check_sampling(
-        uncertain,
-        samples=samples,
-        method=method,
-        seed=seed,
-        quantiles=quantiles,
-        thresholds=thresholds,
-        correlation=correlation,
-        sensitivity=sensitivity,
-        over=over,
-        g=options.MODELS.of(model).g,
-    )
+    sampling = Sampling(
+        uncertain, samples=samples, method=method, seed=seed, quantiles=quantiles, thresholds=thresholds,
+        correlation=correlation, sensitivity=sensitivity, over=over, g=options.MODELS.of(model).g,
+    )  # fmt: skip
     plan = plan_samples(sampling, inputs, excitation=excitation, model=model, solver=solver)
     coords = datasets.brought_coordinates(
         inputs, plan.coords, {*variables.STATISTICS, *variables.STATISTIC_COORDINATES}
@@ -215,41 +206,27 @@ def sample(
 
 
 def plan_samples(
-    sampling: Sampling,
-    inputs: grid_inputs.Inputs,
-    *,
-    excitation: Any = "sine",
-    model: Any = "mendez",
-    solver: Any = "auto",
+    sampling: Sampling, inputs: grid_inputs.Inputs, *, excitation: Any, model: Any, solver: Any
 ) -> "SamplePlan":
-    """Plan of the samples of a grid, drawn and checked; as `plans.plan_sweep`.
-
-    Raises
-    ------
-    InputError
-        As `slipsweep.sample`.
-    """
+    """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
     # friction may be given, or drawn about, by its angle
     given = ["phi" if name == "mu_s" and inputs.phi is not None else name for name in inputs.given]
     problem = problems.check_problem(excitation, model, solver)
     _check_drawn(sampling, given, problem)
     drawn = sampling.distributions
+    absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
     plan = plans.plan_sweep(
-        inputs.but(dict.fromkeys(sampling.absolute, _ANY)),
+        inputs.but(dict.fromkeys(absolute, _ANY)),
         excitation=excitation, model=model, solver=solver, variables=["permanent_displacement"],
     )  # fmt: skip
-    dropped = {*sampling.absolute, *(["mu_s"] if "phi" in drawn else [])}
+    dropped = {*absolute, *(["mu_s"] if "phi" in drawn else [])}
     if "displacement_amplitude" in plan.coords and {"displacement_amplitude", "frequency"} & dropped:
         dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
-    draws = sampling.draws()
-    sampling.check_draws(draws, coords)
+    sampling.check_draws(coords)
     about = options.friction_inputs(problem.model.name, coords, {name: one.kind for name, one in drawn.items()})
     attrs = {**plan.attrs, "title": TITLE, "friction_inputs": about, **sampling.attributes}
-    found = SamplePlan(sampling, draws, problem, coords, attrs)
-    if sampling.over:
-        attrs["pooled"] = resources.grid_text(found.pooled)
-    return found
+    return SamplePlan(sampling, problem, coords, attrs)
 
 
 def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Problem) -> None:
@@ -259,17 +236,17 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Pro
             "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
         )
     recorded = not isinstance(problem.excitation, Waveform)
-    kinds = variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS
-    own, other = reversed(kinds) if recorded else kinds
+    kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
+    foreign = {*kinds[not recorded]} - {*kinds[recorded]}
     for name, one in sampling.distributions.items():
-        friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
-        if name in other and name not in own:
-            raise InputError(f"{sampling.key(name)}: not allowed with {'a Record' if recorded else 'a waveform'}")
+        key, friction_law = sampling.key(name), name in ("decay_rate", "delta_mu", "minimum_friction")
+        if name in foreign:
+            raise InputError(f"{key}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
-            raise InputError(f"{sampling.key(name)}: not allowed with Newmark's block, which has no friction law")
+            raise InputError(f"{key}: not allowed with Newmark's block, which has no friction law")
         if one.kind == "absolute" and name in given:
             raise InputError(
-                f'{sampling.key(name)}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
+                f'{key}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
                 'or "offset" to draw about what is given'
             )
         # under a record each pulse has estimates of its own, but for Coulomb's yield acceleration
@@ -277,37 +254,29 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Pro
         if name == "yield_acceleration":
             estimated = "yield_coefficient" not in {*given, *sampling.distributions}
         if one.kind != "absolute" and name not in given and not estimated:
-            raise InputError(f'{sampling.key(name)}: kind = "{one.kind}" needs {name} given, to which it is relative')
+            raise InputError(f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative')
 
 
 class SamplePlan:
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
-    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.
-
-    A plan as all others are (`anyplan.AnyPlan`); its parts have the draws of the whole.  Under a record there is no
-    sliding mode.
+    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.  A plan as all
+    others are (`anyplan.AnyPlan`).
     """
 
     cell_memory = 0
 
     def __init__(
-        self,
-        sampling: Sampling,
-        draws: dict[str, Floats],
-        problem: problems.Problem,
-        coords: dict[str, xr.Variable],
-        attrs: dict[str, Any],
+        self, sampling: Sampling, problem: problems.Problem, coords: dict[str, xr.Variable], attrs: dict[str, Any]
     ) -> None:
-        self.sampling, self.draws, self.problem = sampling, draws, problem
-        self.coords, self.attrs = coords, attrs
+        self.sampling, self.problem, self.coords = sampling, problem, coords
         is_wave, drawn = isinstance(problem.excitation, Waveform), sampling.distributions
         #: Results, and their dimensions in addition to those of the grid.
         self.results = STATISTICS | (SENSITIVITY if sampling.sensitivity else {})
         if not is_wave:
             del self.results["mode_share"]
         self.names = tuple(self.results)
-        self.clock = clock = "frequency" if is_wave else "time_scale"
+        clock = "frequency" if is_wave else "time_scale"
         inputs = grid_inputs.inputs_of(problem, coords)
         if "phi" in coords and "phi" in drawn:
             inputs["phi"] = coords["phi"]
@@ -333,111 +302,134 @@ class SamplePlan:
         #: What displacements are divided by the square of; where it is not 1, cells are solved at 1.
         self.frequency = xr.Variable((), 1.0)
         if self.scaled:
-            clocks = inputs.pop(clock)
-            self.frequency = clocks if is_wave else 1.0 / clocks
-            if clock not in drawn:
-                inputs[clock] = xr.Variable((), 1.0)
+            self.frequency = inputs[clock] if is_wave else 1.0 / inputs[clock]
+            inputs[clock] = xr.Variable((), 1.0)
         self.inputs = inputs
-        #: Runs of a grid point, all draws with all that is pooled; and how many points are solved together.
-        self.runs = sampling.runs * math.prod(self.pooled.values())
+        self.attrs = attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {})
+        #: Samples and runs of a grid point, all draws with all that is pooled; how many points are solved together.
+        self.samples, self.runs = (n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs))
         self.points = max(_CELLS // self.runs, 1)
         # as in `anyplan.AnyPlan`
         self.cells = math.prod(self.solved.values()) * self.runs
         self.together = tuple(self.scaled)
         self.cost = max(1.0, problems.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
-        self.cost += _SOBOL_COST if sampling.sensitivity else 0
         run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
-        self.memory = self.runs * run + problems.memory_of(problem) + sampling.memory
+        self.memory = self.runs * run + problems.memory_of(problem)
+        if sampling.sensitivity:
+            self.cost += _SOBOL_COST
+            self.memory += SOBOL_MEMORY + 64 * sampling.runs
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
-        return SamplePlan(self.sampling, self.draws, self.problem, _cut(self.coords, chunk), self.attrs)
+        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
+        return SamplePlan(self.sampling, self.problem, coords, self.attrs)
 
     def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
-        return self._dataset({name: np.zeros(()) for name in self.results})
-
-    def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-        """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns.
-
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with a number of samples just solved, from any thread.
-        """
-        parameters.check_progress(progress)
-        resources.check_memory(
-            f"grid of {resources.grid_text(self.sizes) or 'one point'}, {self.runs} samples",
-            self.memory + self.template().nbytes,
-            "ask for fewer samples, grid points, quantiles or thresholds",
-        )
-        # chunks follow one another in the order of the grid
-        parts = [self._reduced(chunk, progress) for chunk in chunks.grid_chunks(self.solved, self.points)]
-        return self._dataset({name: np.concatenate([part[name] for part in parts]) for name in self.results})
-
-    def _dataset(self, found: Arrays) -> xr.Dataset:
-        """The results as a Dataset, of values that broadcast to (solved, scaled, own dimensions)."""
-        own_coords = self._statistic_coords()
-        lengths = {**self.sizes, **{name: one.size for name, one in own_coords.items()}}
-        results = {}
-        for name, own in self.results.items():
-            dims = (*self.solved, *(self.scaled if name in _BY_FREQUENCY else ()), *own)
-            shape = [lengths[dim] for dim in dims]
-            filled = found[name].reshape(shape) if found[name].ndim else np.broadcast_to(found[name], shape)
-            dtype = variables.RESULT_DTYPES.get(name, "float64")
-            variable = xr.Variable(dims, filled.astype(dtype, copy=False), variables.STATISTICS[name])
-            results[name] = variable.transpose(*(dim for dim in self.sizes if dim in dims), *own)
-        coords = {name: one for name, one in self.coords.items() if not {*self.pooled} & {*one.dims}}
-        return xr.Dataset(results, coords | own_coords, self.attrs)
-
-    def _statistic_coords(self) -> dict[str, xr.Variable]:
-        """Coordinates of the dimensions that the results have in addition to those of the grid."""
-        values: dict[str, NDArray[Any]] = {
+        values: dict[str, Any] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,
             "mode": np.array(_MODES, np.int8),
             "flag": np.array(variables.Validity, np.int16),
-            "input": np.array(["+".join(one) for one in self.sampling.independent]),
-            "bound": np.array(ENDS),
+            "input": ["+".join(one) for one in self.sampling.independent],
+            "bound": [*ENDS],
         }
-        own = {dim for dims in self.results.values() for dim in dims}
-        about = variables.STATISTIC_COORDINATES
-        return {dim: xr.Variable((dim,), one, about[dim]) for dim, one in values.items() if dim in own}
+        own_dims = dict.fromkeys(dim for dims in self.results.values() for dim in dims)
+        own_coords = {dim: xr.Variable((dim,), values[dim], variables.STATISTIC_COORDINATES[dim]) for dim in own_dims}
+        lengths = self.sizes | {dim: one.size for dim, one in own_coords.items()}
+        results = {}
+        for name, own in self.results.items():
+            dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *own)
+            zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
+            results[name] = (dims, np.broadcast_to(zero, [lengths[dim] for dim in dims]), variables.STATISTICS[name])
+        return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
-    def _reduced(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> Arrays:
-        """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
-        sizes = {dim: cut.stop - cut.start for dim, cut in chunks.places(chunk, self.solved).items()}
-        rows = math.prod(sizes.values())
+    def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
+        """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns.
+
+        `progress` is called with a number of samples just solved, from any thread.
+        """
+        parameters.check_progress(progress)
+        table = self.template()
+        resources.check_memory(
+            f"grid of {resources.grid_text(self.sizes) or 'one point'}, {self.runs} samples",
+            self.memory + table.nbytes,
+            "ask for fewer samples, grid points, quantiles or thresholds",
+        )
+        table = xr.zeros_like(table)
+        for chunk in chunks.grid_chunks(self.solved, self.points):
+            for name, values in self._statistics(chunk, progress).items():
+                target = table[name].variable
+                sizes = target[chunk].sizes
+                scaled = self.scaled if name in _BY_FREQUENCY else {}
+                dims = (*self.solved, *scaled, *self.results[name])
+                target[chunk] = xr.Variable(dims, values.reshape([sizes[dim] for dim in dims]))
+        return table
+
+    def _statistics(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
+        """The results at the grid points of a chunk, (solved, frequencies, own dimension).
+
+        Quantiles, mean, probabilities and shares are of the samples that have a value; probabilities also count the
+        statically unstable ones, as exceeding every threshold.
+        """
+        sampling, sizes = self.sampling, {dim: cut.stop - cut.start for dim, cut in chunk.items()}
         arrays, shape = self._drawn(chunk, sizes)
-        names = ("permanent_displacement", *(["sliding_mode"] if "mode_share" in self.names else []), "validity")
+        names = ("permanent_displacement", "validity", *(["sliding_mode"] if "mode_share" in self.names else []))
         solved = engine.solve(engine.Request(self.problem, shape, arrays, names, progress))
-        runs = {name: values.reshape(rows, -1) for name, values in solved.items()}
+        runs = {name: values.reshape(math.prod(sizes.values()), -1) for name, values in solved.items()}
         # of Sobol indices the first runs are the samples
-        samples = self.runs // self.sampling.runs * self.sampling.samples
-        frequency = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
-        found = statistics_of_samples(
-            self.sampling, {name: one[:, :samples] for name, one in runs.items()}, frequency.values.reshape(rows, -1)
-        )
-        return found | (
-            sobol_indices(self.sampling, runs["permanent_displacement"]) if self.sampling.sensitivity else {}
-        )
+        samples = {name: values[:, : self.samples] for name, values in runs.items()}
+        displacement, flags = samples["permanent_displacement"], samples["validity"]
+        clocks = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
+        frequency = clocks.values.reshape(len(displacement), -1)
+        squares = frequency[..., np.newaxis] ** 2
+        quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
+        means = np.full((*frequency.shape, 1), np.nan)
+        exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
+
+        def reduce(point: int) -> None:
+            values = np.sort(displacement[point])
+            values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
+            # these slide without any shaking: their displacement has no value and exceeds every threshold
+            unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
+            if values.size + unstable:
+                above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
+                exceeding[point] = (above + unstable) / (values.size + unstable)
+            if values.size:
+                with np.errstate(over="ignore"):  # refused below
+                    quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
+                    means[point] = values.mean() / squares[point]
+
+        threads.spread(range(len(displacement)), reduce)
+        for wrong in frequency[(np.isinf(quantiles) | np.isinf(means)).any(axis=-1)][:1]:
+            text = parameters.number_text(float(wrong))
+            raise InputError(f"frequency or 1 / time_scale = {text}: must be nearer to 1")
+        found = {
+            "displacement_quantile": quantiles,
+            "mean_displacement": means,
+            "exceedance_probability": exceeding,
+            "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
+            "valueless_share": np.isnan(displacement).mean(axis=-1),
+        }
+        if "sliding_mode" in samples:
+            found["mode_share"] = np.stack([np.mean(samples["sliding_mode"] == mode, axis=-1) for mode in _MODES], -1)
+        if sampling.sensitivity:
+            found |= sobol_indices(sampling, runs["permanent_displacement"])
+        return found
 
     def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, Floats], tuple[int, ...]]:
         """Inputs of the runs of a chunk, and their shape, (solved, pooled, draw): a sweep with one more dimension."""
-        inputs = _cut(self.inputs, chunk)
+        inputs = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.inputs.items()}
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
-        drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.draws.items()}
+        drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}
         about_estimates = []
         for name, one in self.sampling.distributions.items():
             if name in inputs or one.kind == "absolute":
                 inputs[name] = one.applied(inputs.get(name), drawn[name])
-            elif name == self.clock:  # a factor on the frequencies that displacements are scaled to
-                inputs[name] = drawn[name]
             else:
                 about_estimates.append(name)
         if "phi" in inputs:
-            angles = inputs.pop("phi")
-            inputs["mu_s"] = angles.copy(data=np.tan(np.radians(angles.values)))
+            inputs["mu_s"] = parameters.friction_coefficient(inputs.pop("phi"))
         arrays = grid_inputs.aligned(inputs, sizes)
         for name in sorted(about_estimates, key=_ESTIMATED.index):
             one, draws = self.sampling.distributions[name], grid_inputs.aligned({name: drawn[name]}, sizes)[name]
@@ -452,72 +444,18 @@ class SamplePlan:
 
     def tally(self, results: Mapping[str, NDArray[Any]]) -> tally.Tally:
         """Samples by sliding mode and by flag, from their shares; grid points by what moves the displacement."""
-        samples = self.sampling.samples * math.prod(self.pooled.values())
 
         def counts(name: str, codes: Sequence[Any]) -> dict[Any, int]:
             shares = results[name].reshape(-1, len(codes)).astype(np.float64)
-            return dict(zip(codes, np.rint(shares * samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
+            return dict(zip(codes, np.rint(shares * self.samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
 
-        found = tally.Tally()
-        if "sensitivity_status" in results:
+        found = tally.Tally(flags=counts("flag_share", tuple(variables.Validity)))
+        found.counted = results["valueless_share"].size * self.samples
+        if "mode_share" in results:
+            found.modes = counts("valueless_share", (variables.SlidingMode.MISSING,)) | counts("mode_share", _MODES)
+        if self.sampling.sensitivity:
             found.indices = tally.Indices.counted(
-                self._statistic_coords()["input"].values.tolist(),
+                ["+".join(one) for one in self.sampling.independent],
                 *(results[name] for name in ("first_order_index", "total_index", "sensitivity_status")),
             )
-        if {"flag_share", "valueless_share"} <= results.keys():
-            found.flags = counts("flag_share", tuple(variables.Validity))
-            found.counted = results["valueless_share"].size * samples
-            if "mode_share" in results:
-                found.modes = counts("valueless_share", (variables.SlidingMode.MISSING,))
-                found.modes |= counts("mode_share", _MODES)
         return found
-
-
-def _cut(coords: Mapping[str, xr.Variable], chunk: chunks.Chunk) -> dict[str, xr.Variable]:
-    return {name: one.isel(chunk, missing_dims="ignore") for name, one in coords.items()}
-
-
-def statistics_of_samples(
-    sampling: Sampling, solved: Mapping[str, NDArray[Any]], frequency: Floats
-) -> dict[str, NDArray[Any]]:
-    """`STATISTICS` of the samples of grid points, (point, own dimension), at each frequency where they depend on it.
-
-    Quantiles, mean, probabilities and shares are of the samples that have a value; probabilities also count the
-    statically unstable ones, as exceeding every threshold.  `solved` has results of samples, (point, sample);
-    displacements are divided by the square of `frequency`, (point, frequency).
-    """
-    displacement, flags = solved["permanent_displacement"], solved["validity"]
-    squares = frequency[..., np.newaxis] ** 2
-    quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
-    means = np.full((*frequency.shape, 1), np.nan)
-    exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
-
-    def reduce(point: int) -> None:
-        values = np.sort(displacement[point])
-        values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-        # these slide without any shaking: their displacement has no value and exceeds every threshold
-        unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
-        if values.size + unstable:
-            above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
-            exceeding[point] = (above + unstable) / (values.size + unstable)
-        if values.size:
-            with np.errstate(over="ignore"):  # refused below
-                quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
-                means[point] = values.mean() / squares[point]
-
-    threads.spread(range(len(displacement)), reduce)
-    wrong = (np.isinf(quantiles) | np.isinf(means)).any(axis=-1)
-    if wrong.any():
-        first = parameters.number_text(float(frequency[wrong][0]))
-        raise InputError(f"frequency or 1 / time_scale = {first}: must be nearer to 1")
-    found = {
-        "displacement_quantile": quantiles,
-        "mean_displacement": means,
-        "exceedance_probability": exceeding,
-        "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
-        "valueless_share": np.isnan(displacement).mean(axis=-1),
-    }
-    if "sliding_mode" in solved:
-        modes = solved["sliding_mode"]
-        found["mode_share"] = np.stack([np.mean(modes == mode.value, axis=-1) for mode in _MODES], axis=-1)
-    return found
