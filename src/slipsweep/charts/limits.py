@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, log_ticks, member_text, over, plot_curve
 from slipsweep.charts.slices import NAMED, Result
-from slipsweep.charts.suites import draw_suite, kept_motions, suite_text
+from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import LimitStatus
@@ -36,7 +36,7 @@ def limit(result: Result, options: style.Options) -> Figure:
     Curves end where no limit exists; circles mark limits set by a discontinuity of the model.  Of a suite with the
     median and the 16 to 84 % band; where nothing but the motion varies, the motions lie along the abscissa.
     """
-    suite = kept_motions(result) if "motion" in result.dims else {}
+    suite = SUITE if "motion" in result.dims else ()
     along = "motion" if suite and not {*result.wide} - {*SUITE, *options.at} else _ABSCISSAE
     curves = None if suite else _CURVES
     names, shown = ["limit_amplitude", "limit_status"], replace(options, more_panels=True)

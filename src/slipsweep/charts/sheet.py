@@ -16,20 +16,18 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from slipsweep.charts import solved, style
 from slipsweep.charts.solved import DISPLACEMENT
-from slipsweep.charts.style import Options
+from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
-
-Floats = NDArray[np.float64]
 
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
@@ -42,9 +40,6 @@ _LINE, _LINES = 0.165, 4
 
 #: Markers on a curve.
 _MARKED = 7
-
-
-# ------------------------------------------------------------------------ any figure
 
 
 class Drawing:
@@ -73,46 +68,39 @@ class Drawing:
 
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
         """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
-        entries, font = self.legend | self.remarks, self.options.font
-        handles, labels = list(entries.values()), list(entries)
-        axes, lines = self.options.ax, 0
+        entries, axes = self.legend | self.remarks, self.options.ax
+        handles, look = (list(entries.values()), list(entries)), Look(fontsize="small", frameon=False)
         width, height = self.figure.get_size_inches()
+        text_width = width * 10.0 / self.options.font  # inches of text of 10 points
+        available = axes.get_window_extent().width / self.figure.dpi if axes else text_width
+        characters = max(20, int(_CHARACTERS * available))
+        every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
+        caption = [line for text in every for line in textwrap.wrap(text, characters)]
         if axes is not None:
             right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
             if entries:
-                axes.legend(
-                    handles, labels, fontsize="small", frameon=False,
-                    loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0),
-                )  # fmt: skip
-            wrapped = self._wrapped(texts, axes.get_window_extent().width / self.figure.dpi)
+                axes.legend(*handles, loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0), **look)
             axes.annotate(
-                "\n".join(wrapped), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
+                "\n".join(caption), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
                 ha="center", va="top", fontsize="x-small", annotation_clip=False,
             )  # fmt: skip
         else:
             self._set_small()
+            beside = beside and width > 5.0
+            columns = 1 if beside else max(1, int(text_width / 2.2))
             if entries:
-                beside = beside and width > 5.0
-                columns = 1 if beside else max(1, int(width * 10.0 / font / 2.2))
                 self.figure.legend(
-                    handles, labels, ncols=columns, handlelength=3.2, fontsize="small", frameon=False,
-                    loc="outside right upper" if beside else "outside upper center",
+                    *handles, loc="outside right upper" if beside else "outside upper center",
+                    ncols=columns, handlelength=3.2, **look,
                 )  # fmt: skip
-                longest = max(text.count("\n") + 1 for text in entries)
-                lines = 0 if beside else math.ceil(len(entries) / columns) * longest - 1
-            wrapped = self._wrapped(texts, width * 10.0 / font)
-            self.figure.supxlabel("\n".join(wrapped), fontsize="small")
-            more = max(0, lines + len(wrapped) - _LINES) * _LINE * font / 10.0
+            self.figure.supxlabel("\n".join(caption), fontsize="small")
+            longest = max((text.count("\n") + 1 for text in entries), default=0)
+            lines = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
+            more = max(0, lines + len(caption) - _LINES) * _LINE * self.options.font / 10.0
             self.figure.set_size_inches(width, height + more)
         if self.options.grey:
             _without_colour(self.figure)
         return self.figure
-
-    def _wrapped(self, texts: Sequence[str], width: float) -> list[str]:
-        """Lines of a caption that is as wide as some inches of text of 10 points."""
-        characters = max(20, int(_CHARACTERS * width))
-        every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
-        return [line for text in every for line in textwrap.wrap(text, characters)]
 
     def _set_small(self) -> None:
         """Sizes of text, in points: ticks are made only when the figure is drawn."""
@@ -130,20 +118,18 @@ class Drawing:
 def _without_colour(figure: Figure) -> None:
     """Replace all colours by their lightness."""
     for artist in figure.findobj():
+        kinds: tuple[str, ...] = ()
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
             artist.set_cmap(style.grey_map(artist.get_cmap()))
-        elif isinstance(artist, Line2D | Patch):
+        elif isinstance(artist, Line2D):
             kinds = ("color", "markerfacecolor", "markeredgecolor")
-            for kind in kinds if isinstance(artist, Line2D) else ("facecolor", "edgecolor"):
-                artist.set(**{kind: tuple(style.to_grey(getattr(artist, f"get_{kind}")())[0])})
-        elif isinstance(artist, mpl.collections.Collection):
-            for kind in ("facecolor", "edgecolor"):
-                colours = getattr(artist, f"get_{kind}")()
-                if len(colours):
-                    artist.set(**{kind: style.to_grey(colours)})
-
-
-# ------------------------------------------------------------------- of slices of a result
+        elif isinstance(artist, Patch | Collection):
+            kinds = ("facecolor", "edgecolor")
+        for kind in kinds:
+            colours = getattr(artist, f"get_{kind}")()
+            if len(colours):
+                grey = style.to_grey(colours)
+                artist.set(**{kind: grey if len(grey) > 1 else tuple(grey[0])})
 
 
 class Panel:
@@ -158,6 +144,16 @@ class Panel:
     def data(self) -> xr.Dataset:
         """The sheet's slice at the panel's values."""
         return self._sheet.data.isel(self._where, missing_dims="ignore")
+
+    @property
+    def xs(self) -> Floats:
+        """The values along `x`, in the units that they are drawn in."""
+        return self.values(self.x)
+
+    @property
+    def ys(self) -> Floats:
+        """The values along `y`."""
+        return self.values(str(self.y))
 
     def values(self, name: str) -> Floats:
         """The values along an axis, in the units that they are drawn in."""
@@ -303,9 +299,6 @@ def over(array: xr.DataArray, data: xr.Dataset, dims: Sequence[str | None]) -> A
     return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
 
-# ------------------------------------------------------------------------------------- axes
-
-
 def is_log(values: Floats) -> bool:
     """Whether an axis is spaced by a constant factor rather than a constant step."""
     if values.size < 3 or values[0] <= 0 or values[-1] < 3 * values[0]:
@@ -357,9 +350,6 @@ def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, 
     axes.grid(color="0.9", which="major")
     axes.set_axisbelow(True)
     return axes.get_ylim()[0] / 10
-
-
-# ----------------------------------------------------------------------------------- curves
 
 
 def curve_looks(number: int) -> list[dict[str, Any]]:

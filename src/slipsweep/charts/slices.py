@@ -136,7 +136,8 @@ class Result:
         stay; the others are cut where `at` says, else in the middle, `polarity` at 1.  Every parameter is a coordinate,
         and the attribute ``picked`` has the names of the case and motion that were selected.
         """
-        cuts, index, exact, picked = self.places(at), {}, {}, {}
+        cuts, exact, picked = self.places(at), {}, {}
+        index: dict[str, Any] = {}
         for dim in self.dims:
             chosen: Any = keep[dim] if dim in keep else cuts.get(dim) or [Place(math.nan, self._middle(dim))]
             if isinstance(chosen, slice):
@@ -144,17 +145,13 @@ class Result:
                 continue
             if dim not in keep and len(chosen) > 1:
                 raise InputError(f"{self.name}: {dim} = {at[dim]}: several values are for curves or panels only")
-            shape = (len(chosen),) if dim in keep else ()
-            where: Any = np.reshape([place.index or 0 for place in chosen], shape)
+            dims = (dim,) if dim in keep else ()
+            shape = [len(chosen)] * len(dims)
+            index[dim] = np.reshape([place.index or 0 for place in chosen], shape)
             if any(place.index is None for place in chosen):
-                exact[dim] = (
-                    (dim,) if shape else (),
-                    np.reshape([one.value for one in chosen], shape),
-                    PARAMETERS[dim],
-                )
-            elif not shape and dim in NAMED and axis_labels(self.data, dim):
-                picked[dim] = axis_labels(self.data, dim)[int(where)]
-            index[dim] = where
+                exact[dim] = dims, np.reshape([one.value for one in chosen], shape), PARAMETERS[dim]
+            elif not dims and dim in NAMED and (labels := axis_labels(self.data, dim)):
+                picked[dim] = labels[int(index[dim])]
         there = [name for name in names if name in self.variables]
         data = self.data[there].isel(index, missing_dims="ignore").load().assign_coords(exact)
         if exact and "displacement_amplitude" in data.coords:
@@ -180,11 +177,9 @@ class Result:
         number = even[0] if even and size > number else number
         return [Place(math.nan, int(i)) for i in np.unique(np.linspace(0, size - 1, min(number, size)).round())]
 
-    # ---------------------------------------------------------------------------- layout
-
     def sheet(
         self, options: Options, names: Sequence[str], x: str | Sequence[str], *, y: Sequence[str] = (),
-        curves: Sequence[str] | None = None, keep: Mapping[str, Kept] | None = None, same: Sequence[str] = (),
+        curves: Sequence[str] | None = None, keep: Sequence[str] = (), same: Sequence[str] = (),
     ) -> Sheet:  # fmt: skip
         """The slice of a chart, in panels (InputError if an axis that was chosen is not there, or none is left).
 
@@ -197,57 +192,53 @@ class Result:
             What it is drawn over; or axes in order of preference, of which the user may choose another.
         y, curves : sequence of str
             Of a map, vertical axes; of curves, axes that tell them apart, if one is there; in order of preference.
-        keep : mapping of axis to slice or places
-            What else stays.
+        keep : sequence of str
+            What else stays, whole or at the values requested.
         same : sequence of str
             Axes that the results do not vary along in fact: no panels are made of them.
         """
-        kept: dict[str, Any] = {}
-        at, places = dict(options.at), self.places(options.at)
-        for dim, part in (keep or {}).items():
-            kept[dim] = places.get(dim, part)
-            at.pop(dim, None)
-        along = [str(dim) for dim in self.data[self.result(names[0])].dims]
+        places = self.places(options.at)
+        kept: dict[str, Kept] = {dim: places.get(dim, slice(None)) for dim in keep}
+        along = self.data[self.result(names[0])].dims
         groups = [dim for dim in self.groups if dim in along and dim not in kept]
         wide = [dim for dim in groups if dim in (*PARAMETERS, "displacement")]
         several = [dim for dim in groups if len(places.get(dim, ())) > 1 and dim not in options.panels]
-        across: str = x if isinstance(x, str) else self._axis(options, "x", wide, x)
+        across = x if isinstance(x, str) else self._axis(options, "x", wide, x)
         if isinstance(x, str) and options.x is not None:
             raise InputError(f"{self.name}: --x {options.x}: not with this chart, which is drawn over another quantity")
         rest = [dim for dim in groups if dim != across]
         up: str | None = None
         if y:
             up = self._axis(options, "y", [dim for dim in wide if dim != across], y, f"; --x is {across}")
-            kept[up] = self._thinned(up)
-        elif curves is not None:
-            free = [dim for dim in rest if dim not in (*at, *options.panels)]
-            up = next((dim for dim in (*several, *curves) if dim in (*several, *free) and dim != across), None)
-            if options.y is not None:
-                up = self._axis(options, "y", rest, ())
-            if up:
-                kept[up] = places.get(up) or self.spread(up, _CURVES)
-                at.pop(up, None)
         elif options.y is not None:
-            raise InputError(f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use --panels")
-        if not (isinstance(x, str) and across in kept):
-            kept[across] = self._thinned(across) if across in self.dims else slice(None)
-        for dim in (across, up or across):
-            if dim in at:
-                raise InputError(f"{self.name}: {dim} = {at[dim]}: is an axis of this chart; it cannot have one value")
+            if curves is None:
+                raise InputError(f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use --panels")
+            up = self._axis(options, "y", rest, ())
+        elif curves is not None:
+            free = [dim for dim in rest if dim in several or dim not in (*options.at, *options.panels)]
+            up = next((dim for dim in (*several, *curves) if dim in free), None)
+        for dim in (across, str(up)) if y else (across,):
+            if dim in options.at and dim not in keep:
+                raise InputError(
+                    f"{self.name}: {dim} = {options.at[dim]}: is an axis of this chart; it cannot have one value"
+                )
+        if across not in kept:
+            kept[across] = self._thinned(across)
+        if up:
+            kept[up] = self._thinned(up) if y else places.get(up) or self.spread(up, _CURVES)
         panels = list(options.panels) or [dim for dim in several if dim not in kept]
         if options.more_panels and not panels:
-            panels = [dim for dim in groups if dim not in (*kept, *same, *at)]
+            panels = [dim for dim in groups if dim not in (*kept, *same, *options.at)]
         for name in panels[:2]:
             if name not in groups or name in kept:
                 left = [dim for dim in groups if dim not in kept]
                 raise InputError(f"{self.name}: --panels {name}: must be another axis; {did_you_mean(name, left)}")
             kept[name] = places.get(name) or self.spread(name, _PANELS)
-            at.pop(name, None)
-        return Sheet(self.select(names, kept, at), across, up, options, *panels[:2])
+        return Sheet(self.select(names, kept, options.at), across, up, options, *panels[:2])
 
     def _axis(self, options: Options, option: str, there: list[str], preferred: Sequence[str], more: str = "") -> str:
         """The axis that an option names, or the first of those preferred, or any that is left for it."""
-        given = options.x if option == "x" else options.y
+        given: str | None = getattr(options, option)
         if given is not None:
             if given not in there:
                 raise InputError(f"{self.name}: --{option} {given}: no such axis; {did_you_mean(given, there)}{more}")

@@ -64,8 +64,7 @@ def draw_fragility(sheet: Sheet) -> Figure:
 
 def quantiles(result: Result, options: Options) -> Figure:
     """Bands between quantiles of the permanent displacement over one axis."""
-    keep = {"quantile": slice(None)}
-    sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=keep)
+    sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"])
     everything = sheet.data["displacement_quantile"].values * 1000.0
     sheet.set_axis("x", sheet.x)
     shares = np.atleast_1d(sheet.data["quantile"].values)
@@ -95,9 +94,8 @@ def sensitivity(result: Result, options: Options) -> Figure:
         raise InputError(f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them")
     names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
     left = [dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims]
-    keep = {"bound": slice(None), "input": slice(None)}
     bars = options.x is None and not {*left} - {*options.at, *options.panels}
-    sheet = result.sheet(options, names, "input" if bars else _AXES, keep=keep)
+    sheet = result.sheet(options, names, "input" if bars else _AXES, keep=["bound", "input"])
     _note_status(sheet)
     inputs = axis_labels(sheet.data, "input")
     symbols = [" + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+")) for name in inputs]

@@ -9,11 +9,13 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, to_rgba
+from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import (
+    INTENSITY_MEASURES,
     LIMIT_RESULTS,
     PARAMETERS,
     RECORD_RESULTS,
@@ -30,8 +32,14 @@ if TYPE_CHECKING:
 
     from slipsweep.files.selection import At
 
-#: Attributes of all results that charts show, by name.
+Floats = NDArray[np.float64]
+
+#: Properties of an artist, by the names that matplotlib gives them.
+Look = dict[str, Any]
+
+#: Attributes of all results that charts show, by name; and of all that an axis can have.
 SHOWN = LIMIT_RESULTS | RECORD_RESULTS | RESULTS | STATISTICS
+_ABOUT = INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": TOLERABLE_DISPLACEMENT}
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -81,7 +89,7 @@ NEWMARK, NO_SLIDING = "Newmark's block", MODE_TEXT[SlidingMode.STUCK]
 UNSOUND = "falls with A, or below\nhalf of Newmark's"
 
 #: How the lines of yield and of the mode limit are drawn.
-LINES: dict[str, tuple[str, dict[str, Any]]] = {
+LINES: dict[str, tuple[str, Look]] = {
     "yield_line": ("yield", {"color": "black", "linestyle": "-", "linewidth": 1.6}),
     "limit_line": ("mode limit (Eq. 7)", {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.6}),
 }
@@ -169,32 +177,20 @@ def grey_map(colours: Colormap) -> Colormap:
     return found.with_extremes(under=to_grey(colours.get_under())[0], over=to_grey(colours.get_over())[0])
 
 
-# ------------------------------------------------------------------------- names and units
-
-
 def is_acceleration(name: str) -> bool:
     """Whether a parameter is an acceleration, which people give in m/s² or in g."""
     return PARAMETERS.get(name, {}).get("units") == "m s-2"
 
 
-def about(name: str) -> dict[str, Any]:
-    """Long name and unit of a parameter, result or tolerable displacement."""
-    return (SHOWN | PARAMETERS | {"displacement": TOLERABLE_DISPLACEMENT})[name]
-
-
 def unit(name: str) -> str:
-    """The unit of a parameter or result as people write it; nothing for a pure number."""
-    return unit_text(about(name).get("units", "1"))
-
-
-def unit_text(units: str) -> str:
-    """A unit of a file as people write it."""
+    """The unit of a parameter, result or intensity measure as people write it; nothing for a pure number."""
+    units = _ABOUT[name].get("units", "1")
     return _UNITS.get(units, units)
 
 
 def axis_label(name: str, options: Options) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
-    text = about(name)["long_name"]
+    text = _ABOUT[name]["long_name"]
     if SYMBOLS[name] != name.replace("_", " "):
         text = f"{text.split(',')[0].split(' that ')[0]} {SYMBOLS[name]}"
     units = options.unit(name)
@@ -229,9 +225,6 @@ def plain(text: Any) -> str:
 def flag_name(flag: int) -> str:
     """A flag as results, legends and captions name it."""
     return (Validity(flag).name or "").lower()
-
-
-# --------------------------------------------------------------------------------- captions
 
 
 def caption(data: xr.Dataset, options: Options | None = None) -> str:

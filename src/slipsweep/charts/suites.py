@@ -100,7 +100,7 @@ def intensity(result: Result, options: style.Options) -> Figure:
             panel.axes.set_xscale("log")
             log_ticks(panel.axes.xaxis, there.max() / there.min())
         panel.axes.grid(color="0.9")
-        panel.axes.set_xlabel(f"{text} ({style.unit_text(INTENSITY_MEASURES[measure]['units'])})")
+        panel.axes.set_xlabel(f"{text} ({style.unit(measure)})")
         low = panel.axes.get_ylim()[0]
         groups: list[tuple[str, NDArray[np.bool_], dict[str, Any]]] = [
             ("polarity 1" if negative.any() else "a motion", ~negative, {"marker": "o", "color": style.BLUE}),
@@ -171,18 +171,13 @@ def fragility(result: Result, options: style.Options) -> Figure:
 # ------------------------------------------------------------------------------- what they share
 
 
-def kept_motions(result: Result) -> dict[str, slice]:
-    """The dimensions of a suite: all its motions, but where some are requested."""
-    return {dim: slice(None) for dim in SUITE if dim in result.dims}
-
-
 def _axes(result: Result) -> list[str]:
     """What charts of a suite are drawn over: how strong the motions are, else Üy or ky, or any axis."""
     return [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
 
 
 def _sheet(result: Result, options: style.Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
-    sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
+    sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=SUITE)
     given = sheet.data[DISPLACEMENT]
     sheet.data[DISPLACEMENT] = without_rounding(given)
     if (sheet.data[DISPLACEMENT] != given).where(given.notnull(), False).any():
