@@ -1,7 +1,4 @@
-"""The kinds of charts: which results have them, what draws each, and all of a result as one PDF.
-
-The command line and `Dataset.slipsweep.chart` both come here.
-"""
+"""What is drawn of which result, by command and from Python: the kinds of charts, and all of them as one PDF."""
 
 import textwrap
 from collections.abc import Callable, Iterable
@@ -40,9 +37,6 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "calibration": ("a calibration", (histories.calibration,)),
     "hazard": ("annual rates", (limits.hazard,)),
 }  # fmt: skip
-
-#: What results that are drawn whole have no choice of.
-_CHOICES = ("at", "x", "y", "panels", "levels")
 
 #: Characters in a line of a title page.
 _WIDTH = 96
@@ -85,12 +79,10 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
     kinds = kinds_of(result.sort)
     kind = fitting(result, options)[0] if kind is None else check_kind(kind)
     if kind not in kinds:
-        one_of = "one of " if len(kinds) > 1 else ""
-        raise InputError(
-            f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {one_of}{', '.join(kinds)}"
-        )
-    for name in _CHOICES if not result.dims else ():
-        if getattr(options, name):
+        allowed = f"{'one of ' if len(kinds) > 1 else ''}{', '.join(kinds)}"
+        raise InputError(f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}")
+    for name in ("at", "x", "y", "panels", "levels"):
+        if getattr(options, name) and not result.dims:
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
     with mpl.rc_context({"font.size": options.font}):
         try:
@@ -109,10 +101,7 @@ def figure_of(data: xr.Dataset, name: str = "dataset", kind: str | None = None, 
 def draw_all(
     result: Result, kinds: Iterable[str], options: Options, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
-    """Draw several charts; where not `strict`, those that cannot be drawn are named with the reason.
-
-    InputError as `draw`, or if none can be drawn.
-    """
+    """Several charts, and why others cannot be drawn; InputError as `draw` if `strict`, or if none can be drawn."""
     result.places(options.at)
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}

@@ -8,7 +8,7 @@ import itertools
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -17,29 +17,28 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import Collection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from slipsweep.charts import solved, style
-from slipsweep.charts.solved import DISPLACEMENT
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
 
+#: Dashes and markers of the curves of a family, and how many markers a curve has.
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
+_MARKED = 7
 
 #: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line of a small panel.
 _WIDTH, _CHARACTERS, _LABEL = 7.0, 15, 26
 
 #: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
 _LINE, _LINES = 0.165, 4
-
-#: Markers on a curve.
-_MARKED = 7
 
 
 class Drawing:
@@ -120,7 +119,10 @@ def _without_colour(figure: Figure) -> None:
     for artist in figure.findobj():
         kinds: tuple[str, ...] = ()
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            artist.set_cmap(style.grey_map(artist.get_cmap()))
+            colours = artist.get_cmap()
+            ends = {"under": colours.get_under(), "over": colours.get_over()}
+            grey = ListedColormap(style.to_grey(colours(np.arange(colours.N))))
+            artist.set_cmap(grey.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
         elif isinstance(artist, Line2D):
             kinds = ("color", "markerfacecolor", "markeredgecolor")
         elif isinstance(artist, Patch | Collection):
@@ -139,25 +141,16 @@ class Panel:
         self._sheet, self._where = sheet, where
         self.axes, self.x, self.y, self.options = axes, sheet.x, sheet.y, sheet.options
         self.g = float(sheet.data.attrs["g"])
+        # the values along x and y, in the units that they are drawn in
+        self.xs, self.ys = (
+            axis_numbers(self.data, name) * self.options.scale(name, self.g) if name else np.zeros(0)
+            for name in (self.x, self.y)
+        )
 
     @property
     def data(self) -> xr.Dataset:
         """The sheet's slice at the panel's values."""
         return self._sheet.data.isel(self._where, missing_dims="ignore")
-
-    @property
-    def xs(self) -> Floats:
-        """The values along `x`, in the units that they are drawn in."""
-        return self.values(self.x)
-
-    @property
-    def ys(self) -> Floats:
-        """The values along `y`."""
-        return self.values(str(self.y))
-
-    def values(self, name: str) -> Floats:
-        """The values along an axis, in the units that they are drawn in."""
-        return axis_numbers(self.data, name) * self.options.scale(name, self.g)
 
     def grid(self, name: str | xr.DataArray) -> Any:
         """A variable over (y, x); without y of one row."""
@@ -195,12 +188,12 @@ class Sheet(Drawing):
             if title:
                 one.set_title(title, fontsize="medium")
 
-    def set_axis(self, side: str, name: str) -> None:
+    def set_axis(self, side: Literal["x", "y"]) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
-        values, label = self.panels[0].values(name), style.axis_label(name, self.options)
+        name, values = (self.x, self.panels[0].xs) if side == "x" else (str(self.y), self.panels[0].ys)
         for panel in self.panels:
             axes = panel.axes
-            axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": label})
+            axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": style.axis_label(name, self.options)})
             if name not in ("theta", "phi") and is_log(values):
                 axes.set(**{f"{side}scale": "log"})
                 log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
@@ -210,17 +203,13 @@ class Sheet(Drawing):
                 _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
-        """Say which unreliable values of a result are left out, and which are drawn on request: by flags.
-
-        No logarithmic scale shows what is below zero: displacements upslope are left out in any case.
-        """
+        """Say which unreliable values are left out or drawn on request; displacements upslope have no logarithm."""
         flags = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
         groups: dict[str, list[str]] = {}
         for flag, text in style.LEFT_OUT_TEXT.items():
-            if not any(has_flags(one, flag).any() for one in flags):
-                continue
-            drawn = self.options.show_cautions and not (name == DISPLACEMENT and flag == Validity.UPSLOPE)
-            groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
+            if any(has_flags(one, flag).any() for one in flags):
+                drawn = self.options.show_cautions and not (name == solved.DISPLACEMENT and flag == Validity.UPSLOPE)
+                groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
         self.notes += [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
@@ -231,7 +220,7 @@ class Sheet(Drawing):
         """
         drawn = reliable(self.data, name, self.options)
         self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
-        if name != DISPLACEMENT or solved.is_newmark(self.data):
+        if name != solved.DISPLACEMENT or solved.is_newmark(self.data):
             return
         theirs = solved.newmark(self.data)
         if theirs is not None:
@@ -352,7 +341,7 @@ def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, 
     return axes.get_ylim()[0] / 10
 
 
-def curve_looks(number: int) -> list[dict[str, Any]]:
+def curve_looks(number: int) -> list[Look]:
     """Colour, dash and marker of the curves of a family: told apart without colour."""
     # not up to the yellow end, which is faint on white and in grey
     colours = mpl.colormaps["viridis"](np.linspace(0, 0.68, number))

@@ -1,7 +1,4 @@
-"""Slices of a result: the cells that a chart shows, and no others, laid out in panels.
-
-A slice at a value that is not among those of the result is solved, with the same options.
-"""
+"""Slices of a result: the cells that a chart shows and no others, read, or solved where the result has none."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,13 +10,11 @@ import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
 from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
-from slipsweep.charts.style import SHOWN, Options, drawn_text
+from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
-from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
-from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
@@ -61,15 +56,14 @@ class Result:
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
-        _check_attributes(data.attrs, self.name)
+        check_attributes(data.attrs, self.name)
         for key, one in data.variables.items():
             units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
             if units and one.attrs.get("units", units) != units:
                 raise InputError(f'{name}: {key}: units = "{one.attrs["units"]}"; must be "{units}"')
         self.dims = [str(dim) for dim in data.sizes]
-        parameters = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
-        falling = [dim for dim in parameters if not data.get_index(dim).is_monotonic_increasing]
-        self.data = data.sortby(falling) if falling else data
+        ordered = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
+        self.data = data.sortby([dim for dim in ordered if not data.get_index(dim).is_monotonic_increasing])
         there = {*map(str, with_amplitude(data).coords)}
         block = () if "yield_coefficient" in there else ("theta", "mu_s")
         for key in (*block, "amplitude", "frequency") if self.sort == "sweep" else ():
@@ -100,19 +94,13 @@ class Result:
         return name
 
     def compared(self, name: str) -> list[str]:
-        """A result with its flags, and with Newmark's displacement if the file has it, or the record to solve it for.
-
-        That of harmonic motion is solved where it is drawn.
-        """
+        """A result with its flags, and Newmark's displacement if the file has it, or the record to solve it under."""
         theirs = "newmark_displacement"
         known = theirs in self.variables or (self.motion is not None and not is_newmark(self.data))
         return [name, "validity", *([theirs] if name == DISPLACEMENT and known else [])]
 
     def places(self, at: Mapping[str, At]) -> dict[str, list[Place]]:
-        """Where on the axes the values requested are.
-
-        InputError as `slipsweep.files.selection.find`, or for a value between those of the result where none is solved.
-        """
+        """Where on the axes the requested values are; InputError as `find`, or where no cell is or can be solved."""
         found = find(self.data, at, self.name)
         for name, places in found.items():
             for place in places:
@@ -130,11 +118,10 @@ class Result:
         return f"{tied} is known at those values only" if tied else ""
 
     def select(self, names: Iterable[str], keep: Mapping[str, Kept], at: Mapping[str, At]) -> xr.Dataset:
-        """The cells of a slice, read, or solved where they are not in the result.
+        """The cells of a slice, read, or solved where the result of a sweep does not have them.
 
-        Results of a sweep that are not in the file are solved for the slice.  `keep` has what stays of the axes that
-        stay; the others are cut where `at` says, else in the middle, `polarity` at 1.  Every parameter is a coordinate,
-        and the attribute ``picked`` has the names of the case and motion that were selected.
+        `keep` has what stays of the axes that stay; the others are cut where `at` says, else in the middle, `polarity`
+        at 1.  Every parameter is a coordinate; the attribute ``picked`` names the case and motion that were selected.
         """
         cuts, exact, picked = self.places(at), {}, {}
         index: dict[str, Any] = {}
@@ -181,21 +168,12 @@ class Result:
         self, options: Options, names: Sequence[str], x: str | Sequence[str], *, y: Sequence[str] = (),
         curves: Sequence[str] | None = None, keep: Sequence[str] = (), same: Sequence[str] = (),
     ) -> Sheet:  # fmt: skip
-        """The slice of a chart, in panels (InputError if an axis that was chosen is not there, or none is left).
+        """The slice of a chart that needs some results, in panels.
 
-        Parameters
-        ----------
-        options : Options
-        names : sequence of str
-            Results that it needs; the chart can be drawn over the axes of the first.
-        x : str, or sequence of str
-            What it is drawn over; or axes in order of preference, of which the user may choose another.
-        y, curves : sequence of str
-            Of a map, vertical axes; of curves, axes that tell them apart, if one is there; in order of preference.
-        keep : sequence of str
-            What else stays, whole or at the values requested.
-        same : sequence of str
-            Axes that the results do not vary along in fact: no panels are made of them.
+        It is drawn over `x`, or over the first of these axes that is there, or another that the user chooses: axes of
+        the first result.  `y` has axes for the ordinate of a map, and `curves` those that may tell curves apart, in
+        order of preference.  `keep` stays, too, whole or at the values requested; of `same`, along which the results
+        do not vary, no panels are made.  InputError: an axis that was chosen is not there, or none is left.
         """
         places = self.places(options.at)
         kept: dict[str, Kept] = {dim: places.get(dim, slice(None)) for dim in keep}
@@ -219,9 +197,8 @@ class Result:
             up = next((dim for dim in (*several, *curves) if dim in free), None)
         for dim in (across, str(up)) if y else (across,):
             if dim in options.at and dim not in keep:
-                raise InputError(
-                    f"{self.name}: {dim} = {options.at[dim]}: is an axis of this chart; it cannot have one value"
-                )
+                why = "is an axis of this chart; it cannot have one value"
+                raise InputError(f"{self.name}: {dim} = {options.at[dim]}: {why}")
         if across not in kept:
             kept[across] = self._thinned(across)
         if up:
@@ -268,19 +245,3 @@ def _sort(data: xr.Dataset) -> str:
     if not is_recorded(data):
         return "sweep"
     return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
-
-
-def _check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
-    """Refuse a result that does not say what was solved (InputError)."""
-    recorded = not {"record", "suite"}.isdisjoint(attrs)
-    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
-    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
-        if key not in attrs:
-            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
-    try:
-        MODELS.from_attributes(attrs)
-        if not recorded:
-            WAVEFORMS.from_attributes(attrs)
-        drawn_text(attrs)
-    except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise InputError(f"{name}: attributes do not say what was solved: {error}") from None
