@@ -676,13 +676,11 @@ def test_results_without_an_axis_or_an_attribute(here: Path, capsys: pytest.Capt
 
 
 def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path) -> None:
-    from slipsweep.charts import book
-
     assert main(["report", str(path)]) == 0
     pages = Path("grid.pdf").read_bytes().count(b"/Type /Page ")
     assert pages == len(SWEEP_KINDS)  # without the curve, with the title
     with slipsweep.open_result(path) as data:
-        title = book.title_page(Result(data, "grid.nc"))
+        title = kinds.title_page(Result(data, "grid.nc"))
     text = "\n".join(one.get_text() for one in title.texts)
     assert " θ: 11 values, 0 to 20 degree" in text
     for flag in maps.HATCHES:

@@ -10,46 +10,36 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from slipsweep.charts import solved, style
 from slipsweep.charts.sheet import Panel, Sheet, curve_looks, has_flags, log_axis, log_ticks, plot_curve, reliable
 from slipsweep.charts.slices import Result
+from slipsweep.charts.style import Look
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Mendez, Model, Newmark
-from slipsweep.model.variables import CAUTIONS, RESULTS, STRENGTHS, Validity
+from slipsweep.model.variables import CAUTIONS, RESULTS, STRENGTHS
 
-Floats = NDArray[np.float64]
-Curve = tuple[Floats, Floats]
+Curve = tuple[style.Floats, style.Floats]
 
 #: Least value of u ω² / A on its axis, where the largest is far above.
 _LEAST_SCALED = 1e-4
 
-_NEWMARK: dict[str, Any] = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
-_JUMP: dict[str, Any] = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
-_CAUTION: dict[str, Any] = {"color": "0.8", "linewidth": 7, "markersize": 14, "solid_capstyle": "butt", "zorder": 1.5}
-_UNSOUND: dict[str, Any] = {
-    "color": "0.55",
-    "linewidth": 7,
-    "markersize": 14,
-    "linestyle": (0, (0.15, 0.35)),
-    "zorder": 1.6,
-}
+_NEWMARK: Look = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
+_JUMP: Look = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
+_CAUTION: Look = {"color": "0.8", "linewidth": 7, "markersize": 14, "solid_capstyle": "butt", "zorder": 1.5}
+_UNSOUND: Look = _CAUTION | {"color": "0.55", "linestyle": (0, (0.15, 0.35)), "zorder": 1.6}
 
 #: What an engineer has to choose from in `spread`, what is given for it, and how it is drawn: the end of sliding, and
 #: the friction decay, also as the paper measured it on its shaking table, 2.30 and 2.70 (Table 2).
-_ENDS: dict[str, tuple[str, dict[str, Any]]] = {
+_ENDS: dict[str, tuple[str, Look]] = {
     "Eq. 12": ("eq12", {"color": style.BLUE, "markerfacecolor": style.BLUE}),
     "integration": ("integrate", {"color": style.VERMILION, "markerfacecolor": "white"}),
 }
-_DECAYS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+_DECAYS: dict[str, tuple[dict[str, Any], Look]] = {
     "λ by Eq. 6": ({"decay_rate": None}, {"linestyle": (0, (7, 2)), "marker": "o"}),
     "λ = 2": ({"decay_rate": 2.0, "minimum_friction": None}, {"linestyle": (0, (3, 1.5)), "marker": "s"}),
     "λ = 3": ({"decay_rate": 3.0, "minimum_friction": None}, {"linestyle": (0, (7, 2, 1.5, 2)), "marker": "^"}),
 }
-
-
-# ------------------------------------------------------------------------------- the kinds
 
 
 def families(result: Result, options: style.Options) -> Figure:
@@ -96,7 +86,7 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     if scaled:
         label, least, factor = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", _LEAST_SCALED, 0.0
     else:
-        sheet.set_axis("x", sheet.x)
+        sheet.set_axis("x")
     every = [_curves(panel, panel.data["drawn"], factor) for panel in sheet.panels]
     # the paper's axis of A/Üy begins at the yield acceleration
     values = np.concatenate([ys[xs > 1] if scaled else ys for curves in every for xs, ys in curves])
@@ -120,18 +110,15 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
 
 
 def spread(result: Result, options: style.Options) -> Figure:
-    """The results of options that an engineer has to choose from, the band between them, and this result.
-
-    Newmark's block; friction decay λ by Eq. 6 or as measured; sliding that ends by Eq. 12 or by integration.
-    """
+    """This result, and the range of those of other options: Newmark's block, λ as measured, stop by integration."""
     if "yield_coefficient" in result.data.coords:
         raise InputError(f"{result.name}: the result has ky alone: other options of the model need theta and mu_s")
     sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), solved.DRIVES)
     # the others have a mode limit, whatever this one is
     sheet.show(solved.DISPLACEMENT, "Barred, of this result", always=True)
-    sheet.set_axis("x", sheet.x)
+    sheet.set_axis("x")
     flags: list[xr.DataArray] = []
-    answers = [_answers(panel, sheet.data.coords.get("decay_rate"), flags) for panel in sheet.panels]
+    answers = [_answers(sheet, panel, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for (_, ys), _ in one.values()])
     for panel, curves in zip(sheet.panels, answers, strict=True):
         log_axis(panel.axes, values, "permanent displacement (mm)")
@@ -139,9 +126,8 @@ def spread(result: Result, options: style.Options) -> Figure:
         each = np.array([ys for (_, ys), _ in curves.values()])
         # what is zero lies below any logarithmic axis, not nowhere
         low, high = (np.maximum(most(each, axis=0), 1e-300) for most in (np.fmin.reduce, np.fmax.reduce))
-        area: dict[str, Any] = {"facecolor": "0.92", "linewidth": 0}
-        panel.axes.fill_between(xs, low, high, zorder=1, gid="spread", **area)
-        sheet.legend["range of these results"] = Patch(**area)
+        area: Look = {"facecolor": "0.92", "linewidth": 0, "zorder": 1, "gid": "spread"}
+        sheet.legend["range of these results"] = panel.axes.fill_between(xs, low, high, **area)
         for number, (text, (curve, look)) in enumerate(curves.items()):
             place = number / len(curves)
             sheet.legend[text] = plot_curve(panel.axes, *_above_zero(curve), place, label=text, **look)
@@ -152,23 +138,13 @@ def spread(result: Result, options: style.Options) -> Figure:
     return sheet.done()
 
 
-# ------------------------------------------------------------------------ what they show
-
-
-def _answers(
-    panel: Panel, given: xr.DataArray | None, flags: list[xr.DataArray]
-) -> dict[str, tuple[Curve, dict[str, Any]]]:
-    """The curves of a spread, mm, over the same abscissae, and their looks; the result's own comes last.
-
-    All have the slice's own yield acceleration.  `given` is λ of the result in all panels; `flags` gets the validity.
-    """
+def _answers(sheet: Sheet, panel: Panel, flags: list[xr.DataArray]) -> dict[str, tuple[Curve, Look]]:
+    """The curves of a spread, mm, over the same abscissae, and their looks, the result's own last; adds to `flags`."""
     data, own = panel.data, MODELS.from_attributes(panel.data.attrs)
     ours = own if isinstance(own, Mendez) else Mendez(g=panel.g)
-    options: dict[str, tuple[Model, dict[str, Any], dict[str, Any]]] = {
-        style.NEWMARK: (Newmark(g=panel.g), {}, {"color": "0.35", "linestyle": "-", "marker": "x"})
-    }
-    for end, decay in itertools.product(_ENDS, _DECAYS):
-        (recoupling, colours), (changed, dash) = _ENDS[end], _DECAYS[decay]
+    newmark: Look = {"color": "0.35", "linestyle": "-", "marker": "x"}
+    options: dict[str, tuple[Model, dict[str, Any], Look]] = {style.NEWMARK: (Newmark(g=panel.g), {}, newmark)}
+    for (end, (recoupling, colours)), (decay, (changed, dash)) in itertools.product(_ENDS.items(), _DECAYS.items()):
         options[f"{decay}, stop by {end}"] = ours.but(recoupling=recoupling), changed, colours | dash
     found = {}
     for text, (model, changed, look) in options.items():
@@ -178,22 +154,17 @@ def _answers(
         found[text] = _curves(panel, drawn, 1000.0)[0], {"linewidth": 1.0, "markersize": 3.5, **look}
     text = style.NEWMARK
     if own is ours:
+        given = sheet.data.coords.get("decay_rate")
         decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
         text = f"{decay}, stop by {'Eq. 12' if own.options['recoupling'] == 'eq12' else 'integration'}"
-    own_look: dict[str, Any] = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
-    return {**found, f"this result:\n{text}": (_curves(panel, data["drawn"], 1000.0)[0], own_look)}
-
-
-# -------------------------------------------------------------------------- jumps and gaps
+    heavy: Look = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
+    return {**found, f"this result:\n{text}": (_curves(panel, data["drawn"], 1000.0)[0], heavy)}
 
 
 def _curves(panel: Panel, array: xr.DataArray, factor: float, gaps: bool = True) -> list[Curve]:
-    """The curves of a panel in units of `factor`; of 0, as uω²/A over A/Üy.
-
-    They have a gap where the amplitude passes the mode limit: the jump is no line.
-    """
+    """The curves of a panel times `factor`, of 0 as uω²/A over A/Üy, with `gaps` where they pass the mode limit."""
     if factor:
-        curves = [(panel.values(panel.x), ys * factor) for ys in panel.grid(array)]
+        curves = [(panel.xs, ys * factor) for ys in panel.grid(array)]
     else:
         amplitude = panel.grid("amplitude")
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -211,7 +182,7 @@ def _above_zero(curve: Curve) -> Curve:
     return curve[0], np.where(curve[1] > 0, curve[1], np.nan)
 
 
-def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: dict[str, Any]) -> None:
+def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: Look) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
     xs, ys = _above_zero(curve)
     text = panel.member(member) or (style.NEWMARK if solved.is_newmark(panel.data) else "this result")
@@ -223,21 +194,21 @@ def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, l
             sheet.remarks["jump at the mode limit"] = Line2D([], [], color="0.3", **_JUMP)
 
 
-def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: dict[str, Any]) -> None:
+def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: Look) -> None:
     """Draw Newmark's curve: thin, with the dash of its curve of a family; dashed where there is one curve."""
-    single = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
-    look = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
-    panel.axes.plot(*_above_zero(curve), gid="newmark", **look)
+    single: Look = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
+    own = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
+    panel.axes.plot(*_above_zero(curve), gid="newmark", **own)
     text = f"{style.NEWMARK} (same dash)" if panel.y else style.NEWMARK
-    sheet.remarks[text] = Line2D([], [], **(_NEWMARK if panel.y else look))
+    sheet.remarks[text] = Line2D([], [], **(_NEWMARK if panel.y else own))
 
 
 def _underlay(sheet: Sheet, panel: Panel, factor: float) -> None:
     """Put a broad grey line under what a caution is about, and a barred one under what no block does."""
     drawn = panel.data["drawn"]
     flagged = (drawn > 0) & has_flags(panel.data["validity"], CAUTIONS)
-    codes = sheet.data["validity"].where(sheet.data["drawn"] > 0, 0).values.astype(int)
-    names = [style.flag_name(flag) for flag in CAUTIONS & Validity(int(np.bitwise_or.reduce(codes, axis=None)))]
+    seen = sheet.data["validity"].where(sheet.data["drawn"] > 0)
+    names = [style.flag_name(flag) for flag in CAUTIONS if has_flags(seen, flag).any()]
     marks = [("caution", "caution:\n" + "\n".join(names), _CAUTION, flagged)]
     if "unsound" in panel.data:
         text = style.UNSOUND if "newmark" in panel.data else "falls with A"
@@ -251,13 +222,12 @@ def _underlay(sheet: Sheet, panel: Panel, factor: float) -> None:
 
 def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
     """Vertical lines where the amplitude passes a threshold that all curves of a panel share."""
-    low, high = panel.axes.get_xlim()
-    data = panel.data
+    (low, high), data = panel.axes.get_xlim(), panel.data
     if panel.x in ("yield_coefficient", "yield_acceleration") and "amplitude" in data and not solved.is_recorded(data):
         place = data["amplitude"].values.max() / (panel.g if panel.x == "yield_coefficient" else 1.0)
         place *= panel.options.scale(panel.x, panel.g)
         if low < place < high and data["amplitude"].size == 1:
-            look: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.7", "hatch": ".."}
+            look: Look = {"facecolor": "none", "edgecolor": "0.7", "hatch": ".."}
             panel.axes.axvspan(place, high, linewidth=0, zorder=0.5, **look)
             sheet.remarks[f"{style.NO_SLIDING}: Üy above A"] = Patch(**look)
     for name, (text, look) in style.LINES.items() if panel.x == "amplitude" else ():

@@ -13,18 +13,18 @@ from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import thresholds
-from slipsweep.charts.style import BLUE, VERMILION, Options
+from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.model.variables import SlidingMode
 
 #: How the half waves of a record are drawn: told apart in grey, too.
-_MODES: dict[SlidingMode, dict[str, Any]] = {
+_MODES: dict[SlidingMode, Look] = {
     SlidingMode.STUCK: {"facecolor": "white", "edgecolor": "0.6", "linewidth": 0.5},
     SlidingMode.STICK_SLIP: {"facecolor": "#BBD7EA", "edgecolor": BLUE, "linewidth": 0.5},
     SlidingMode.CONTINUOUS: {"facecolor": VERMILION, "edgecolor": "black", "linewidth": 0.5, "hatch": "/////"},
 }
 
 #: What legends above a panel have in common.
-_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False}
+_ABOVE: Look = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False}
 
 _GREY = "0.45"
 
@@ -37,7 +37,6 @@ _CHANNELS = {
 
 
 def _plot(panel: Axes, table: xr.Dataset, name: str, ylabel: str, factor: float = 1.0, **look: Any) -> None:
-    """A variable over time."""
     panel.plot(table["time"].values, factor * table[name].values, **{"color": VERMILION, **look})
     panel.set_ylabel(ylabel)
 
@@ -52,15 +51,8 @@ def _finish(drawing: Drawing, panels: Iterable[Axes], texts: list[str]) -> Figur
     return drawing.finish(texts)
 
 
-# ------------------------------------------------------------------------- of `simulate`
-
-
 def history(result: Result, options: Options) -> Figure:
-    """A time history in the manner of the paper's Figs. 5, 8 and 9.
-
-    Under a record a row of boxes on top has the sliding mode of each positive half wave, and lines show the
-    accelerations of yield and of the mode limit.
-    """
+    """A time history in the manner of the paper's Figs. 5, 8 and 9; of a record with the modes of its half waves."""
     data = result.data
     modes, friction = "half_wave_mode" in data, "friction_coefficient" in data
     heights = [*([0.22] if modes else []), *([1.0] * (3 + friction))]
@@ -73,7 +65,11 @@ def history(result: Result, options: Options) -> Figure:
     _plot(accelerations, data, "block_acceleration", label, linestyle="--", label="block")
     if modes:
         _draw_modes(drawing.grid[0, 0], data)
-        _draw_thresholds(accelerations, data)
+        highest = data["half_wave_peak"].values.max(initial=0.0)
+        for name, value in thresholds(data).items():
+            if np.isfinite(value) and value <= 1.5 * highest:
+                text, look = style.LINES[str(name)]
+                accelerations.axhline(value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5})
     accelerations.legend(ncols=4, fontsize="small", **_ABOVE)
     if friction:
         _plot(panels[1], data, "friction_coefficient", "friction\ncoefficient")
@@ -102,18 +98,6 @@ def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
     panel.margins(x=0)
 
 
-def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
-    """Lines of the accelerations of yield and, but for Newmark's block, of the mode limit."""
-    highest = data["half_wave_peak"].values.max(initial=0.0)
-    for name, value in thresholds(data).items():
-        if np.isfinite(value) and value <= 1.5 * highest:
-            text, look = style.LINES[str(name)]
-            panel.axhline(value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5})
-
-
-# ------------------------------------------------------------- of tests on a shaking table
-
-
 def friction(result: Result, options: Options) -> Figure:
     """Measured friction in the manner of the paper's Fig. 7, with the friction by statics; slides are shaded."""
     table = result.data
@@ -137,15 +121,12 @@ def friction(result: Result, options: Options) -> Figure:
 
 
 def calibration(result: Result, options: Options) -> Figure:
-    """Measured against computed motion in the manner of the paper's Figs. 8 and 9, a column for each test.
-
-    With the misfit of each channel, the friction by Eq. 1 and by statics, and in the caption the parameters.
-    """
+    """Measured against computed motion in the manner of the paper's Figs. 8 and 9, a column for each test."""
     table = result.data
     tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
     rows = 5 if "free_body_friction" in table else 4
-    size = (7.0 if len(tests) == 1 else 5.0 * len(tests), 9.0)
-    drawing = Drawing(options, rows, len(tests), size, sharey=False)
+    width = 7.0 if len(tests) == 1 else 5.0 * len(tests)
+    drawing = Drawing(options, rows, len(tests), (width, 9.0), sharey=False)
     for test, panels in zip(tests, drawing.grid.T, strict=True):
         shown = test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values})
         _draw_test(shown, list(panels))
@@ -155,9 +136,8 @@ def calibration(result: Result, options: Options) -> Figure:
 
 
 def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
-    """One test of a calibration."""
     ground, label = panels[0], "acceleration of\nthe table (m/s²)"
-    measured: dict[str, Any] = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
+    measured: Look = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
     _plot(ground, table, "measured_ground_acceleration", label, **measured)
     _plot(ground, table, "computed_ground_acceleration", label, color=BLUE, label="smooth")
     ground.legend(ncols=2, **_ABOVE)
@@ -179,7 +159,7 @@ def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
 def _friction_lines(table: xr.Dataset, panel: Axes) -> None:
     """Friction by Eq. 1 and by statics; told apart in grey by their widths and dashes."""
     label = "friction\ncoefficient"
-    dashed: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 1.5))}
+    dashed: Look = {"linewidth": 1.0, "linestyle": (0, (4, 1.5))}
     _plot(panel, table, "free_body_friction", label, color=BLUE, linewidth=1.6, label="by statics")
     _plot(panel, table, "friction_coefficient", label, label="μ(t) by Eq. 1", **dashed)
 

@@ -1,20 +1,22 @@
-"""The kinds of charts: which results have them, and what draws each.
+"""What is drawn of which result, by command and from Python: the kinds of charts, and all of them as one PDF."""
 
-The command line and `Dataset.slipsweep.chart` both come here.
-"""
-
+import textwrap
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from slipsweep.charts import curves, histories, limits, maps, statistics, suites
+from slipsweep._version import __version__
+from slipsweep.charts import curves, histories, limits, maps, statistics, style, suites
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DISPLACEMENT, is_newmark
+from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
+from slipsweep.files.contents import values_text
+from slipsweep.model.variables import PARAMETERS, REFERENCE
 
 Draw = Callable[[Result, Options], Figure]
 
@@ -36,8 +38,8 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "hazard": ("annual rates", (limits.hazard,)),
 }  # fmt: skip
 
-#: What results that are drawn whole have no choice of.
-_CHOICES = ("at", "x", "y", "panels", "levels")
+#: Characters in a line of a title page.
+_WIDTH = 96
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
@@ -77,12 +79,10 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
     kinds = kinds_of(result.sort)
     kind = fitting(result, options)[0] if kind is None else check_kind(kind)
     if kind not in kinds:
-        one_of = "one of " if len(kinds) > 1 else ""
-        raise InputError(
-            f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {one_of}{', '.join(kinds)}"
-        )
-    for name in _CHOICES if not result.dims else ():
-        if getattr(options, name):
+        allowed = f"{'one of ' if len(kinds) > 1 else ''}{', '.join(kinds)}"
+        raise InputError(f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}")
+    for name in ("at", "x", "y", "panels", "levels"):
+        if getattr(options, name) and not result.dims:
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
     with mpl.rc_context({"font.size": options.font}):
         try:
@@ -101,10 +101,7 @@ def figure_of(data: xr.Dataset, name: str = "dataset", kind: str | None = None, 
 def draw_all(
     result: Result, kinds: Iterable[str], options: Options, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
-    """Draw several charts; where not `strict`, those that cannot be drawn are named with the reason.
-
-    InputError as `draw`, or if none can be drawn.
-    """
+    """Several charts, and why others cannot be drawn; InputError as `draw` if `strict`, or if none can be drawn."""
     result.places(options.at)
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
@@ -119,3 +116,52 @@ def draw_all(
         reasons = "; ".join(dict.fromkeys(left_out.values()))
         raise InputError(f"{result.name}: no chart can be drawn from it: {reasons}")
     return figures, left_out
+
+
+def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
+    """Write a title page and some charts as pages of one PDF."""
+    from matplotlib.backends.backend_pdf import PdfPages  # here: other charts do without it
+
+    with PdfPages(path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}) as pages:
+        for figure in (title_page(result), *figures):
+            pages.savefig(figure)
+
+
+def title_page(result: Result) -> Figure:
+    """What was computed, of which inputs, by which model and estimates, and by which versions."""
+    attributes, coords = result.attrs, result.data.coords
+    names = {name: f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}" for name in PARAMETERS}
+    names |= {"label": "label", "motion": "motion"}
+    inputs = [style.plain(f"{text}: {values_text(coords[name])}") for name, text in names.items() if name in coords]
+    compared = ["one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"]
+    if is_recorded(result.data):
+        compared.append("none under recorded motions: the rules for them extend the paper")
+    sections = {
+        "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
+        "Inputs": [*inputs, *filter(None, [style.drawn_text(attributes)])],
+        "Model and estimates": style.model_text(attributes).splitlines(),
+        "Range in which the model was compared with measurements": compared,
+    }
+    if not is_recorded(result.data):
+        left_out = "; left out of contours and curves unless their caption says that it is drawn"
+        sections["Flags that the charts hatch"] = [
+            f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in style.LEFT_OUT else ''}"
+            for flag in maps.HATCHES
+        ]
+    sections["Origin"] = [
+        style.plain(result.name),
+        f"solved by {attributes.get('source', 'slipsweep')}",
+        f"drawn by slipsweep {__version__}, matplotlib {mpl.__version__}",
+        *style.plain(str(attributes.get("history", ""))).splitlines(),
+        REFERENCE,
+    ]
+    figure = Figure(figsize=(8.27, 11.69))
+    title = style.plain(textwrap.fill(str(attributes.get("title", "")), 54))
+    figure.text(0.08, 0.94, title, fontsize="xx-large", va="top")
+    lines = []
+    for heading, texts in sections.items():
+        lines += ["", heading.upper()]
+        for text in texts:
+            lines += textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="    ")
+    figure.text(0.08, 0.86, "\n".join(lines), fontsize="small", va="top", linespacing=1.4)
+    return figure

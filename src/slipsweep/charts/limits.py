@@ -1,60 +1,49 @@
 """Charts of what a tolerable displacement allows: limit amplitudes, and mean annual rates of exceedance."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from slipsweep.charts import style
-from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, log_ticks, member_text, over, plot_curve
+from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, log_ticks, member_text, plot_curve
 from slipsweep.charts.slices import NAMED, Result
-from slipsweep.charts.suites import draw_suite, kept_motions, suite_text
+from slipsweep.charts.style import Floats, Look, Options
+from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import LimitStatus
-from slipsweep.studies.suite_statistics import QUANTILES, SUITE, limit_quantiles
+from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
 #: What is drawn along the abscissa, and as curves, in order of preference.
 _ABSCISSAE = ("frequency", "mu_s", "theta", "displacement")
 _CURVES = ("theta", "displacement", "mu_s", "case")
 
-Floats = NDArray[np.float64]
-
 #: Most grid points of annual rates, a curve each; most displacements that are marked, and those of a smooth curve.
 _MOST_CURVES, _MOST_MARKS, _POINTS = 8, 20, 121
 
 
-# --------------------------------------------------------------------- of `limit_amplitude`
-
-
-def limit(result: Result, options: style.Options) -> Figure:
+def limit(result: Result, options: Options) -> Figure:
     """Limit amplitudes, in g, over one axis: a curve for each value of another, or a thin line for each motion.
 
     Curves end where no limit exists; circles mark limits set by a discontinuity of the model.  Of a suite with the
     median and the 16 to 84 % band; where nothing but the motion varies, the motions lie along the abscissa.
     """
-    suite = kept_motions(result) if "motion" in result.dims else {}
+    suite = SUITE if "motion" in result.dims else ()
     along = "motion" if suite and not {*result.wide} - {*SUITE, *options.at} else _ABSCISSAE
-    curves = None if suite else _CURVES
     names, shown = ["limit_amplitude", "limit_status"], replace(options, more_panels=True)
-    sheet = result.sheet(shown, names, along, curves=curves, keep=suite)
+    sheet = result.sheet(shown, names, along, curves=None if suite else _CURVES, keep=suite)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9", which="both")
         panel.axes.set_ylabel("limit amplitude A / g")
-        if suite:
-            _draw_motions(sheet, panel)
-        else:
-            _draw_curves(sheet, panel)
-    if sheet.x in NAMED:
-        for panel in sheet.panels:
+        (_draw_motions if suite else _draw_curves)(sheet, panel)
+        if sheet.x in NAMED:
             labels = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
-            panel.axes.set_xticks(panel.values(sheet.x), labels, rotation=40, ha="right")
+            panel.axes.set_xticks(panel.xs, labels, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
-    else:
-        sheet.set_axis("x", sheet.x)
+    if sheet.x not in NAMED:
+        sheet.set_axis("x")
     # one scale for all, from zero; only now, for it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():
@@ -66,9 +55,8 @@ def limit(result: Result, options: style.Options) -> Figure:
 
 def _draw_curves(sheet: Sheet, panel: Panel) -> None:
     """The curves of a family, in circles where a discontinuity of the model sets the limit."""
-    xs = panel.values(panel.x)
-    limits, states = panel.grid("limit_amplitude") / panel.g, panel.grid("limit_status")
-    circle: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 9, "color": "0.82", "zorder": 1.5}
+    xs, limits, states = panel.xs, panel.grid("limit_amplitude") / panel.g, panel.grid("limit_status")
+    circle: Look = {"linestyle": "none", "marker": "o", "markersize": 9, "color": "0.82", "zorder": 1.5}
     for member, look in enumerate(curve_looks(len(limits))):
         line = plot_curve(panel.axes, xs, limits[member], member / len(limits), **look)
         if panel.y:
@@ -81,13 +69,11 @@ def _draw_curves(sheet: Sheet, panel: Panel) -> None:
 
 def _draw_motions(sheet: Sheet, panel: Panel) -> None:
     """The limits of the motions of a suite, with their median and band."""
-    xs, limits = panel.values(panel.x), panel.data["limit_amplitude"]
-    found = limit_quantiles(panel.data, QUANTILES)["limit_quantile"]
-    quantiles = found.transpose("quantile", ...).values / panel.g
+    xs, limits = panel.xs, panel.data["limit_amplitude"]
+    quantiles = limit_quantiles(panel.data)["limit_quantile"].transpose("quantile", ...).values / panel.g
     quantiles[np.isinf(quantiles)] = np.nan
     if panel.x != "motion":
-        dims = [dim for dim in SUITE if dim in limits.dims]
-        lines = over(limits, panel.data, (*dims, panel.x)).reshape(-1, xs.size)
+        lines = limits.transpose(*SUITE, panel.x, missing_dims="ignore").values
         draw_suite(sheet.legend, panel.axes, xs, lines / panel.g, quantiles)
         return
     # no lines from motion to motion: a row of points for each polarity, and the quantiles across all of them
@@ -97,7 +83,7 @@ def _draw_motions(sheet: Sheet, panel: Panel) -> None:
     points = limits.transpose("motion", ...).values.reshape(xs.size, -1)
     polarities = panel.data["polarity"].values if "polarity" in limits.dims else ()
     names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
-    look: dict[str, Any] = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
+    look: Look = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
     for name, row, marker in zip(names, points.T / panel.g, "os", strict=False):
         (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
 
@@ -108,16 +94,11 @@ def _suite_text(data: xr.Dataset) -> str:
     beyond, invalid = (int(np.count_nonzero(status == one)) for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID))
     texts = [f"Median and band are of {suite_text(data['limit_amplitude'].sizes)}."]
     if beyond:
-        highest = float(data.attrs["maximum_amplitude"]) / float(data.attrs["g"])
-        texts.append(
-            f"{beyond} of {status.size} limits are above {highest:.4g} g; they count as larger than all others."
-        )
+        highest = f"{float(data.attrs['maximum_amplitude']) / float(data.attrs['g']):.4g} g"
+        texts.append(f"{beyond} of {status.size} limits are above {highest}; they count as larger than all others.")
     if invalid:
         texts.append(f"{invalid} of {status.size} have no value and are left out.")
     return " ".join(texts)
-
-
-# ----------------------------------------------------------------- of `displacement_hazard`
 
 
 def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
@@ -127,7 +108,7 @@ def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
     return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], requested)
 
 
-def hazard(result: Result, options: style.Options) -> Figure:
+def hazard(result: Result, options: Options) -> Figure:
     """The mean annual rate of exceedance over the displacement, a curve for each grid point.
 
     The displacements that the attribute ``marked`` has, by default all if they are few, have a marker.  Curves are
@@ -135,12 +116,11 @@ def hazard(result: Result, options: style.Options) -> Figure:
     """
     rates = result.data
     grid = {str(dim): size for dim, size in rates["valueless_share"].sizes.items()}
-    points = [dict(zip(grid, at, strict=True)) for at in np.ndindex(*grid.values())]
-    names = [", ".join(member_text(rates, dim, at, options) for dim, at in one.items()) for one in points]
+    points = [zip(grid, at, strict=True) for at in np.ndindex(*grid.values())]
+    names = [", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points]
     if len(names) > _MOST_CURVES:
-        raise InputError(
-            f"{len(names)} grid points: a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
-        )
+        most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
+        raise InputError(f"{len(names)} grid points: {most}")
     wanted = rates["threshold"].values
     marks = np.isin(wanted, rates.attrs.get("marked", wanted if wanted.size <= _MOST_MARKS else []))
     lines, held = (rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate"))

@@ -25,11 +25,11 @@ from slipsweep.charts import style
 from slipsweep.charts.sheet import Panel, Sheet, has_flags
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DISPLACEMENT, DRIVES, is_newmark
-from slipsweep.charts.style import Options
+from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.model.variables import RESULTS, SlidingMode, Validity
 
-Floats = NDArray[np.float64]
+Cells = NDArray[np.bool_]
 
 #: Colour and hatch of each mode: from light to dark.
 MODES = {
@@ -67,20 +67,17 @@ _LABEL_SPACE, _LINE_SPACE = 0.28, 0.11
 _RATIOS = (1.1, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
 
 
-# ------------------------------------------------------------------------------- the kinds
-
-
 def contours(result: Result, options: Options) -> Figure:
     """Contours of a result, with the lines of yield and of the mode limit."""
     name, levels = result.quantity(options.variable), options.heights
     if len(levels) == 1:
         raise InputError(f"levels: {levels[0]:g}: must be two different values or more")
-    sheet = _sheet(result, options, result.compared(name), ("frequency", "theta", "mu_s"), [])
+    sheet = _sheet(result, options, result.compared(name), ("frequency", "theta", "mu_s"))
     drawn = sheet.data["drawn"]
     levels = levels or _levels(name, drawn.values)
     if not levels or not np.isfinite(drawn).any():
-        above = (drawn > 0).any()
-        sheet.notes.append(f"No contours: {'all values are about the same' if above else 'no values above zero'}.")
+        why = "all values are about the same" if (drawn > 0).any() else "no values above zero"
+        sheet.notes.append(f"No contours: {why}.")
         return _finish(sheet, name)
     colours = style.COLOURS.resampled(len(levels) + 1)
     norm = BoundaryNorm(np.log10(levels), colours.N, extend="min" if np.nanmax(drawn) < levels[-1] else "both")
@@ -95,8 +92,7 @@ def newmark(result: Result, options: Options) -> Figure:
     """The ratio of the permanent displacement to that of Newmark's block."""
     if is_newmark(result.data):
         raise InputError(f"{result.name}: the result is of Newmark's block itself: the ratio is 1 everywhere")
-    across = ("theta", "mu_s", "frequency")
-    sheet = _sheet(result, options, result.compared(DISPLACEMENT), across, _same(result))
+    sheet = _sheet(result, options, result.compared(DISPLACEMENT), ("theta", "mu_s", "frequency"))
     sheet.data["drawn"] = (sheet.data["drawn"] / sheet.data["newmark"]).where(sheet.data["newmark"] > 0)
     ratio = sheet.data["drawn"].values
     there = ratio[np.isfinite(ratio) & (ratio > 0)]
@@ -115,66 +111,51 @@ def newmark(result: Result, options: Options) -> Figure:
 
 def modes(result: Result, options: Options) -> Figure:
     """The sliding mode of every cell, by colour and hatch."""
-    across = ("theta", "yield_coefficient", "mu_s", "frequency")
-    sheet = _sheet(result, options, ["sliding_mode", "validity"], across, _same(result))
+    sheet = _sheet(result, options, ["sliding_mode", "validity"], ("theta", "yield_coefficient", "mu_s", "frequency"))
     for panel, (mode, (colour, hatch)) in itertools.product(sheet.panels, MODES.items()):
-        look = {"facecolor": colour, "edgecolor": "white", "hatch": hatch}
-        border = {"edgecolor": "0.6"} if mode is SlidingMode.STUCK else {}
-        _mark(sheet, panel, panel.grid("sliding_mode") == int(mode), style.MODE_TEXT[mode], look | border, 0.5)
+        look = {"facecolor": colour, "edgecolor": "white" if hatch else "0.6", "hatch": hatch}
+        _mark(sheet, panel, panel.grid("sliding_mode") == int(mode), style.MODE_TEXT[mode], look, 0.5)
     return _finish(sheet, "sliding_mode")
 
 
-# -------------------------------------------------------------------------- what they share
-
-
-def _same(result: Result) -> list[str]:
-    """With the amplitude given, modes and ratios of displacements do not depend on the frequency."""
-    return ["frequency"] if "displacement_amplitude" not in result.data.coords else []
-
-
-def _sheet(result: Result, options: Options, names: list[str], across: Sequence[str], same: list[str]) -> Sheet:
+def _sheet(result: Result, options: Options, names: list[str], across: Sequence[str]) -> Sheet:
     """The slice of a map of the first of some results, with its axes and the lines of yield and of the mode limit."""
-    sheet = result.sheet(options, names, across, y=DRIVES, same=same)
+    # with the amplitude given, modes and ratios of displacements do not depend on the frequency
+    varies = across[0] == "frequency" or "displacement_amplitude" in result.data.coords
+    sheet = result.sheet(options, names, across, y=DRIVES, same=[] if varies else ["frequency"])
     sheet.show(names[0], f"Hatched {UNSOUND_HATCH}")
-    for side, name in (("x", sheet.x), ("y", str(sheet.y))):
-        sheet.set_axis(side, name)
+    sheet.set_axis("x")
+    sheet.set_axis("y")
     for panel, (name, (text, look)) in itertools.product(sheet.panels, style.LINES.items()):
-        if name not in panel.data:
-            continue
-        excess = np.ma.masked_invalid(panel.grid("amplitude") - panel.grid(name))
+        excess = _excess(panel, name)
         if excess.count() and excess.min() < 0 < excess.max():
-            drawing: dict[str, Any] = {f"{key}s": [value] for key, value in look.items()}
-            lines = panel.axes.contour(panel.values(panel.x), panel.values(str(panel.y)), excess, [0.0], **drawing)
-            lines.set_gid(name)
+            drawing: Look = {f"{key}s": [value] for key, value in look.items()}
+            panel.axes.contour(panel.xs, panel.ys, excess, [0.0], **drawing).set_gid(name)
             sheet.remarks[text] = Line2D([], [], **look)
     return sheet
 
 
-# ------------------------------------------------------------------------- filled contours
+def _excess(panel: Panel, line: str) -> Any:
+    """Amplitudes over a threshold, masked where there is none."""
+    return np.ma.masked_invalid(panel.grid("amplitude") - (panel.grid(line) if line in panel.data else np.nan))
 
 
 def _fill_panels(
     sheet: Sheet, colours: Colormap, norm: BoundaryNorm, texts: list[str], label: str, least: float = 0.0
 ) -> None:
-    """Fill between contours and label them; both end on the mode limit, where the result jumps.
-
-    Values below `least` are drawn as that; of zero there is no logarithm.
-    """
+    """Fill between contours and label them, up to the jump at the mode limit; values below `least` are drawn as it."""
     places, areas = norm.boundaries, None
-    look: dict[str, Any] = {"cmap": colours, "norm": norm}
-    line: dict[str, Any] = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
+    look: Look = {"cmap": colours, "norm": norm}
+    line: Look = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
     for panel in sheet.panels:
-        xs, ys = panel.values(panel.x), panel.values(str(panel.y))
+        xs, ys = panel.xs, panel.ys
         with np.errstate(divide="ignore", invalid="ignore"):
             logs = np.log10(np.maximum(panel.grid("drawn"), least))
         # what contours leave open along the mode limit and cells without a value has the colours of the cells
         cells = np.ma.masked_invalid(logs)
         panel.axes.pcolormesh(xs, ys, cells, shading="nearest", zorder=0.4, rasterized=True, **look)
-        sides = [np.ones_like(logs, bool)]
-        if "limit_line" in panel.data:  # no contour crosses the jump
-            beyond = panel.grid("amplitude") > panel.grid("limit_line")
-            sides = [np.broadcast_to(side, logs.shape) for side in (~beyond, beyond)]
-        for side in sides:
+        beyond = _excess(panel, "limit_line").filled(-1.0) > 0
+        for side in (~beyond, beyond):  # no contour crosses the jump
             shown = np.ma.masked_invalid(np.where(side, logs, np.nan))
             if shown.count():
                 areas = panel.axes.contourf(xs, ys, shown, places, zorder=0.5, extend=norm.extend, **look)
@@ -228,18 +209,18 @@ def _levels(name: str, values: Floats) -> list[float]:
     return inside
 
 
-# ---------------------------------------------------------------------- areas and hatching
-
-
 def _finish(sheet: Sheet, name: str) -> Figure:
     """Area of no sliding, hatching, legend and caption of a map."""
     scraps: dict[str, int] = {}
     for panel in sheet.panels:
-        if name != "sliding_mode":
-            _cover_no_sliding(sheet, panel)
-        hatches = {
-            style.flag_name(flag): (has_flags(panel.data["validity"], flag), hatch) for flag, hatch in HATCHES.items()
-        }
+        excess = _excess(panel, "yield_line")
+        if name != "sliding_mode" and excess.count() and excess.min() < 0:
+            # left white up to the line of yield: no colour of a displacement stands for what does not slide
+            if excess.max() > 0:
+                levels = [float(excess.min()) - 1.0, 0.0]
+                panel.axes.contourf(panel.xs, panel.ys, excess, levels, colors="white", zorder=1.05)
+            sheet.legend[style.NO_SLIDING] = Patch(facecolor="white", edgecolor="0.6", linewidth=0.6)
+        hatches = {style.flag_name(flag): (has_flags(panel.data["validity"], flag), HATCHES[flag]) for flag in HATCHES}
         if "unsound" in panel.data:
             hatches[style.UNSOUND] = panel.data["unsound"], UNSOUND_HATCH
         for text, (cells, hatch) in hatches.items():
@@ -255,39 +236,23 @@ def _finish(sheet: Sheet, name: str) -> Figure:
     return sheet.done(beside=False)
 
 
-def _cover_no_sliding(sheet: Sheet, panel: Panel) -> None:
-    """Leave white, up to the line of yield, what does not slide: no colour of a displacement stands for it."""
-    excess = np.ma.masked_invalid(panel.grid("amplitude") - panel.grid("yield_line"))
-    if not excess.count() or excess.min() >= 0:
-        return
-    if excess.max() > 0:
-        xs, ys = panel.values(panel.x), panel.values(str(panel.y))
-        panel.axes.contourf(xs, ys, excess, [float(excess.min()) - 1.0, 0.0], colors="white", zorder=1.05)
-    sheet.legend[style.NO_SLIDING] = Patch(facecolor="white", edgecolor="0.6", linewidth=0.6)
-
-
-def _mark(
-    sheet: Sheet, panel: Panel, cells: NDArray[np.bool_], label: str, look: dict[str, Any], zorder: float
-) -> None:
+def _mark(sheet: Sheet, panel: Panel, cells: Cells, label: str, look: Look, zorder: float) -> None:
     """Cover cells, half way to their neighbours, with a colour or hatch, and give the legend an entry."""
     if not cells.any():
         return
-    xs, ys = panel.values(panel.x), panel.values(str(panel.y))
     with mpl.rc_context({"hatch.linewidth": 0.6}):
-        area = panel.axes.contourf(
-            xs, ys, cells.astype(float), [0.5, 1.5], colors=[look["facecolor"]], hatches=[look["hatch"]], zorder=zorder
-        )
+        fill: Look = {"colors": [look["facecolor"]], "hatches": [look["hatch"]], "zorder": zorder}
+        area = panel.axes.contourf(panel.xs, panel.ys, cells.astype(float), [0.5, 1.5], **fill)
         area.set(edgecolor=look["edgecolor"], linewidth=0, gid=label)
         sheet.legend[label] = Patch(linewidth=0.6, **look)
 
 
-def _large(panel: Panel, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _large(panel: Panel, cells: Cells) -> Cells:
     """The cells of connected regions that a hatch of some width and height fits into."""
     window = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted())
-    least = [
-        max(1, math.ceil(_SCRAP * n / size)) for n, size in zip(cells.shape, (window.height, window.width), strict=True)
-    ]
+    least = np.ceil(_SCRAP * np.array(cells.shape) / (window.height, window.width))
+    high, wide = np.maximum(1, least).astype(int)
     # beyond the frame a region may go on
-    inner = ndimage.binary_opening(np.pad(cells, [(n, n) for n in least], "edge"), np.ones(least))
-    kernel = inner[least[0] : least[0] + cells.shape[0], least[1] : least[1] + cells.shape[1]]
-    return np.asarray(ndimage.binary_propagation(kernel, np.ones((3, 3)), mask=cells))
+    around = np.pad(cells, [(high, high), (wide, wide)], "edge")
+    inner = ndimage.binary_opening(around, np.ones((high, wide)))[high:-high, wide:-wide]
+    return np.asarray(ndimage.binary_propagation(inner, np.ones((3, 3)), mask=cells))

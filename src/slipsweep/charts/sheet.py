@@ -8,7 +8,7 @@ import itertools
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -16,35 +16,29 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import Collection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from slipsweep.charts import solved, style
-from slipsweep.charts.solved import DISPLACEMENT
-from slipsweep.charts.style import Options
+from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
 
-Floats = NDArray[np.float64]
-
+#: Dashes and markers of the curves of a family, and how many markers a curve has.
 _DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
 _MARKERS = ("o", "s", "^", "D", "v", "x")
+_MARKED = 7
 
 #: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line of a small panel.
 _WIDTH, _CHARACTERS, _LABEL = 7.0, 15, 26
 
 #: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
 _LINE, _LINES = 0.165, 4
-
-#: Markers on a curve.
-_MARKED = 7
-
-
-# ------------------------------------------------------------------------ any figure
 
 
 class Drawing:
@@ -73,46 +67,39 @@ class Drawing:
 
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
         """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
-        entries, font = self.legend | self.remarks, self.options.font
-        handles, labels = list(entries.values()), list(entries)
-        axes, lines = self.options.ax, 0
+        entries, axes = self.legend | self.remarks, self.options.ax
+        handles, look = (list(entries.values()), list(entries)), Look(fontsize="small", frameon=False)
         width, height = self.figure.get_size_inches()
+        text_width = width * 10.0 / self.options.font  # inches of text of 10 points
+        available = axes.get_window_extent().width / self.figure.dpi if axes else text_width
+        characters = max(20, int(_CHARACTERS * available))
+        every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
+        caption = [line for text in every for line in textwrap.wrap(text, characters)]
         if axes is not None:
             right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
             if entries:
-                axes.legend(
-                    handles, labels, fontsize="small", frameon=False,
-                    loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0),
-                )  # fmt: skip
-            wrapped = self._wrapped(texts, axes.get_window_extent().width / self.figure.dpi)
+                axes.legend(*handles, loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0), **look)
             axes.annotate(
-                "\n".join(wrapped), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
+                "\n".join(caption), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
                 ha="center", va="top", fontsize="x-small", annotation_clip=False,
             )  # fmt: skip
         else:
             self._set_small()
+            beside = beside and width > 5.0
+            columns = 1 if beside else max(1, int(text_width / 2.2))
             if entries:
-                beside = beside and width > 5.0
-                columns = 1 if beside else max(1, int(width * 10.0 / font / 2.2))
                 self.figure.legend(
-                    handles, labels, ncols=columns, handlelength=3.2, fontsize="small", frameon=False,
-                    loc="outside right upper" if beside else "outside upper center",
+                    *handles, loc="outside right upper" if beside else "outside upper center",
+                    ncols=columns, handlelength=3.2, **look,
                 )  # fmt: skip
-                longest = max(text.count("\n") + 1 for text in entries)
-                lines = 0 if beside else math.ceil(len(entries) / columns) * longest - 1
-            wrapped = self._wrapped(texts, width * 10.0 / font)
-            self.figure.supxlabel("\n".join(wrapped), fontsize="small")
-            more = max(0, lines + len(wrapped) - _LINES) * _LINE * font / 10.0
+            self.figure.supxlabel("\n".join(caption), fontsize="small")
+            longest = max((text.count("\n") + 1 for text in entries), default=0)
+            lines = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
+            more = max(0, lines + len(caption) - _LINES) * _LINE * self.options.font / 10.0
             self.figure.set_size_inches(width, height + more)
         if self.options.grey:
             _without_colour(self.figure)
         return self.figure
-
-    def _wrapped(self, texts: Sequence[str], width: float) -> list[str]:
-        """Lines of a caption that is as wide as some inches of text of 10 points."""
-        characters = max(20, int(_CHARACTERS * width))
-        every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
-        return [line for text in every for line in textwrap.wrap(text, characters)]
 
     def _set_small(self) -> None:
         """Sizes of text, in points: ticks are made only when the figure is drawn."""
@@ -130,20 +117,21 @@ class Drawing:
 def _without_colour(figure: Figure) -> None:
     """Replace all colours by their lightness."""
     for artist in figure.findobj():
+        kinds: tuple[str, ...] = ()
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            artist.set_cmap(style.grey_map(artist.get_cmap()))
-        elif isinstance(artist, Line2D | Patch):
+            colours = artist.get_cmap()
+            ends = {"under": colours.get_under(), "over": colours.get_over()}
+            grey = ListedColormap(style.to_grey(colours(np.arange(colours.N))))
+            artist.set_cmap(grey.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
+        elif isinstance(artist, Line2D):
             kinds = ("color", "markerfacecolor", "markeredgecolor")
-            for kind in kinds if isinstance(artist, Line2D) else ("facecolor", "edgecolor"):
-                artist.set(**{kind: tuple(style.to_grey(getattr(artist, f"get_{kind}")())[0])})
-        elif isinstance(artist, mpl.collections.Collection):
-            for kind in ("facecolor", "edgecolor"):
-                colours = getattr(artist, f"get_{kind}")()
-                if len(colours):
-                    artist.set(**{kind: style.to_grey(colours)})
-
-
-# ------------------------------------------------------------------- of slices of a result
+        elif isinstance(artist, Patch | Collection):
+            kinds = ("facecolor", "edgecolor")
+        for kind in kinds:
+            colours = getattr(artist, f"get_{kind}")()
+            if len(colours):
+                grey = style.to_grey(colours)
+                artist.set(**{kind: grey if len(grey) > 1 else tuple(grey[0])})
 
 
 class Panel:
@@ -153,15 +141,16 @@ class Panel:
         self._sheet, self._where = sheet, where
         self.axes, self.x, self.y, self.options = axes, sheet.x, sheet.y, sheet.options
         self.g = float(sheet.data.attrs["g"])
+        # the values along x and y, in the units that they are drawn in
+        self.xs, self.ys = (
+            axis_numbers(self.data, name) * self.options.scale(name, self.g) if name else np.zeros(0)
+            for name in (self.x, self.y)
+        )
 
     @property
     def data(self) -> xr.Dataset:
         """The sheet's slice at the panel's values."""
         return self._sheet.data.isel(self._where, missing_dims="ignore")
-
-    def values(self, name: str) -> Floats:
-        """The values along an axis, in the units that they are drawn in."""
-        return axis_numbers(self.data, name) * self.options.scale(name, self.g)
 
     def grid(self, name: str | xr.DataArray) -> Any:
         """A variable over (y, x); without y of one row."""
@@ -199,12 +188,12 @@ class Sheet(Drawing):
             if title:
                 one.set_title(title, fontsize="medium")
 
-    def set_axis(self, side: str, name: str) -> None:
+    def set_axis(self, side: Literal["x", "y"]) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
-        values, label = self.panels[0].values(name), style.axis_label(name, self.options)
+        name, values = (self.x, self.panels[0].xs) if side == "x" else (str(self.y), self.panels[0].ys)
         for panel in self.panels:
             axes = panel.axes
-            axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": label})
+            axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": style.axis_label(name, self.options)})
             if name not in ("theta", "phi") and is_log(values):
                 axes.set(**{f"{side}scale": "log"})
                 log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
@@ -214,17 +203,13 @@ class Sheet(Drawing):
                 _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
-        """Say which unreliable values of a result are left out, and which are drawn on request: by flags.
-
-        No logarithmic scale shows what is below zero: displacements upslope are left out in any case.
-        """
+        """Say which unreliable values are left out or drawn on request; displacements upslope have no logarithm."""
         flags = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
         groups: dict[str, list[str]] = {}
         for flag, text in style.LEFT_OUT_TEXT.items():
-            if not any(has_flags(one, flag).any() for one in flags):
-                continue
-            drawn = self.options.show_cautions and not (name == DISPLACEMENT and flag == Validity.UPSLOPE)
-            groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
+            if any(has_flags(one, flag).any() for one in flags):
+                drawn = self.options.show_cautions and not (name == solved.DISPLACEMENT and flag == Validity.UPSLOPE)
+                groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
         self.notes += [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
@@ -235,7 +220,7 @@ class Sheet(Drawing):
         """
         drawn = reliable(self.data, name, self.options)
         self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
-        if name != DISPLACEMENT or solved.is_newmark(self.data):
+        if name != solved.DISPLACEMENT or solved.is_newmark(self.data):
             return
         theirs = solved.newmark(self.data)
         if theirs is not None:
@@ -303,9 +288,6 @@ def over(array: xr.DataArray, data: xr.Dataset, dims: Sequence[str | None]) -> A
     return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
 
-# ------------------------------------------------------------------------------------- axes
-
-
 def is_log(values: Floats) -> bool:
     """Whether an axis is spaced by a constant factor rather than a constant step."""
     if values.size < 3 or values[0] <= 0 or values[-1] < 3 * values[0]:
@@ -359,10 +341,7 @@ def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, 
     return axes.get_ylim()[0] / 10
 
 
-# ----------------------------------------------------------------------------------- curves
-
-
-def curve_looks(number: int) -> list[dict[str, Any]]:
+def curve_looks(number: int) -> list[Look]:
     """Colour, dash and marker of the curves of a family: told apart without colour."""
     # not up to the yellow end, which is faint on white and in grey
     colours = mpl.colormaps["viridis"](np.linspace(0, 0.68, number))

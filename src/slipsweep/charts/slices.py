@@ -1,7 +1,4 @@
-"""Slices of a result: the cells that a chart shows, and no others, laid out in panels.
-
-A slice at a value that is not among those of the result is solved, with the same options.
-"""
+"""Slices of a result: the cells that a chart shows and no others, read, or solved where the result has none."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,13 +10,11 @@ import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
 from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
-from slipsweep.charts.style import SHOWN, Options, drawn_text
+from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
-from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
-from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
@@ -61,15 +56,14 @@ class Result:
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
-        _check_attributes(data.attrs, self.name)
+        check_attributes(data.attrs, self.name)
         for key, one in data.variables.items():
             units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
             if units and one.attrs.get("units", units) != units:
                 raise InputError(f'{name}: {key}: units = "{one.attrs["units"]}"; must be "{units}"')
         self.dims = [str(dim) for dim in data.sizes]
-        parameters = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
-        falling = [dim for dim in parameters if not data.get_index(dim).is_monotonic_increasing]
-        self.data = data.sortby(falling) if falling else data
+        ordered = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
+        self.data = data.sortby([dim for dim in ordered if not data.get_index(dim).is_monotonic_increasing])
         there = {*map(str, with_amplitude(data).coords)}
         block = () if "yield_coefficient" in there else ("theta", "mu_s")
         for key in (*block, "amplitude", "frequency") if self.sort == "sweep" else ():
@@ -100,19 +94,13 @@ class Result:
         return name
 
     def compared(self, name: str) -> list[str]:
-        """A result with its flags, and with Newmark's displacement if the file has it, or the record to solve it for.
-
-        That of harmonic motion is solved where it is drawn.
-        """
+        """A result with its flags, and Newmark's displacement if the file has it, or the record to solve it under."""
         theirs = "newmark_displacement"
         known = theirs in self.variables or (self.motion is not None and not is_newmark(self.data))
         return [name, "validity", *([theirs] if name == DISPLACEMENT and known else [])]
 
     def places(self, at: Mapping[str, At]) -> dict[str, list[Place]]:
-        """Where on the axes the values requested are.
-
-        InputError as `slipsweep.files.selection.find`, or for a value between those of the result where none is solved.
-        """
+        """Where on the axes the requested values are; InputError as `find`, or where no cell is or can be solved."""
         found = find(self.data, at, self.name)
         for name, places in found.items():
             for place in places:
@@ -130,13 +118,13 @@ class Result:
         return f"{tied} is known at those values only" if tied else ""
 
     def select(self, names: Iterable[str], keep: Mapping[str, Kept], at: Mapping[str, At]) -> xr.Dataset:
-        """The cells of a slice, read, or solved where they are not in the result.
+        """The cells of a slice, read, or solved where the result of a sweep does not have them.
 
-        Results of a sweep that are not in the file are solved for the slice.  `keep` has what stays of the axes that
-        stay; the others are cut where `at` says, else in the middle, `polarity` at 1.  Every parameter is a coordinate,
-        and the attribute ``picked`` has the names of the case and motion that were selected.
+        `keep` has what stays of the axes that stay; the others are cut where `at` says, else in the middle, `polarity`
+        at 1.  Every parameter is a coordinate; the attribute ``picked`` names the case and motion that were selected.
         """
-        cuts, index, exact, picked = self.places(at), {}, {}, {}
+        cuts, exact, picked = self.places(at), {}, {}
+        index: dict[str, Any] = {}
         for dim in self.dims:
             chosen: Any = keep[dim] if dim in keep else cuts.get(dim) or [Place(math.nan, self._middle(dim))]
             if isinstance(chosen, slice):
@@ -144,17 +132,13 @@ class Result:
                 continue
             if dim not in keep and len(chosen) > 1:
                 raise InputError(f"{self.name}: {dim} = {at[dim]}: several values are for curves or panels only")
-            shape = (len(chosen),) if dim in keep else ()
-            where: Any = np.reshape([place.index or 0 for place in chosen], shape)
+            dims = (dim,) if dim in keep else ()
+            shape = [len(chosen)] * len(dims)
+            index[dim] = np.reshape([place.index or 0 for place in chosen], shape)
             if any(place.index is None for place in chosen):
-                exact[dim] = (
-                    (dim,) if shape else (),
-                    np.reshape([one.value for one in chosen], shape),
-                    PARAMETERS[dim],
-                )
-            elif not shape and dim in NAMED and axis_labels(self.data, dim):
-                picked[dim] = axis_labels(self.data, dim)[int(where)]
-            index[dim] = where
+                exact[dim] = dims, np.reshape([one.value for one in chosen], shape), PARAMETERS[dim]
+            elif not dims and dim in NAMED and (labels := axis_labels(self.data, dim)):
+                picked[dim] = labels[int(index[dim])]
         there = [name for name in names if name in self.variables]
         data = self.data[there].isel(index, missing_dims="ignore").load().assign_coords(exact)
         if exact and "displacement_amplitude" in data.coords:
@@ -180,74 +164,58 @@ class Result:
         number = even[0] if even and size > number else number
         return [Place(math.nan, int(i)) for i in np.unique(np.linspace(0, size - 1, min(number, size)).round())]
 
-    # ---------------------------------------------------------------------------- layout
-
     def sheet(
         self, options: Options, names: Sequence[str], x: str | Sequence[str], *, y: Sequence[str] = (),
-        curves: Sequence[str] | None = None, keep: Mapping[str, Kept] | None = None, same: Sequence[str] = (),
+        curves: Sequence[str] | None = None, keep: Sequence[str] = (), same: Sequence[str] = (),
     ) -> Sheet:  # fmt: skip
-        """The slice of a chart, in panels (InputError if an axis that was chosen is not there, or none is left).
+        """The slice of a chart that needs some results, in panels.
 
-        Parameters
-        ----------
-        options : Options
-        names : sequence of str
-            Results that it needs; the chart can be drawn over the axes of the first.
-        x : str, or sequence of str
-            What it is drawn over; or axes in order of preference, of which the user may choose another.
-        y, curves : sequence of str
-            Of a map, vertical axes; of curves, axes that tell them apart, if one is there; in order of preference.
-        keep : mapping of axis to slice or places
-            What else stays.
-        same : sequence of str
-            Axes that the results do not vary along in fact: no panels are made of them.
+        It is drawn over `x`, or over the first of these axes that is there, or another that the user chooses: axes of
+        the first result.  `y` has axes for the ordinate of a map, and `curves` those that may tell curves apart, in
+        order of preference.  `keep` stays, too, whole or at the values requested; of `same`, along which the results
+        do not vary, no panels are made.  InputError: an axis that was chosen is not there, or none is left.
         """
-        kept: dict[str, Any] = {}
-        at, places = dict(options.at), self.places(options.at)
-        for dim, part in (keep or {}).items():
-            kept[dim] = places.get(dim, part)
-            at.pop(dim, None)
-        along = [str(dim) for dim in self.data[self.result(names[0])].dims]
+        places = self.places(options.at)
+        kept: dict[str, Kept] = {dim: places.get(dim, slice(None)) for dim in keep}
+        along = self.data[self.result(names[0])].dims
         groups = [dim for dim in self.groups if dim in along and dim not in kept]
         wide = [dim for dim in groups if dim in (*PARAMETERS, "displacement")]
         several = [dim for dim in groups if len(places.get(dim, ())) > 1 and dim not in options.panels]
-        across: str = x if isinstance(x, str) else self._axis(options, "x", wide, x)
+        across = x if isinstance(x, str) else self._axis(options, "x", wide, x)
         if isinstance(x, str) and options.x is not None:
             raise InputError(f"{self.name}: --x {options.x}: not with this chart, which is drawn over another quantity")
         rest = [dim for dim in groups if dim != across]
         up: str | None = None
         if y:
             up = self._axis(options, "y", [dim for dim in wide if dim != across], y, f"; --x is {across}")
-            kept[up] = self._thinned(up)
-        elif curves is not None:
-            free = [dim for dim in rest if dim not in (*at, *options.panels)]
-            up = next((dim for dim in (*several, *curves) if dim in (*several, *free) and dim != across), None)
-            if options.y is not None:
-                up = self._axis(options, "y", rest, ())
-            if up:
-                kept[up] = places.get(up) or self.spread(up, _CURVES)
-                at.pop(up, None)
         elif options.y is not None:
-            raise InputError(f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use --panels")
-        if not (isinstance(x, str) and across in kept):
-            kept[across] = self._thinned(across) if across in self.dims else slice(None)
-        for dim in (across, up or across):
-            if dim in at:
-                raise InputError(f"{self.name}: {dim} = {at[dim]}: is an axis of this chart; it cannot have one value")
+            if curves is None:
+                raise InputError(f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use --panels")
+            up = self._axis(options, "y", rest, ())
+        elif curves is not None:
+            free = [dim for dim in rest if dim in several or dim not in (*options.at, *options.panels)]
+            up = next((dim for dim in (*several, *curves) if dim in free), None)
+        for dim in (across, str(up)) if y else (across,):
+            if dim in options.at and dim not in keep:
+                why = "is an axis of this chart; it cannot have one value"
+                raise InputError(f"{self.name}: {dim} = {options.at[dim]}: {why}")
+        if across not in kept:
+            kept[across] = self._thinned(across)
+        if up:
+            kept[up] = self._thinned(up) if y else places.get(up) or self.spread(up, _CURVES)
         panels = list(options.panels) or [dim for dim in several if dim not in kept]
         if options.more_panels and not panels:
-            panels = [dim for dim in groups if dim not in (*kept, *same, *at)]
+            panels = [dim for dim in groups if dim not in (*kept, *same, *options.at)]
         for name in panels[:2]:
             if name not in groups or name in kept:
                 left = [dim for dim in groups if dim not in kept]
                 raise InputError(f"{self.name}: --panels {name}: must be another axis; {did_you_mean(name, left)}")
             kept[name] = places.get(name) or self.spread(name, _PANELS)
-            at.pop(name, None)
-        return Sheet(self.select(names, kept, at), across, up, options, *panels[:2])
+        return Sheet(self.select(names, kept, options.at), across, up, options, *panels[:2])
 
     def _axis(self, options: Options, option: str, there: list[str], preferred: Sequence[str], more: str = "") -> str:
         """The axis that an option names, or the first of those preferred, or any that is left for it."""
-        given = options.x if option == "x" else options.y
+        given: str | None = getattr(options, option)
         if given is not None:
             if given not in there:
                 raise InputError(f"{self.name}: --{option} {given}: no such axis; {did_you_mean(given, there)}{more}")
@@ -277,19 +245,3 @@ def _sort(data: xr.Dataset) -> str:
     if not is_recorded(data):
         return "sweep"
     return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
-
-
-def _check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
-    """Refuse a result that does not say what was solved (InputError)."""
-    recorded = not {"record", "suite"}.isdisjoint(attrs)
-    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
-    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
-        if key not in attrs:
-            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
-    try:
-        MODELS.from_attributes(attrs)
-        if not recorded:
-            WAVEFORMS.from_attributes(attrs)
-        drawn_text(attrs)
-    except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise InputError(f"{name}: attributes do not say what was solved: {error}") from None

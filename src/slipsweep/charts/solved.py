@@ -1,8 +1,4 @@
-"""What charts compute on the cells of their slice, by the public functions.
-
-The accelerations of yield and of the mode limit, Newmark's block, the results of other options of the model, and where
-the displacement has a trend that no block has.
-"""
+"""What charts compute on their slice: thresholds, Newmark's block, other options of the model, trends no block has."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -40,10 +36,7 @@ def is_newmark(data: xr.Dataset) -> bool:
 def solve(
     data: xr.Dataset, names: Iterable[str], model: Model | None = None, motion: Any = None, **changed: Any
 ) -> xr.Dataset:
-    """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate.
-
-    The slice gives the parameters and, in its attributes, model, solver and excitation where that is no `motion`.
-    """
+    """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate."""
     chosen = model or MODELS.from_attributes(data.attrs)
     block = ("yield_coefficient",) if "yield_coefficient" in data.coords else _BLOCK
     wanted = [*block, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS, *RECORD_INPUTS[1:]]
@@ -62,10 +55,8 @@ def solve(
 def _bare(array: xr.DataArray) -> Any:
     """Values along their dimensions, as the public functions take them."""
     values = np.asarray(array.values, np.float64)
-    if not array.dims:
-        return float(values)
     coords = {array.name: values} if array.dims == (array.name,) else {}
-    return xr.DataArray(values, dims=array.dims, coords=coords)
+    return xr.DataArray(values, dims=array.dims, coords=coords) if array.dims else float(values)
 
 
 def with_amplitude(data: xr.Dataset) -> xr.Dataset:

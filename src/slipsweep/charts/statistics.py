@@ -1,7 +1,5 @@
 """Charts of statistics: fragility curves, bands of quantiles, Sobol indices."""
 
-from typing import Any
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,7 +10,7 @@ from slipsweep.charts import style
 from slipsweep.charts.sheet import Sheet, curve_looks, log_axis, over, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DRIVES
-from slipsweep.charts.style import BLUE, VERMILION, Options
+from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import PARAMETERS, STRENGTHS, SensitivityStatus
@@ -25,7 +23,7 @@ _INDICES = (
     ("total_index", "total_interval", "total", VERMILION),
     ("first_order_index", "first_order_interval", "first order", BLUE),
 )
-_FIRST_ORDER: dict[str, Any] = {"linestyle": (0, (3, 1.5)), "linewidth": 1.0}
+_FIRST_ORDER: Look = {"linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 
 
 def fragility(result: Result, options: Options) -> Figure:
@@ -38,24 +36,20 @@ def fragility(result: Result, options: Options) -> Figure:
 
 def draw_fragility(sheet: Sheet) -> Figure:
     """Curves of `exceedance_probability` of a slice, and the share of samples without a value, where there are any."""
-    sheet.set_axis("x", sheet.x)
-    fixed = (
-        None
-        if "threshold" in (sheet.y, sheet.across, sheet.down)
-        else style.length_text(sheet.data["threshold"].item())
-    )
+    sheet.set_axis("x")
+    thresholds = sheet.data["threshold"]
+    fixed = style.length_text(thresholds.item()) if thresholds.ndim == 0 else None
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
         curves = panel.grid("exceedance_probability")
         for member, (curve, look) in enumerate(zip(curves, curve_looks(len(curves)), strict=True)):
             text = panel.member(member) or f"d = {fixed}"
-            line = plot_curve(panel.axes, panel.values(panel.x), curve, member / len(curves), label=text, **look)
-            sheet.legend[text] = line
+            place = member / len(curves)
+            sheet.legend[text] = plot_curve(panel.axes, panel.xs, curve, place, label=text, **look)
         shares = panel.grid("valueless_share")
         if shares.any():
-            dotted: dict[str, Any] = {"color": "0.4", "linestyle": ":"}
-            panel.axes.plot(panel.values(panel.x), shares.max(axis=0), **dotted)
-            sheet.legend["no value (share)"] = Line2D([], [], **dotted)
+            dotted = panel.axes.plot(panel.xs, shares.max(axis=0), color="0.4", linestyle=":")
+            sheet.legend["no value (share)"] = dotted[0]
         panel.axes.set_ylim(-0.02, 1.02)
         given = "u > d" if fixed is None or sheet.y is None else f"u > {fixed}"
         panel.axes.set_ylabel(f"probability of exceedance P({given})")
@@ -64,27 +58,22 @@ def draw_fragility(sheet: Sheet) -> Figure:
 
 def quantiles(result: Result, options: Options) -> Figure:
     """Bands between quantiles of the permanent displacement over one axis."""
-    keep = {"quantile": slice(None)}
-    sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=keep)
+    sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"])
     everything = sheet.data["displacement_quantile"].values * 1000.0
-    sheet.set_axis("x", sheet.x)
+    sheet.set_axis("x")
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
         floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
         values = over(panel.data["displacement_quantile"], panel.data, ("quantile", panel.x)) * 1000.0
-        shown, xs = np.maximum(values, floor), panel.values(panel.x)
-        pairs = [(low, shares.size - 1 - low) for low in range(shares.size // 2)]
-        for number, (low, high) in enumerate(pairs):
-            colour = mpl.colormaps["Blues"](0.2 + 0.3 * number / len(pairs))
-            look: dict[str, Any] = {"facecolor": colour, "linewidth": 0}
-            panel.axes.fill_between(xs, shown[low], shown[high], **look)
-            sheet.legend[f"{shares[low] * 100:g} to {shares[high] * 100:g} %"] = Patch(**look)
+        shown, xs, middle = np.maximum(values, floor), panel.xs, shares.size // 2
+        for low in range(middle):
+            high, colour = shares.size - 1 - low, mpl.colormaps["Blues"](0.2 + 0.3 * low / middle)
+            band = panel.axes.fill_between(xs, shown[low], shown[high], facecolor=colour, linewidth=0)
+            sheet.legend[f"{shares[low] * 100:g} to {shares[high] * 100:g} %"] = band
         if shares.size % 2:
-            middle = shares.size // 2
             text = "median" if shares[middle] == 0.5 else f"{shares[middle] * 100:g} %"
             sheet.legend[text] = panel.axes.plot(xs, shown[middle], color=BLUE, linewidth=1.8, label=text)[0]
-    most = float(sheet.data["valueless_share"].max())
-    if most > 0:
+    if (most := float(sheet.data["valueless_share"].max())) > 0:
         sheet.notes.append(f"Without a value: up to {most:.1%} of the samples.")
     return sheet.done()
 
@@ -95,26 +84,24 @@ def sensitivity(result: Result, options: Options) -> Figure:
         raise InputError(f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them")
     names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
     left = [dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims]
-    keep = {"bound": slice(None), "input": slice(None)}
     bars = options.x is None and not {*left} - {*options.at, *options.panels}
-    sheet = result.sheet(options, names, "input" if bars else _AXES, keep=keep)
+    sheet = result.sheet(options, names, "input" if bars else _AXES, keep=["bound", "input"])
     _note_status(sheet)
     inputs = axis_labels(sheet.data, "input")
     symbols = [" + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+")) for name in inputs]
     if bars:
         _draw_bars(sheet, symbols)
         return sheet.done()
-    sheet.set_axis("x", sheet.x)
+    sheet.set_axis("x")
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
-        xs = panel.values(panel.x)
         total, first = (over(panel.data[name], panel.data, ("input", panel.x)) for name, *_ in _INDICES)
         low, high = over(panel.data["total_interval"], panel.data, ("bound", "input", panel.x))
         for at, look in enumerate(curve_looks(len(inputs))):
-            panel.axes.fill_between(xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0)
+            panel.axes.fill_between(panel.xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0)
             solid = {**look, "linestyle": "-", "label": symbols[at]}
-            sheet.legend[symbols[at]] = plot_curve(panel.axes, xs, total[at], at / len(inputs), **solid)
-            panel.axes.plot(xs, first[at], color=look["color"], **_FIRST_ORDER)
+            sheet.legend[symbols[at]] = plot_curve(panel.axes, panel.xs, total[at], at / len(inputs), **solid)
+            panel.axes.plot(panel.xs, first[at], color=look["color"], **_FIRST_ORDER)
         panel.axes.set_ylim(*_ends(sheet, intervals=False))
         panel.axes.set_ylabel("Sobol index of the permanent displacement")
     sheet.remarks["total"] = Line2D([], [], color="0.3")
@@ -128,11 +115,12 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
     totals = over(sheet.data["total_index"], sheet.data, ("input", sheet.across, sheet.down))
     order = np.argsort(np.nan_to_num(totals).reshape(len(symbols), -1).sum(axis=1))
     for panel in sheet.panels:
-        for (name, interval, _, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
+        for (name, interval, text, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
             values = over(panel.data[name], panel.data, ("input",))[order]
             low, high = over(panel.data[interval], panel.data, ("bound", "input"))[:, order]
             at = np.arange(len(order)) + shift
             panel.axes.barh(at, values, height=0.36, color=colour)
+            sheet.legend[text] = Patch(color=colour)
             # a bootstrap's interval may, by a hair, not hold the estimate; NaN: there is none
             ends = np.maximum([values - low, high - values], 0.0)
             panel.axes.errorbar(values, at, xerr=ends, fmt="none", color="black", capsize=2.5)
@@ -141,8 +129,6 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
         panel.axes.set_xlim(*_ends(sheet, intervals=True))
         panel.axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
         panel.axes.set_xlabel("Sobol index of the permanent displacement")
-    for _, _, text, colour in _INDICES:
-        sheet.legend[text] = Patch(color=colour)
     sheet.legend["95 % interval"] = Line2D([], [], color="black", marker="|", markersize=6)
 
 

@@ -8,21 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, to_rgba
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap, to_rgba
+from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
+from slipsweep.model import variables
 from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import (
-    LIMIT_RESULTS,
-    PARAMETERS,
-    RECORD_RESULTS,
-    RESULTS,
-    STATISTICS,
-    TOLERABLE_DISPLACEMENT,
-    SlidingMode,
-    Validity,
-)
+from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, SlidingMode, Validity
 from slipsweep.motion.waveforms import WAVEFORMS
 
 if TYPE_CHECKING:
@@ -30,8 +23,14 @@ if TYPE_CHECKING:
 
     from slipsweep.files.selection import At
 
-#: Attributes of all results that charts show, by name.
-SHOWN = LIMIT_RESULTS | RECORD_RESULTS | RESULTS | STATISTICS
+Floats = NDArray[np.float64]
+
+#: Properties of an artist, by the names that matplotlib gives them.
+Look = dict[str, Any]
+
+#: Attributes of all results that charts show, by name; and of all that an axis can have.
+SHOWN = variables.LIMIT_RESULTS | variables.RECORD_RESULTS | variables.RESULTS | variables.STATISTICS
+_ABOUT = INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": variables.TOLERABLE_DISPLACEMENT}
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -81,7 +80,7 @@ NEWMARK, NO_SLIDING = "Newmark's block", MODE_TEXT[SlidingMode.STUCK]
 UNSOUND = "falls with A, or below\nhalf of Newmark's"
 
 #: How the lines of yield and of the mode limit are drawn.
-LINES: dict[str, tuple[str, dict[str, Any]]] = {
+LINES: dict[str, tuple[str, Look]] = {
     "yield_line": ("yield", {"color": "black", "linestyle": "-", "linewidth": 1.6}),
     "limit_line": ("mode limit (Eq. 7)", {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.6}),
 }
@@ -96,8 +95,8 @@ _WIDE = 5.0
 class Options:
     """What a user chooses about a chart: the parameters of `SlipsweepAccessor.chart`, checked (InputError).
 
-    `heights` has the levels as numbers in the variable's own unit, in order.  With `more_panels` panels lie along axes
-    that would have one value otherwise.
+    With `more_panels` panels lie along axes that would have one value otherwise.  `heights` has the levels as numbers
+    in the variable's own unit, in order; `inches` the width of the figure, None for the usual one.
     """
 
     x: str | None = None
@@ -111,8 +110,9 @@ class Options:
     width: float | str | None = None
     grey: bool = False
     ax: "Axes | None" = None
-    heights: list[float] = field(init=False)
     more_panels: bool = False
+    heights: list[float] = field(init=False)
+    inches: float | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         own = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
@@ -123,15 +123,12 @@ class Options:
         self.heights = sorted(found)
         if len(self.panels) > 2:
             raise InputError(f"--panels {','.join(self.panels)}: must be one axis or two")
+        if isinstance(self.width, str):
+            self.inches = quantity("width", self.width, "m", 1.0) / 0.0254
+        elif self.width is not None:
+            self.inches = self.width / 25.4
         if self.inches is not None and not 50.0 <= self.inches * 25.4 <= 1000.0:
             raise InputError(f"width = {self.width}: must be 50 to 1000 mm, as in 90mm")
-
-    @property
-    def inches(self) -> float | None:
-        """Width of the figure; None for the usual one."""
-        if isinstance(self.width, str):
-            return quantity("width", self.width, "m", 1.0) / 0.0254
-        return None if self.width is None else self.width / 25.4
 
     @property
     def font(self) -> float:
@@ -163,38 +160,20 @@ def to_grey(colour: Any) -> Any:
     return np.column_stack([grey, grey, grey, rgba[:, 3]])
 
 
-def grey_map(colours: Colormap) -> Colormap:
-    """A map of colours by their lightness alone."""
-    found = ListedColormap(to_grey(colours(np.arange(colours.N))))
-    return found.with_extremes(under=to_grey(colours.get_under())[0], over=to_grey(colours.get_over())[0])
-
-
-# ------------------------------------------------------------------------- names and units
-
-
 def is_acceleration(name: str) -> bool:
     """Whether a parameter is an acceleration, which people give in m/s² or in g."""
     return PARAMETERS.get(name, {}).get("units") == "m s-2"
 
 
-def about(name: str) -> dict[str, Any]:
-    """Long name and unit of a parameter, result or tolerable displacement."""
-    return (SHOWN | PARAMETERS | {"displacement": TOLERABLE_DISPLACEMENT})[name]
-
-
 def unit(name: str) -> str:
-    """The unit of a parameter or result as people write it; nothing for a pure number."""
-    return unit_text(about(name).get("units", "1"))
-
-
-def unit_text(units: str) -> str:
-    """A unit of a file as people write it."""
+    """The unit of a parameter, result or intensity measure as people write it; nothing for a pure number."""
+    units = _ABOUT[name].get("units", "1")
     return _UNITS.get(units, units)
 
 
 def axis_label(name: str, options: Options) -> str:
     """The label of a parameter's axis: name, symbol and unit."""
-    text = about(name)["long_name"]
+    text = _ABOUT[name]["long_name"]
     if SYMBOLS[name] != name.replace("_", " "):
         text = f"{text.split(',')[0].split(' that ')[0]} {SYMBOLS[name]}"
     units = options.unit(name)
@@ -229,9 +208,6 @@ def plain(text: Any) -> str:
 def flag_name(flag: int) -> str:
     """A flag as results, legends and captions name it."""
     return (Validity(flag).name or "").lower()
-
-
-# --------------------------------------------------------------------------------- captions
 
 
 def caption(data: xr.Dataset, options: Options | None = None) -> str:
@@ -274,3 +250,19 @@ def drawn_text(attributes: Mapping[Any, Any]) -> str:
         texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
     pooled = f"{plain(attributes['pooled'])} x " if "pooled" in attributes else ""
     return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"
+
+
+def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
+    """Refuse a result that does not say what was solved (InputError)."""
+    recorded = not {"record", "suite"}.isdisjoint(attrs)
+    options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
+    for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):
+        if key not in attrs:
+            raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
+    try:
+        MODELS.from_attributes(attrs)
+        if not recorded:
+            WAVEFORMS.from_attributes(attrs)
+        drawn_text(attrs)
+    except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{name}: attributes do not say what was solved: {error}") from None

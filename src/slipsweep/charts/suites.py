@@ -15,14 +15,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from slipsweep.charts import solved, statistics, style
-from slipsweep.charts.sheet import Panel, Sheet, has_flags, log_axis, log_ticks, over, plot_curve, reliable
+from slipsweep.charts.sheet import Panel, Sheet, has_flags, log_axis, log_ticks, plot_curve, reliable
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DISPLACEMENT
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
-from slipsweep.studies.suite_statistics import QUANTILES, SUITE, THRESHOLDS, suite_statistics, without_rounding
-
-Floats = NDArray[np.float64]
+from slipsweep.studies.suite_statistics import SUITE, THRESHOLDS, suite_statistics, without_rounding
 
 #: Powers of the factor and of the time scale that an intensity measure of a motion as recorded grows with.
 SCALING = {
@@ -40,49 +37,40 @@ _SAME = 1e-6
 
 _LABEL = "permanent displacement (mm)"
 
-_THIN: dict[str, Any] = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
-_BAND: dict[str, Any] = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
-_EDGE: dict[str, Any] = {"color": style.BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
-_MEDIAN: dict[str, Any] = {"color": style.BLUE, "linewidth": 2.4, "zorder": 2.3}
-_NEWMARK: dict[str, Any] = {"color": "black", "linewidth": 1.2, "linestyle": ":", "zorder": 2.4}
-_BARS: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
-
-
-# ------------------------------------------------------------------------------- the kinds
+_THIN: style.Look = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
+_BAND: style.Look = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
+_EDGE: style.Look = {"color": style.BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
+_MEDIAN: style.Look = {"color": style.BLUE, "linewidth": 2.4, "zorder": 2.3}
+_NEWMARK: style.Look = {"color": "black", "linewidth": 1.2, "linestyle": ":", "zorder": 2.4}
+_POINT: style.Look = {"marker": "o", "ms": 5, "color": style.BLUE}
+_REVERSED: style.Look = {"marker": "s", "ms": 5, "color": style.VERMILION, "markerfacecolor": "white"}
+_BELOW: style.Look = {"marker": "v", "color": "0.4", "markerfacecolor": "none", "gid": "below"}
+_BARS: style.Look = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
 
 
 def motions(result: Result, options: style.Options) -> Figure:
-    """Displacements over one axis: a thin line for each motion, the suite's median and its 16 to 84 % band.
-
-    With the median of Newmark's block where the file has it.
-    """
+    """Displacements over one axis: a thin line for each motion, median and 16 to 84 % band, and Newmark's median."""
     sheet = _sheet(result, options, _axes(result))
-    everything = _millimetres(sheet.data)
-    sheet.show(DISPLACEMENT, "Not marked")
+    sheet.show(solved.DISPLACEMENT, "Not marked")
     if options.show_cautions:  # upslope ones lie below the axis, as zeros do
-        sheet.data["drawn"] = sheet.data[DISPLACEMENT]
-    sheet.set_axis("x", sheet.x)
+        sheet.data["drawn"] = sheet.data[solved.DISPLACEMENT]
+    sheet.set_axis("x")
     for panel in sheet.panels:
-        floor = log_axis(panel.axes, everything, _LABEL, zeros=True)
-        xs = panel.values(panel.x)
-        dims = [dim for dim in SUITE if dim in panel.data[DISPLACEMENT].dims]
-        lines = over(panel.data["drawn"], panel.data, (*dims, panel.x)).reshape(-1, xs.size) * 1000.0
-        draw_suite(sheet.legend, panel.axes, xs, lines, _band(panel.data, panel.x), floor)
+        floor = log_axis(panel.axes, _millimetres(sheet.data), _LABEL, zeros=True)
+        lines = panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
+        draw_suite(sheet.legend, panel.axes, panel.xs, lines, _band(panel.data, panel.x), floor)
         if "newmark_displacement" in panel.data:
-            theirs = panel.data.assign({DISPLACEMENT: panel.data["newmark_displacement"]})
+            theirs = panel.data.assign({solved.DISPLACEMENT: panel.data["newmark_displacement"]})
             median = np.maximum(_band(theirs, panel.x)[1], floor)
-            sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(xs, median, gid="newmark", **_NEWMARK)[0]
+            sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(panel.xs, median, gid="newmark", **_NEWMARK)[0]
     _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
-    sheet.note_left_out(DISPLACEMENT)
+    sheet.note_left_out(solved.DISPLACEMENT)
     _note_cautions(sheet)
     return sheet.done()
 
 
 def intensity(result: Result, options: style.Options) -> Figure:
-    """The displacement of each motion against an intensity measure, and the regression of ln u on its logarithm.
-
-    The measure is that of the motion as it shakes the block.
-    """
+    """The displacement against a measure of each motion as it shakes the block, and the regression of ln u on it."""
     measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.data.coords]
     measure = options.x or ("arias_intensity" if "pgv" in result.dims else "pgv")
     if measure not in measures:
@@ -100,21 +88,17 @@ def intensity(result: Result, options: style.Options) -> Figure:
             panel.axes.set_xscale("log")
             log_ticks(panel.axes.xaxis, there.max() / there.min())
         panel.axes.grid(color="0.9")
-        panel.axes.set_xlabel(f"{text} ({style.unit_text(INTENSITY_MEASURES[measure]['units'])})")
+        panel.axes.set_xlabel(f"{text} ({style.unit(measure)})")
         low = panel.axes.get_ylim()[0]
-        groups: list[tuple[str, NDArray[np.bool_], dict[str, Any]]] = [
-            ("polarity 1" if negative.any() else "a motion", ~negative, {"marker": "o", "color": style.BLUE}),
-            ("polarity −1", negative, {"marker": "s", "color": style.VERMILION, "markerfacecolor": "white"}),
-        ]
-        for name, which, look in groups:
-            seen = which & (ys >= low)
-            if seen.any():
-                sheet.legend[name] = panel.axes.plot(xs[seen], ys[seen], linestyle="", ms=5, gid=name, **look)[0]
-        below = ys < low
-        if below.any():
-            edge: dict[str, Any] = {"linestyle": "", "marker": "v", "color": "0.4", "markerfacecolor": "none"}
-            panel.axes.plot(xs[below], np.full(below.sum(), low * 1.1), gid="below", **edge)
-            sheet.legend["zero, or below the axis"] = Line2D([], [], **edge)
+        marks: dict[str, tuple[NDArray[np.bool_], style.Floats, style.Look]] = {
+            "polarity 1" if negative.any() else "a motion": (~negative & (ys >= low), ys, _POINT),
+            "polarity −1": (negative & (ys >= low), ys, _REVERSED),
+            "zero, or below the axis": (ys < low, np.full_like(ys, low * 1.1), _BELOW),
+        }
+        for name, (which, heights, look) in marks.items():
+            if which.any():
+                own: style.Look = {"gid": name, "linestyle": "", **look}
+                (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
         _draw_regression(sheet, panel, xs, ys)
     sheet.notes.append("Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
                        "σ: standard deviation of ln u about it.")  # fmt: skip
@@ -123,7 +107,7 @@ def intensity(result: Result, options: style.Options) -> Figure:
     if missing:
         sheet.notes.append(f"{missing} of {places.size} have no {text}: the samples resolve none.")
     _note_suite(sheet, "Drawn are", "they are marked at the lower edge")
-    sheet.note_left_out(DISPLACEMENT)
+    sheet.note_left_out(solved.DISPLACEMENT)
     return sheet.done()
 
 
@@ -144,11 +128,10 @@ def histogram(result: Result, options: style.Options) -> Figure:
         axes.set(xscale="log", xlabel=_LABEL, ylabel="number of motions")
         log_ticks(axes.xaxis, edges[-1] / edges[0])
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-        found = _statistics(panel.data)
+        found = suite_statistics(panel.data)
         low, median, high = found["displacement_quantile"].values.ravel() * 1000.0
-        for place, look, text in (
-            (median, _MEDIAN, "median"), (low, _EDGE, "16 and 84 %"), (high, _EDGE, "16 and 84 %"),
-        ):  # fmt: skip
+        edge = "16 and 84 %"
+        for place, look, text in ((median, _MEDIAN, "median"), (low, _EDGE, edge), (high, _EDGE, edge)):
             if place > 0:
                 sheet.legend[text] = axes.axvline(place, gid=text, **look)
         panel.add_title(f"zero displacement: {found['zero_probability'].item():.0%}")
@@ -160,20 +143,12 @@ def histogram(result: Result, options: style.Options) -> Figure:
 def fragility(result: Result, options: style.Options) -> Figure:
     """The share of the motions of a suite that exceed a displacement, over one axis."""
     sheet = _sheet(result, options, _axes(result))
-    found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS, quantiles=QUANTILES)
+    found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS)
     _note_suite(sheet, "P is the share of")
     _note_cautions(sheet)
     drawn = Sheet(found, sheet.x, "threshold", options, sheet.across, sheet.down)
     drawn.notes = sheet.notes
     return statistics.draw_fragility(drawn)
-
-
-# ------------------------------------------------------------------------------- what they share
-
-
-def kept_motions(result: Result) -> dict[str, slice]:
-    """The dimensions of a suite: all its motions, but where some are requested."""
-    return {dim: slice(None) for dim in SUITE if dim in result.dims}
 
 
 def _axes(result: Result) -> list[str]:
@@ -182,22 +157,20 @@ def _axes(result: Result) -> list[str]:
 
 
 def _sheet(result: Result, options: style.Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
-    sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x, keep=kept_motions(result))
-    given = sheet.data[DISPLACEMENT]
-    sheet.data[DISPLACEMENT] = without_rounding(given)
-    if (sheet.data[DISPLACEMENT] != given).where(given.notnull(), False).any():
+    sheet = result.sheet(options, [*result.compared(solved.DISPLACEMENT), *more], x, keep=SUITE)
+    given = sheet.data[solved.DISPLACEMENT]
+    sheet.data[solved.DISPLACEMENT] = without_rounding(given)
+    if not sheet.data[solved.DISPLACEMENT].equals(given):
         sheet.notes.append("Displacements below 10⁻¹² m count as zero.")
     return sheet
 
 
 def draw_suite(
-    legend: dict[str, Any], axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0
-) -> None:
-    """A thin line for each row of `lines`, and the suite's median and band of `quantiles` (16, 50 and 84 %) over them.
-
-    What is below `floor` is drawn there; that is outside of a logarithmic axis.
-    """
-    lines, quantiles = np.maximum(lines, floor), np.maximum(quantiles, floor)
+    legend: dict[str, Any], axes: Axes, xs: style.Floats, lines: style.Floats, quantiles: style.Floats,
+    floor: float = 0.0,
+) -> None:  # fmt: skip
+    """A thin line for each motion of `lines`, and median and band (16, 50 and 84 %) over them, none below `floor`."""
+    lines, quantiles = np.maximum(lines, floor).reshape(-1, xs.size), np.maximum(quantiles, floor)
     axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
     for row in lines:
         plot_curve(axes, xs, row, gid="motion", **_THIN)
@@ -216,36 +189,31 @@ def suite_text(sizes: Mapping[Hashable, int]) -> str:
     return f"{sizes['motion']} motions{polarities}"
 
 
-def _statistics(data: xr.Dataset) -> xr.Dataset:
-    return suite_statistics(data, thresholds=0.0, quantiles=QUANTILES)
-
-
-def _band(data: xr.Dataset, x: str) -> Floats:
+def _band(data: xr.Dataset, x: str) -> style.Floats:
     """The suite's quantiles along an axis, mm."""
-    found = _statistics(data)
-    return np.asarray(over(found["displacement_quantile"], found, ("quantile", x))) * 1000.0
+    return np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x)) * 1000.0
 
 
-def _millimetres(data: xr.Dataset) -> Floats:
-    values = data[DISPLACEMENT].values.ravel() * 1000.0
+def _millimetres(data: xr.Dataset) -> style.Floats:
+    values = data[solved.DISPLACEMENT].values.ravel() * 1000.0
     return np.asarray(values[np.isfinite(values)], np.float64)
 
 
-def _scattered(panel: Panel, measure: str) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _scattered(panel: Panel, measure: str) -> tuple[style.Floats, style.Floats, NDArray[np.bool_]]:
     """Intensity as it shakes the block, displacement in mm, and whether the motion is reversed, of all drawn."""
     data = panel.data
     power, time_power = SCALING[measure]
     factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
     time = data["time_scale"] if "time_scale" in data.coords else 1.0
     xs = data[f"motion_{measure}"] * factor**power * time**time_power
-    ys = reliable(data, DISPLACEMENT, panel.options) * 1000.0
+    ys = reliable(data, solved.DISPLACEMENT, panel.options) * 1000.0
     every = xr.broadcast(xs, ys, data["polarity"] < 0)
     xs, ys, reverse = (one.transpose(*every[1].dims).values.ravel() for one in every)  # type: ignore[assignment]
     there = np.isfinite(ys)
     return np.asarray(xs)[there], np.asarray(ys)[there], np.asarray(reverse)[there]
 
 
-def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
+def _draw_regression(sheet: Sheet, panel: Panel, xs: style.Floats, ys: style.Floats) -> None:
     """The line of ln u = a + b ln(measure), its R² and scatter over the panel."""
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
     if slid.sum() < 3:
@@ -258,30 +226,25 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None
         scatter = float(np.sqrt(np.sum(rest**2) / (rest.size - 2)))
         ends = np.geomspace(xs[slid].min(), xs[slid].max(), 50)
         line = np.exp(found.intercept) * ends**found.slope
-        look: dict[str, Any] = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
+        look: style.Look = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
         sheet.remarks["regression"] = panel.axes.plot(ends, line, gid="regression", **look)[0]
         panel.add_title(f"slope {found.slope:.2f}, R² = {found.rvalue**2:.2f}, σ = {scatter:.2f}")
 
 
 def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
     """How many motions there are, how many of them have no value, and why; how many displacements are zero."""
-    found = _statistics(sheet.data)
-    text = f"{what} {suite_text(sheet.data[DISPLACEMENT].sizes)}"
-    up_to = "" if found["valueless_count"].size == 1 else "up to "
-    total, most = int((found["value_count"] + found["valueless_count"]).max()), int(found["valueless_count"].max())
-    if most:
-        counts = found["valueless_flag_count"]
-        reasons = counts.max([dim for dim in counts.dims if dim != "flag"])
-        pairs = zip(counts["flag"].values, reasons.values, strict=True)
-        why = ", ".join(f"{style.flag_name(int(bit))} {int(n)}" for bit, n in pairs if n)
-        sheet.notes.append(f"{text}; {up_to}{most} of {total} have no value and are left out ({why}).")
-    else:
-        sheet.notes.append(f"{text}; all have a value.")
+    found = suite_statistics(sheet.data)
+    missing, reasons = found["valueless_count"], found["valueless_flag_count"]
+    total, most = int((found["value_count"] + missing).max()), int(missing.max())
+    up_to = "" if missing.size == 1 else "up to "
+    flags = zip(reasons["flag"].values, reasons.max(missing.dims).values, strict=True)
+    why = ", ".join(f"{style.flag_name(int(bit))} {int(n)}" for bit, n in flags if n)
+    left = f"{up_to}{most} of {total} have no value and are left out ({why})" if most else "all have a value"
+    sheet.notes.append(f"{what} {suite_text(sheet.data[solved.DISPLACEMENT].sizes)}; {left}.")
     zeros = (found["zero_probability"].fillna(0.0) * found["value_count"]).values
     if zeros_are and zeros.max() > 0:
-        at = int(np.argmax(zeros))
-        count = found["value_count"].values.flat[at]
-        sheet.notes.append(f"Zero displacement: {up_to}{round(zeros.flat[at])} of {count}; {zeros_are}.")
+        count = found["value_count"].values.flat[np.argmax(zeros)]
+        sheet.notes.append(f"Zero displacement: {up_to}{round(zeros.max())} of {count}; {zeros_are}.")
 
 
 def _note_cautions(sheet: Sheet) -> None:

@@ -56,7 +56,7 @@ def chart(
     for path in given:
         common.check_ending(path, FIGURES)
 
-    from slipsweep.charts import book, kinds
+    from slipsweep.charts import kinds
     from slipsweep.charts.slices import Result
     from slipsweep.charts.style import Options
     from slipsweep.files import outputs
@@ -83,7 +83,7 @@ def chart(
         figures, left_out = kinds.draw_all(result, chosen, options, strict=bool(requested))
         for path in given if together else ():
             with outputs.complete_or_absent(path, overwrite) as temporary:
-                book.write(temporary, result, figures.values())
+                kinds.write_book(temporary, result, figures.values())
             echo(path)
     for name in () if together else figures:
         common.write_outputs(wanted[name], overwrite, functools.partial(figures.__getitem__, name))
