@@ -17,8 +17,8 @@ from slipsweep.kernels.block import (
     relative_acceleration_root,
 )
 from slipsweep.kernels.eq4 import eq4_integrals, lag_integrals
-from slipsweep.kernels.exact import MOST_STAGES, Workspace, inside, next_break
-from slipsweep.kernels.excitation import offset_at
+from slipsweep.kernels.exact import MOST_STAGES, SLIDE_ON, Workspace, inside, next_break, note
+from slipsweep.kernels.excitation import offset_at, phase_at
 from slipsweep.kernels.pulse import Pulse
 from slipsweep.kernels.series import Gain, series_of
 from slipsweep.motion.pieces import Wave
@@ -78,8 +78,8 @@ def most_gained(block: Block, wave: Wave, q: int, start: float, end: float, work
 def follow_eq4(
     block: Block, wave: Wave, workspace: Workspace, p: int, tau: float, until: int, tau_until: float
 ) -> Gain:  # fmt: skip
-    """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`, by `lag_integrals`."""
-    pieces = wave.pieces
+    """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`, by `lag_integrals`; a log has its parts."""
+    pieces, log, logged = wave.pieces, workspace.log, 0
     velocity, displacement, peak = 0.0, 0.0, 0.0
     # apart, because over a symmetric cycle they cancel to the last digit
     above, below, both = 0.0, 0.0, 0.0
@@ -87,6 +87,10 @@ def follow_eq4(
         start, end = tau if q == p else pieces[q].begin, tau_until if q == until else pieces[q].finish
         if not end > start:
             continue
+        if log.size:
+            begins, ends = phase_at(pieces[q], start), phase_at(pieces[q], end)
+            note(log[logged], SLIDE_ON, q, start, begins, ends, math.nan, velocity, displacement)
+            logged += 1
         peak = max(peak, velocity + most_gained(block, wave, q, start, end, workspace))
         lag, upper = lag_integrals(block, pieces[q], start, end), pieces[q].top > 0.0
         side_g = block.g if upper else -block.g
@@ -95,6 +99,7 @@ def follow_eq4(
         both += lag.first_x
         velocity = block.g * (above - below) + block.tan_theta * both
         peak = max(peak, velocity)
+    workspace.logged[0] = logged
     return Gain(velocity, displacement, peak)
 
 

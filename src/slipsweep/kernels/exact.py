@@ -29,8 +29,8 @@ _SLIVER, _ROUNDING = 1e-10, 4.5e-16
 #: More stages than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
 MOST_STAGES = 32
 
-#: Kinds of motion in a log of it: b held, b by Eq. 4, Eq. 12.
-HOLD, FOLLOW, ATTENUATE = range(3)
+#: Kinds of motion in a log of it: b held, b by Eq. 4, Eq. 12, and b by Eq. 4 whatever the sign of V.
+HOLD, FOLLOW, ATTENUATE, SLIDE_ON = range(4)
 
 #: A log of the motion, for time histories: its kind, the piece, τ and phase where it starts, phase at the end, and b, V
 #: and W at the start.
@@ -142,7 +142,8 @@ def state_after(
     stop = phase_at(pieces[p], part.end) if part.stops or log.size else 0.0
     logged = state.logged
     if log.size:
-        note(log[logged], state, kind, p, start, phase_at(pieces[p], start), stop)
+        velocity, displacement = state.velocity, state.displacement
+        note(log[logged], kind, p, start, phase_at(pieces[p], start), stop, state.held, velocity, displacement)
         logged += 1
     return State(
         part.velocity, state.displacement + part.displacement, state.held, not part.stops,
@@ -152,10 +153,13 @@ def state_after(
 
 
 @scalar
-def note(row: np.record, state: State, kind: int, piece: int, tau: float, start: float, end: float) -> None:
-    """Write a part of the motion that begins with this state into a row of a log."""
+def note(
+    row: np.record, kind: int, piece: int, tau: float, start: float, end: float, held: float, velocity: float,
+    displacement: float,
+) -> None:  # fmt: skip
+    """Write a part of the motion into a row of a log (`LOG`)."""
     row["kind"], row["piece"], row["tau"], row["start"], row["end"] = kind, piece, tau, start, end
-    row["held"], row["velocity"], row["displacement"] = state.held, state.velocity, state.displacement
+    row["held"], row["velocity"], row["displacement"] = held, velocity, displacement
 
 
 # ------------------------------------------------------------------ Eq. 4 on the rise, as a function of Üg alone
@@ -450,7 +454,8 @@ def recouple(
     duration = math.inf if p >= count else phase_at(pieces[p], tau) - started
     logged = state.logged
     if log.size:
-        note(log[logged], state, ATTENUATE, 0, 0.0, started, started + min(duration, state.velocity / state.held))
+        stop = started + min(duration, state.velocity / state.held)
+        note(log[logged], ATTENUATE, 0, 0.0, started, stop, state.held, state.velocity, state.displacement)
         logged += 1
     velocity = eq.attenuated_velocity(state.velocity, state.held, duration)
     displacement = state.displacement + eq.attenuated_displacement(state.velocity, state.held, duration)

@@ -14,8 +14,9 @@ from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import record as recorded
 from slipsweep.kernels.block import Block, Options
+from slipsweep.kernels.continuous import follow_eq4
 from slipsweep.kernels.eq4 import eq4_integrals
-from slipsweep.kernels.exact import ATTENUATE, FOLLOW, Workspace, pulse
+from slipsweep.kernels.exact import ATTENUATE, HOLD, SLIDE_ON, Workspace, pulse
 from slipsweep.kernels.excitation import base_acceleration, held_integrals, phase_at
 from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.model import equations as eq
@@ -34,11 +35,12 @@ class History(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """V and W at an instant, and the first sample after it."""
+    """V and W where a log begins, at phase `start`; `gained` is W after it."""
 
+    start: float
     velocity: float
     displacement: float
-    sample: int
+    gained: float
 
 
 @scalar
@@ -87,22 +89,26 @@ def fill_friction(block: Block, found: History) -> None:
 
 @scalar
 def sample_part(
-    block: Block, wave: Wave, log: np.ndarray, row: int, phi: float, displacement: float, at: int, found: History
+    block: Block, wave: Wave, log: np.ndarray, row: int, phi: float, now: Moving, at: int, found: History
 ) -> None:
-    """Fill Ü, V and W of a sample at phase φ of the table in a part of the motion; W was `displacement` before it."""
+    """Fill Ü, V and W of a sample at phase φ of the table in a part of the motion."""
     part = log[row]
     since, b, tau = max(phi - part["start"], 0.0), part["held"], part["tau"]
+    velocity = now.velocity + part["velocity"]
+    displacement = now.displacement + now.velocity * (part["start"] - now.start) + part["displacement"]
     if part["kind"] == ATTENUATE:
         found.block_acceleration[at] += b
         gained, moved = -b * since, -0.5 * b * since * since
-    elif part["kind"] == FOLLOW:
-        found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
-        gained, moved = eq4_integrals(block, wave.pieces[part["piece"]], tau, tau + since)
-    else:
+    elif part["kind"] == HOLD:
         found.block_acceleration[at] = b
         gained, moved = held_integrals(wave.pieces[part["piece"]], block.amplitude, b, tau, tau + since)
-    found.velocity[at] = max(part["velocity"] + gained, 0.0)
-    found.displacement[at] = displacement + part["displacement"] + part["velocity"] * since + moved
+    else:
+        found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
+        gained, moved = eq4_integrals(block, wave.pieces[part["piece"]], tau, tau + since)
+    left = velocity + gained
+    if part["kind"] != SLIDE_ON:  # beyond a stop, by rounding
+        left = max(left, 0.0) if velocity >= 0.0 else min(left, 0.0)
+    found.velocity[at], found.displacement[at] = left, displacement + velocity * since + moved
 
 
 @scalar
@@ -115,26 +121,26 @@ def begins_at(block: Block, wave: Wave, k: int) -> float:
 
 
 @scalar
-def sample_pulse(
-    block: Block, wave: Wave, log: np.ndarray, start: float, until: float, offset: float,
-    displacement: float, gained: float, phases: np.ndarray, at: int, found: History,
+def sample_log(
+    block: Block, wave: Wave, log: np.ndarray, until: float, offset: float, now: Moving, phases: np.ndarray, at: int,
+    found: History,
 ) -> int:  # fmt: skip
-    """Fill Ü, V and W up to phase `until`, from the log of a pulse that begins at `start`; the first sample beyond.
+    """Fill Ü, V and W up to phase `until` of the table from a log; the first sample beyond.
 
-    W is `displacement` before the pulse and `gained` more after it; phases of the table are less by `offset`.
+    Phases of the table are those of the samples less `offset`.
     """
     row = 0
-    while at < phases.size and phases[at] < until:
+    while at < phases.size and phases[at] - offset < until:
         phi = phases[at] - offset
         while row < log.size and phi >= log[row]["end"]:
             row += 1
         moved = 0.0
-        if phases[at] >= start:
-            moved = log[row]["displacement"] if row < log.size else gained
-        found.displacement[at] = displacement + moved
+        if phi >= now.start:
+            moved = log[row]["displacement"] if row < log.size else now.gained
+        found.displacement[at] = now.displacement + moved
         # a part that is entered with V follows the one before: what lies between them is rounding
-        if row < log.size and (phi >= log[row]["start"] or log[row]["velocity"] > 0.0):
-            sample_part(block, wave, log, row, phi, displacement, at, found)
+        if row < log.size and (phi >= log[row]["start"] or log[row]["velocity"] != 0.0):
+            sample_part(block, wave, log, row, phi, now, at, found)
         at += 1
     return at
 
@@ -151,10 +157,10 @@ def stick_slip_history(
         # the plain cycle of the table comes again and again
         following = first_pulse(block, wave, k + 1)
         offset = 2.0 * math.pi * repeat
-        start, until = begins_at(block, wave, k) + offset, begins_at(block, wave, following) + offset
         now = pulse(block, options, wave, workspace, k, following, velocity)
-        log = workspace.log[: workspace.logged[0]]
-        at = sample_pulse(block, wave, log, start, until, offset, displacement, now.displacement, phases, at, found)
+        log, until = workspace.log[: workspace.logged[0]], begins_at(block, wave, following)
+        before = Moving(begins_at(block, wave, k), 0.0, displacement, now.displacement)
+        at = sample_log(block, wave, log, until, offset, before, phases, at, found)
         velocity = now.velocity
         displacement += now.displacement
         again = following < intervals and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
@@ -167,85 +173,32 @@ def stick_slip_history(
 
 
 @scalar
-def sample_following(
-    block: Block, wave: Wave, p: int, tau: float, until: int, tau_until: float, offset: float, now: Moving,
-    phases: np.ndarray, found: History,
-) -> Moving:  # fmt: skip
-    """Fill Ü, V and W under Eq. 4 from τ on piece p to `tau_until` on piece `until`; what moves then.
-
-    Phases of the table are less by `offset`.
-    """
-    velocity, displacement, at = now
-    for q in range(p, min(until + 1, wave.pieces.shape[0])):
-        start = tau if q == p else wave.pieces[q].begin
-        end, end_phase = wave.pieces[q].finish, wave.pieces[q].end
-        if q == until:
-            end, end_phase = tau_until, phase_at(wave.pieces[q], tau_until)
-        if end <= start:
-            continue
-        start_phase = phase_at(wave.pieces[q], start) + offset
-        while at < phases.size and phases[at] < end_phase + offset:
-            since = max(phases[at] - start_phase, 0.0)
-            gained, moved = eq4_integrals(block, wave.pieces[q], start, min(start + since, end))
-            found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
-            found.velocity[at] = velocity + gained
-            found.displacement[at] = displacement + velocity * since + moved
-            at += 1
-        gained, moved = eq4_integrals(block, wave.pieces[q], start, end)
-        displacement += velocity * (end - start) + moved
-        velocity += gained
-    return Moving(velocity, displacement, at)
-
-
-@scalar
-def continuous_history(block: Block, cycles: int, wave: Wave, phases: np.ndarray, found: History) -> None:
-    """Fill Ü, V and W of a continuously sliding block at increasing phases φ, piece by piece."""
+def continuous_history(
+    block: Block, cycles: int, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
+) -> None:
+    """Fill Ü, V and W of a continuously sliding block at increasing phases φ, cycle by cycle."""
     k = first_pulse(block, wave, 0)
     if k == wave.height.size:
         return
     first, began = beginning(block, wave, k)
-    at = 0
-    while at < phases.size and phases[at] < phase_at(wave.pieces[first], began):
-        at += 1
-    now = Moving(0.0, 0.0, at)
+    at, slides, velocity, displacement = 0, False, 0.0, 0.0
     for n in range(cycles):
         c = table_cycle(wave, n)
-        p, until = max(wave.cycle[c], first), wave.cycle[c + 1]
-        if p < until:
-            tau = began if p == first and n == c else wave.pieces[p].begin
-            tau_until = wave.pieces[until].begin if until < wave.pieces.shape[0] else 0.0
-            offset = 2.0 * math.pi * (n - c)
-            now = sample_following(block, wave, p, tau, until, tau_until, offset, now, phases, found)
-        if c == wave.lead:
-            first = 0 if wave.cycle[c] == 0 else min(first, wave.cycle[c])
-    for after in range(now.sample, phases.size):
-        found.velocity[after], found.displacement[after] = now.velocity, now.displacement
-
-
-@scalar
-def sample_continuous_pulse(
-    block: Block, wave: Wave, k: int, following: int, peak: float, now: Moving, times: np.ndarray, found: History
-) -> int:
-    """Fill Ü, v and u of a continuous pulse of a record (`record.continuous_pulse`); the first sample beyond."""
-    p, tau = beginning(block, wave, k)
-    until = recorded.end_of_following(block, wave, k, following)
-    at = now.sample
-    while at < times.size and times[at] < phase_at(wave.pieces[p], tau):
-        found.displacement[at] = now.displacement
-        at += 1
-    after = sample_following(
-        block, wave, p, tau, until.piece, until.tau, 0.0, Moving(now.velocity, now.displacement, at), times, found
-    )
-    at = after.sample
-    held, speed, side = physics.response(block, peak), abs(after.velocity), math.copysign(1.0, after.velocity)
-    while at < times.size and times[at] < until.begins:
-        since = max(times[at] - until.ends, 0.0)
-        left = eq.attenuated_velocity(speed, held, since)
-        found.block_acceleration[at] += side * held if left > 0.0 else 0.0
-        found.velocity[at] = side * left
-        found.displacement[at] = after.displacement + side * eq.attenuated_displacement(speed, held, since)
-        at += 1
-    return at
+        p, until = wave.cycle[c], wave.cycle[c + 1]
+        if p == until or (not slides and until <= first):
+            continue
+        tau = wave.pieces[p].begin
+        if not slides:
+            p, tau, slides = first, began, True
+        gain = follow_eq4(block, wave, workspace, p, tau, until, -math.inf)
+        log = workspace.log[: workspace.logged[0]]
+        start, end = phase_at(wave.pieces[p], tau), wave.pieces[until - 1].end
+        before = Moving(start, velocity, displacement, 0.0)
+        at = sample_log(block, wave, log, end, 2.0 * math.pi * (n - c), before, phases, at, found)
+        displacement += velocity * (end - start) + gain.displacement
+        velocity += gain.velocity
+    for after in range(at, phases.size):
+        found.velocity[after], found.displacement[after] = velocity, displacement
 
 
 @kernel
@@ -263,13 +216,11 @@ def record_history(
         block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
         continuous = recorded.slides_continuously(interface, options, peak)
         now = recorded.recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
-        if continuous:
-            moving = Moving(velocity, displacement, at)
-            at = sample_continuous_pulse(block, wave, k, following, peak, moving, times, found)
-        else:
-            start, until = begins_at(block, wave, k), begins_at(block, wave, following)
-            log = workspace.log[: workspace.logged[0]]
-            at = sample_pulse(block, wave, log, start, until, 0.0, displacement, now.displacement, times, at, found)
+        # the log of continuous sliding begins at rest
+        entered = velocity if continuous else 0.0
+        before = Moving(begins_at(block, wave, k), entered, displacement, now.displacement)
+        log, until = workspace.log[: workspace.logged[0]], begins_at(block, wave, following)
+        at = sample_log(block, wave, log, until, 0.0, before, times, at, found)
         velocity, displacement = now.velocity, displacement + now.displacement
         k = following
     fill_friction(block, found)
@@ -285,7 +236,7 @@ def wave_history(
     fill_base(block.amplitude, options.cycles, wave, phases, found)
     rest(found)
     if interface.sliding_mode == eq.CONTINUOUS:
-        continuous_history(block, options.cycles, wave, phases, found)
+        continuous_history(block, options.cycles, wave, workspace, phases, found)
     elif interface.sliding_mode == eq.STICK_SLIP:
         stick_slip_history(block, options, wave, workspace, phases, found)
     fill_friction(block, found)

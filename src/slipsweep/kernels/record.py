@@ -17,7 +17,7 @@ from slipsweep.kernels import block as physics
 from slipsweep.kernels import pulse as pulses
 from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.continuous import find_zeros, follow_eq4
-from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
+from slipsweep.kernels.exact import ATTENUATE, Workspace, note, pulse, uncounted_workspace
 from slipsweep.kernels.excitation import phase_at
 from slipsweep.kernels.grid import cell_at, uncounted_wave
 from slipsweep.model import equations as eq
@@ -112,6 +112,11 @@ def continuous_pulse(
     displacement = velocity * (until.ends - phase_at(wave.pieces[p], tau)) + displaced
     if until.begins > until.ends:
         held, speed, side = physics.response(block, peak), abs(after), math.copysign(1.0, after)
+        if workspace.log.size:
+            row = workspace.log[workspace.logged[0]]
+            stop = until.ends + min(speed / held, until.begins - until.ends)
+            note(row, ATTENUATE, 0, 0.0, until.ends, stop, side * held, gained, displaced)
+            workspace.logged[0] += 1
         displacement += side * eq.attenuated_displacement(speed, held, until.begins - until.ends)
         after = side * eq.attenuated_velocity(speed, held, until.begins - until.ends)
     slips = 1.0 if velocity == 0.0 else 0.0
