@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import scalar
+from slipsweep.kernels import exact
 from slipsweep.kernels.block import (
     Block,
     Options,
@@ -17,7 +18,7 @@ from slipsweep.kernels.block import (
     relative_acceleration_root,
 )
 from slipsweep.kernels.eq4 import eq4_integrals, lag_integrals
-from slipsweep.kernels.exact import MOST_STAGES, SLIDE_ON, Workspace, inside, next_break, note
+from slipsweep.kernels.exact import MOST_STAGES, Workspace, inside, next_break
 from slipsweep.kernels.excitation import offset_at, phase_at
 from slipsweep.kernels.pulse import Pulse
 from slipsweep.kernels.series import Gain, series_of
@@ -89,7 +90,7 @@ def follow_eq4(
             continue
         if log.size:
             begins, ends = phase_at(pieces[q], start), phase_at(pieces[q], end)
-            note(log[logged], SLIDE_ON, q, start, begins, ends, math.nan, velocity, displacement)
+            exact.note(log[logged], exact.SLIDE_ON, q, start, begins, ends, math.nan, velocity, displacement)
             logged += 1
         peak = max(peak, velocity + most_gained(block, wave, q, start, end, workspace))
         lag, upper = lag_integrals(block, pieces[q], start, end), pieces[q].top > 0.0

@@ -12,11 +12,12 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels import block as physics
+from slipsweep.kernels import exact
 from slipsweep.kernels import record as recorded
 from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.continuous import follow_eq4
 from slipsweep.kernels.eq4 import eq4_integrals
-from slipsweep.kernels.exact import ATTENUATE, HOLD, SLIDE_ON, Workspace, pulse
+from slipsweep.kernels.exact import Workspace, pulse
 from slipsweep.kernels.excitation import base_acceleration, held_integrals, phase_at
 from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.model import equations as eq
@@ -96,17 +97,17 @@ def sample_part(
     since, b, tau = max(phi - part["start"], 0.0), part["held"], part["tau"]
     velocity = now.velocity + part["velocity"]
     displacement = now.displacement + now.velocity * (part["start"] - now.start) + part["displacement"]
-    if part["kind"] == ATTENUATE:
+    if part["kind"] == exact.ATTENUATE:
         found.block_acceleration[at] += b
         gained, moved = -b * since, -0.5 * b * since * since
-    elif part["kind"] == HOLD:
+    elif part["kind"] == exact.HOLD:
         found.block_acceleration[at] = b
         gained, moved = held_integrals(wave.pieces[part["piece"]], block.amplitude, b, tau, tau + since)
     else:
         found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
         gained, moved = eq4_integrals(block, wave.pieces[part["piece"]], tau, tau + since)
     left = velocity + gained
-    if part["kind"] != SLIDE_ON:  # beyond a stop, by rounding
+    if part["kind"] != exact.SLIDE_ON:  # beyond a stop, by rounding
         left = max(left, 0.0) if velocity >= 0.0 else min(left, 0.0)
     found.velocity[at], found.displacement[at] = left, displacement + velocity * since + moved
 

@@ -14,10 +14,11 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels import block as physics
+from slipsweep.kernels import exact
 from slipsweep.kernels import pulse as pulses
 from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.continuous import find_zeros, follow_eq4
-from slipsweep.kernels.exact import ATTENUATE, Workspace, note, pulse, uncounted_workspace
+from slipsweep.kernels.exact import Workspace, pulse
 from slipsweep.kernels.excitation import phase_at
 from slipsweep.kernels.grid import cell_at, uncounted_wave
 from slipsweep.model import equations as eq
@@ -115,7 +116,7 @@ def continuous_pulse(
         if workspace.log.size:
             row = workspace.log[workspace.logged[0]]
             stop = until.ends + min(speed / held, until.begins - until.ends)
-            note(row, ATTENUATE, 0, 0.0, until.ends, stop, side * held, gained, displaced)
+            exact.note(row, exact.ATTENUATE, 0, 0.0, until.ends, stop, side * held, gained, displaced)
             workspace.logged[0] += 1
         displacement += side * eq.attenuated_displacement(speed, held, until.begins - until.ends)
         after = side * eq.attenuated_velocity(speed, held, until.begins - until.ends)
@@ -213,6 +214,6 @@ def solve_cell(
 @kernel
 def solve_record(cells: np.ndarray, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
     """Solve the cells of a tile under a record exactly; `results` is (fields of `Motion`, cells)."""
-    wave, workspace = uncounted_wave(wave), uncounted_workspace(workspace)
+    wave, workspace = uncounted_wave(wave), exact.uncounted_workspace(workspace)
     for j in range(cells.size):
         physics.store(solve_cell(exponential(), cell_at(cells, j), options, wave, workspace), j, results)
