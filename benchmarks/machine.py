@@ -97,9 +97,12 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def arguments(
-    description: str | None, folder: Path = RESULTS, counts: Mapping[str, int] | None = None
+    description: str | None,
+    folder: Path = RESULTS,
+    counts: Mapping[str, int] | None = None,
+    files: Iterable[str] = (),
 ) -> argparse.Namespace:
-    """The command line that all measurements share; `counts` are whole numbers of its own, with their defaults."""
+    """The command line that all measurements share, and whole numbers with their defaults and files of its own."""
     parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
     parser.add_argument("--tiny", action="store_true", help="a few cells only, to see that it runs")
     parser.add_argument(
@@ -107,6 +110,8 @@ def arguments(
     )
     for name, default in (counts or {}).items():
         parser.add_argument(f"--{name}", type=int, default=default, help="(default: %(default)s)")
+    for name in files:
+        parser.add_argument(f"--{name}", type=Path)
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     return given

@@ -5,6 +5,9 @@ on the same straight lines sampled 4 and 16 times as finely, and against pyNewma
 with Newmark's braking put into its rule.  Time: a
 million (ky, motion, scale) analyses by slipsweep; the paper's law, and pySLAMMER, on a share of them.
 Writes records.md.
+
+``--slammer FILE`` compares with SLAMMER 1.1 itself: the table of its results that pySLAMMER is verified against,
+tests/verification_data/reference/SLAMMER_results.xlsx in pySLAMMER's repository, which its package does not have.
 """
 
 import argparse
@@ -20,8 +23,14 @@ from slipsweep import Newmark, Record, Suite, sweep
 
 KY = 0.1
 
-#: Yield coefficients of the regression, and the displacement from which on it counts, m.
-EVERY_KY, LEAST = (0.02, 0.05, 0.1, 0.2, 0.3), 1e-4
+#: Yield coefficients of the comparison with pySLAMMER.
+EVERY_KY = (0.02, 0.05, 0.1, 0.2, 0.3)
+
+#: pySLAMMER's tolerance for SLAMMER's results: a part of those above `SMALL`, m below.
+SMALL, PART, METRES = 0.005, 0.02, 0.0005
+
+#: An analysis: motion, ky, factor on the motion, and another program's displacement, m.
+Run = tuple[str, float, float, float]
 
 #: Refinements of the agreement table, and the longest record that is refined 16 times.
 PARTS = (1, 4, 16)
@@ -39,16 +48,17 @@ def refined(values: np.ndarray, parts: int) -> np.ndarray:
     return np.interp(np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values)
 
 
-def pyslammer_displacement(motion: Any, parts: int, ky: float = KY) -> float:
+def pyslammer_displacement(motion: Any, parts: int, ky: float = KY, factor: float = 1.0) -> float:
     """RigidAnalysis on a refined motion, m."""
     from pyslammer import GroundMotion, RigidAnalysis
 
-    return float(RigidAnalysis(ky, GroundMotion(refined(motion.accel, parts), motion.dt / parts)).max_sliding_disp)
+    scaled = GroundMotion(factor * refined(motion.accel, parts), motion.dt / parts)
+    return float(RigidAnalysis(ky, scaled).max_sliding_disp)
 
 
-def exact_displacement(motion: Any, g: float, ky: float = KY) -> float:
+def exact_displacement(motion: Any, g: float, ky: float = KY, factor: float = 1.0) -> float:
     """Newmark's block by slipsweep, m."""
-    record = Record.sampled(motion.accel * g, motion.dt)
+    record = Record.sampled(factor * motion.accel * g, motion.dt)
     return float(sweep(yield_coefficient=ky, model=Newmark(g), excitation=record).permanent_displacement)
 
 
@@ -74,26 +84,38 @@ def agreement(found: dict[str, Any], g: float) -> str:
     return table([*header, *(f"pyNewmarkDisp, Δt/{n}" for n in (1, 16))], rows)
 
 
-def regression(found: dict[str, Any], g: float) -> str:
-    """pySLAMMER over slipsweep on all motions and `EVERY_KY`: slope, R², share within 2 %, and the worst, refined."""
-    runs = [(name, motion, ky) for name, motion in found.items() for ky in EVERY_KY]
-    ours = np.array([exact_displacement(motion, g, ky) for _, motion, ky in runs])
-    theirs = np.array([pyslammer_displacement(motion, 1, ky) for _, motion, ky in runs])
-    slides = ours > LEAST
-    slope = float((ours @ theirs) / (ours @ ours))
-    r_squared = float(np.corrcoef(ours[slides], theirs[slides])[0, 1] ** 2)
-    apart = np.where(slides, np.abs(theirs / np.where(slides, ours, 1.0) - 1.0), 0.0)
+def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
+    """SLAMMER's rigid blocks, both ways, from the table of its results."""
+    import pandas as pd
+
+    runs = []
+    for row in pd.read_excel(path).drop_duplicates(["Earthquake", "Record", "ky (g)"]).to_dict("records"):
+        name = f"{row['Earthquake'].replace('.', '').replace(' ', '_')}_{row['Record']}"
+        if name not in found:  # --tiny
+            continue
+        factor = row["Scale"] / np.abs(found[name].accel).max()  # to a peak of `Scale` g
+        for sign, column in ((1.0, "Rigid Normal (cm)"), (-1.0, "Rigid Inverse (cm)")):
+            runs.append((name, float(row["ky (g)"]), sign * factor, 0.01 * row[column]))
+    return runs
+
+
+def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
+    """Another program's displacements over slipsweep's: slope, R², share within the tolerance; the worst, refined."""
+    ours = np.array([exact_displacement(found[name], g, ky, factor) for name, ky, factor, _ in runs])
+    theirs = np.array([run[-1] for run in runs])
+    apart = np.abs(theirs - ours)
+    within = np.mean(apart <= np.where(theirs > SMALL, PART * theirs, METRES))
     rows = []
-    for at in np.argsort(-apart)[:5]:
-        name, motion, ky = runs[at]
-        peers = [pyslammer_displacement(motion, parts, ky) / ours[at] - 1.0 for parts in PARTS]
-        rows.append([name, ky, f"{ours[at]:.6f}", *(f"{peer:+.1e}" for peer in peers)])
-    header = ["the five farthest apart", "ky, g", "slipsweep, m", *(f"pySLAMMER, Δt/{parts}" for parts in PARTS)]
-    near = np.mean(apart[slides] <= 0.02)
+    for at in np.argsort(-apart / np.maximum(theirs, SMALL))[:5]:
+        name, ky, factor, other = runs[at]
+        refined_runs = (pyslammer_displacement(found[name], parts, ky, factor) for parts in PARTS)
+        rows.append([name, ky, f"{factor:+.3g}", *(f"{1000 * u:.3f}" for u in (other, ours[at], *refined_runs))])
+    refinements = (f"pySLAMMER, Δt/{parts}" for parts in PARTS)
+    header = ["the five farthest apart, mm", "ky, g", "factor", "the other", "slipsweep", *refinements]
     return (
-        f"{slides.sum()} of {slides.size} pairs of motion and ky ({', '.join(map(str, EVERY_KY))}) slide more than "
-        f"{1000 * LEAST:g} mm: slope {slope:.4f}, R² {r_squared:.6f}, {near:.0%} within 2 %.\n\n"
-        f"{table(header, rows)}"
+        f"{len(runs)} analyses: slope {(ours @ theirs) / (ours @ ours):.4f}, "
+        f"R² {np.corrcoef(ours, theirs)[0, 1] ** 2:.6f}, {within:.0%} within pySLAMMER's tolerance ({PART:.0%}; "
+        f"{1000 * METRES:g} mm below {1000 * SMALL:g} mm).\n\n{table(header, rows)}"
     )
 
 
@@ -150,13 +172,18 @@ def main(given: argparse.Namespace) -> Path:
         found = motions()
         if given.tiny:
             found = dict(list(found.items())[-2:-1])
-        agree, fit = agreement(found, G_EARTH), regression(found, G_EARTH)
+        agree = agreement(found, G_EARTH)
+        pairs = [(name, ky) for name in found for ky in EVERY_KY]
+        fits = {"pySLAMMER": [(name, ky, 1.0, pyslammer_displacement(found[name], 1, ky)) for name, ky in pairs]}
+        if given.slammer:
+            fits["SLAMMER"] = slammer_runs(given.slammer, found)
+        compared = "".join(f"**{name}.** {comparison(found, runs, G_EARTH)}\n" for name, runs in fits.items())
         times = timing(found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found))
     page = given.folder / "records.md"
     page.write_text(
         "# Newmark's block on recorded motions\n\n"
         f"{measured_on(('numpy', 'numba', 'pyslammer', 'pynewmarkdisp'))} "
-        "Made by `python -m benchmarks.records`.\n\n"
+        "Made by `python -m benchmarks.records --slammer SLAMMER_results.xlsx`.\n\n"
         f"## Agreement, ky = {KY} g\n\n"
         "slipsweep is exact for the straight lines between samples. The others' columns are their relative\n"
         "difference from it. pySLAMMER sees onset and stop at samples only: refined, it converges to the exact\n"
@@ -164,9 +191,11 @@ def main(given: argparse.Namespace) -> Path:
         "while Üg is below yield, its block loses the velocity |∫ Üg dt| instead of ∫ (Üy − Üg) dt, and is hardly\n"
         "braked near Üg = 0; no refinement removes that.\n\n"
         f"{agree}\n"
-        "## pySLAMMER against slipsweep\n\n"
-        "Of the motions as they are sampled; what differs most comes near as pySLAMMER's samples are refined.\n\n"
-        f"{fit}\n"
+        "## SLAMMER and pySLAMMER against slipsweep\n\n"
+        "Both take the motions as they are sampled; where they differ most, pySLAMMER comes near as samples are "
+        "refined.\nSLAMMER 1.1: its own results, which pySLAMMER is verified against; the motions scaled, and both "
+        "ways.\n\n"
+        f"{compared}"
         "## Time of (ky, motion, scale) analyses\n\n"
         "Processor time of all threads together: core for core. Motions, yield coefficients (0.02 to 0.4) and scales\n"
         "(0.3 to 3) span the grid, solved in one run; seconds a sample count those of the motion, slid\n"
@@ -177,4 +206,4 @@ def main(given: argparse.Namespace) -> Path:
 
 
 if __name__ == "__main__":
-    print(main(arguments(__doc__)))
+    print(main(arguments(__doc__, files=("slammer",))))
