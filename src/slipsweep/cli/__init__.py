@@ -1,4 +1,4 @@
-"""The command line: one file a command, put together and run here.
+"""The command line: one file a command, or a few of one kind, put together and run here.
 
 Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 130: Ctrl-C.  What a user can mend is said in
 one line, never a traceback.  What a command needs is imported inside it, so that `slipsweep --help` is there at once.
@@ -14,8 +14,9 @@ import typer
 from typer.core import TyperGroup
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, example, explore, export, hazard, info, limit, run, simulate
-from slipsweep.cli.common import app, echo
+from slipsweep.cli import calibrate, chart, example, hazard, info, limit, run, simulate
+from slipsweep.cli.common import echo
+from slipsweep.cli.options import app
 from slipsweep.errors import InputError, RunError
 
 
@@ -33,10 +34,20 @@ class _Commands(TyperGroup):
             kept = getattr(error, "__notes__", ["nothing written"])
             echo(f"slipsweep: interrupted; {'; '.join(kept)}", err=True)
             raise typer.Exit(130) from None
-        except InputError as error:
-            raise _failed(error, 2) from None
-        except (RunError, OSError, MemoryError) as error:
-            raise _failed(error, 1) from None
+        except (InputError, RunError, OSError, MemoryError) as error:
+            is_input = isinstance(error, InputError)
+            # notes of bad input are of the files of a suite, say: one each
+            lines = ("\n  " if is_input else "; ").join((_message(error), *getattr(error, "__notes__", ())))
+            echo(f"slipsweep: error: {lines}", err=True)
+            raise typer.Exit(2 if is_input else 1) from None
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return f"out of memory{f': {error}' if str(error) else ''}"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'what is printed'}: {error.strerror}"
+    return str(error)
 
 
 def _show_version(requested: bool) -> None:
@@ -55,7 +66,7 @@ def _options(
 
 
 #: Modules of the commands, in the order of the help.
-_MODULES = [one.__name__ for one in (example, run, simulate, limit, hazard, chart, explore, info, export, calibrate)]
+_MODULES = [one.__name__ for one in (example, run, simulate, limit, hazard, chart, info, calibrate)]
 app.registered_commands.sort(key=lambda one: _MODULES.index(one.callback.__module__ if one.callback else ""))
 
 
@@ -74,18 +85,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     return 0
-
-
-def _failed(error: Exception, status: int) -> typer.Exit:
-    """Say in one line what is wrong; return what ends the command."""
-    notes = getattr(error, "__notes__", ())
-    if isinstance(error, MemoryError):
-        message = f"out of memory{f': {error}' if str(error) else ''}"
-    elif isinstance(error, OSError) and error.strerror:
-        message = f"{error.filename or 'what is printed'}: {error.strerror}"
-    else:
-        message = str(error)
-    # notes of bad input are of the files of a suite, say: one each
-    between = "\n  " if status == 2 else "; "
-    echo(f"slipsweep: error: {between.join((message, *notes))}", err=True)
-    return typer.Exit(status)

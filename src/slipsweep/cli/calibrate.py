@@ -5,11 +5,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from slipsweep.cli import common
-from slipsweep.cli.common import BLOCK, FIGURES, Overwrite, Panel, Quiet, command, echo, written
-from slipsweep.cli.options import chooses
+from slipsweep.cli import common, options
+from slipsweep.cli.common import FIGURES, echo
+from slipsweep.cli.options import Text, Texts, command, written
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: The group of options that say what of the measurement is used, and how.
-TEST = Panel("Measurement")
+TEST = options.Panel("Measurement")
 
 #: Columns of a test.
 _COLUMNS = (
@@ -26,8 +24,8 @@ _COLUMNS = (
     "relative displacement (mm)."
 )
 
-Offset = Annotated[list[str] | None, TEST("Channel with an offset, or all; may be repeated.", metavar="CHANNEL")]
-Drift = Annotated[list[str] | None, TEST("Channel that drifts linearly, or all; may be repeated.", metavar="CHANNEL")]
+Offset = Annotated[Texts, TEST("Channel with an offset, or all; may be repeated.", "CHANNEL")]
+Drift = Annotated[Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")]
 
 #: Slides as a table: results, what stands above, and its width.
 _SLIDES = {
@@ -52,43 +50,40 @@ _OF_CYCLES = (*_FOUND, "attenuation_coefficient")
 )
 def friction(
     *,
-    test: Annotated[Path, typer.Argument(metavar="TEST.csv", help=_COLUMNS)],
-    theta: common.Theta,
-    mu_s: common.MuS = None,
-    phi: common.Phi = None,
-    g: Annotated[float, BLOCK("Gravity, m/s².")] = 9.81,
+    test: Annotated[Path, options.read("TEST.csv", _COLUMNS)],
+    theta: Annotated[str, options.THETA],
+    mu_s: options.MuS = None,
+    phi: options.Phi = None,
+    g: Annotated[float, options.BLOCK("Gravity, m/s².")] = 9.81,
     offset: Offset = None,
     drift: Drift = None,
-    rest: Annotated[str | None, TEST("Times of rest, s, to find offsets and drifts by.", metavar="FROM:TO")] = None,
+    rest: Annotated[Text, TEST("Times of rest, s, to find offsets and drifts by.", "FROM:TO")] = None,
     threshold: Annotated[
-        str | None, TEST.value("Relative acceleration of a slide: 0.02g (default: 4 times its noise).")
+        Text, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", "VALUE")
     ] = None,
-    output: Annotated[list[Path] | None, written("Write .nc, .png, .svg or .pdf; may be repeated.")] = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
+    output: Annotated[options.Paths, written("Write .nc, .png, .svg or .pdf; may be repeated.")] = None,
+    overwrite: options.Overwrite = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
-    angle = quantity("--theta", theta, "degree", g)
-    friction_angle = None if phi is None else quantity("--phi", phi, "degree", g)
+    angle, phi_angle = _angles(theta, phi, g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
 
     span, offsets, drifts = None if rest is None else _times(rest), _channels(offset), _channels(drift)
     table = measured_friction(
-        test, angle, mu_s, phi=friction_angle, g=g, offset=offsets, drift=drifts, rest=span, threshold=least
+        test, angle, mu_s, phi=phi_angle, g=g, offset=offsets, drift=drifts, rest=span, threshold=least
     )
-    attrs = table.attrs
-    writers = {".nc": lambda path: common.write_netcdf(table, path, attrs["title"])}
-    common.write_outputs(paths, overwrite, lambda: common.figure_of(table), writers)
+    common.write_outputs(paths, overwrite, table)
     if quiet:
         return
-    if attrs["constant_friction"]:
-        echo(attrs["constant_friction"])
-    echo(f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}", f"removed    {attrs['removed']}")
-    _echo_coefficients(table)
-    header = ["".join(f"{text:>{width}}" for text, width in _SLIDES.values())] if table.sizes["slide"] else []
-    echo(f"{table.sizes['slide']} slides{', s and m/s2:' if header else ''}", *header)
+    attrs, slides = table.attrs, table.sizes["slide"]
+    _echo_coefficients(
+        table, f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}", f"removed    {attrs['removed']}"
+    )
+    header = ["".join(f"{text:>{width}}" for text, width in _SLIDES.values())] if slides else []
+    echo(f"{slides} slides{', s and m/s2:' if slides else ''}", *header)
     for row in zip(*(table[name].values for name in _SLIDES), strict=True):
         echo("".join(f"{value:{width}.4g}" for value, (_, width) in zip(row, _SLIDES.values(), strict=True)))
     echo(*paths)
@@ -98,42 +93,39 @@ def friction(
     "Tests on a shaking table",
     "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
     "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
+    model=MODELS,
 )
-@chooses(model=MODELS)
 def calibrate(
     *,
-    tests: Annotated[
-        list[Path], typer.Argument(metavar="TEST.csv...", help=f"{_COLUMNS} One at least of the block's.")
-    ],
-    theta: common.Theta,
-    mu_s: common.MuS = None,
-    phi: common.Phi = None,
+    tests: Annotated[list[Path], options.read("TEST.csv...", f"{_COLUMNS} One at least of the block's.")],
+    theta: Annotated[str, options.THETA],
+    mu_s: options.MuS = None,
+    phi: options.Phi = None,
     offset: Offset = None,
     drift: Drift = None,
-    cycles: Annotated[bool, TEST("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
-    output: Annotated[list[Path] | None, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
-    overwrite: Overwrite = False,
+    cycles: Annotated[bool, TEST.flag("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
+    output: Annotated[options.Paths, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
+    overwrite: options.Overwrite = False,
     model: Model,
-    quiet: Quiet = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
-    angle = quantity("--theta", theta, "degree", model.g)
-    friction_angle = None if phi is None else quantity("--phi", phi, "degree", model.g)
+    angle, phi_angle = _angles(theta, phi, model.g)
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
     offsets, drifts = _channels(offset), _channels(drift)
-    table = calibrated(tests, angle, mu_s, phi=friction_angle, model=model, offset=offsets, drift=drifts, cycles=cycles)
+    table = calibrated(tests, angle, mu_s, phi=phi_angle, model=model, offset=offsets, drift=drifts, cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
-    writers = {
-        ".nc": lambda path: common.write_netcdf(table, path, table.attrs["title"]),
-        ".toml": lambda path: path.write_text(text, encoding="utf-8"),
-    }
-    common.write_outputs(paths, overwrite, lambda: common.figure_of(table), writers)
+    common.write_outputs(paths, overwrite, table, {".toml": lambda path: path.write_text(text, encoding="utf-8")})
     if not quiet:
         _summarize(table)
         echo("", text, *paths)
+
+
+def _angles(theta: str, phi: str | None, g: float) -> tuple[float, float | None]:
+    return quantity("--theta", theta, "degree", g), None if phi is None else quantity("--phi", phi, "degree", g)
 
 
 def _channels(given: list[str] | None) -> str | list[str]:
@@ -148,8 +140,9 @@ def _times(text: str) -> tuple[float, float]:
         raise InputError(f"--rest {text}: must be two times, s, as FROM:TO") from None
 
 
-def _echo_coefficients(table: "xr.Dataset") -> None:
-    """Static and kinetic friction by statics, where the block was seen to slide."""
+def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
+    """That the friction is constant, and static and kinetic friction by statics, where the block was seen to slide."""
+    echo(*filter(None, [table.attrs["constant_friction"]]), *lines)
     for kind in ("static", "kinetic"):
         if f"{kind}_friction" in table and table[f"{kind}_friction"].notnull():
             low, high = table[f"{kind}_friction_interval"].values
@@ -158,8 +151,6 @@ def _echo_coefficients(table: "xr.Dataset") -> None:
 
 
 def _summarize(table: "xr.Dataset") -> None:
-    if constant := table.attrs["constant_friction"]:
-        echo(constant)
     _echo_coefficients(table)
     echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
     for name in _FOUND:
@@ -180,9 +171,9 @@ def _summarize(table: "xr.Dataset") -> None:
             parts = (f"{misfit:.2g} {misfits.attrs['units']}  {share:.1%}" for misfit, share in pairs)
             echo(f"  {name:<32}{', '.join(parts)}")
     echo(f"removed: {table.attrs['removed']}")
-    if "cycle_start" in table:
-        for number in range(table.sizes.get("test", 1)):
-            _echo_cycles(table.isel(test=number, missing_dims="ignore"))
+    for number in range(table.sizes.get("test", 1)) if "cycle_start" in table else ():
+        _echo_cycles(table.isel(test=number, missing_dims="ignore"))
+    constant = table.attrs["constant_friction"]
     echo(*(f"note: {finding}" for finding in table.attrs["findings"].splitlines() if finding != constant))
 
 

@@ -4,9 +4,8 @@ import tomllib
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from slipsweep.cli.common import Overwrite, command, echo
+from slipsweep.cli.common import echo
+from slipsweep.cli.options import Overwrite, Text, command, read
 from slipsweep.errors import InputError, did_you_mean
 
 _PACKAGE = Path(__file__).parents[1]
@@ -14,9 +13,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 @command("Start", "slipsweep example", "slipsweep example paper")
 def example(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Sweep file to write (default: list their names).")
-    ] = None,
+    name: Annotated[Text, read("NAME", "Sweep file to write (default: list their names).")] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """List the sweep files that come with slipsweep, or write one with its data."""

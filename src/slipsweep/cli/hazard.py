@@ -4,15 +4,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from slipsweep.cli import common
-from slipsweep.cli.common import FIGURES, At, Overwrite, Panel, Quiet, command, echo, written
+from slipsweep.cli import common, options
+from slipsweep.cli.common import FIGURES, echo
+from slipsweep.cli.options import command, written
 from slipsweep.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
 #: The part of a rate that is worth a sentence.
 _MUCH = 0.05
@@ -20,25 +18,23 @@ _MUCH = 0.05
 #: A row of the table of rates.
 _ROW = "  {:<10}{:>12}{:>16}{:>14}{:>14}{:>16}"
 
-HAZARD = Panel("Hazard")
+HAZARD = options.Panel("Hazard")
 
 
 @command("Compute", "slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml")
 def hazard(
-    file: Annotated[
-        Path, typer.Argument(metavar="OUT.nc", help="A result under a suite or [uncertainty], with an axis amplitude.")
-    ],
+    file: Annotated[Path, options.read("OUT.nc", "A result under a suite or [uncertainty], with an axis amplitude.")],
     curve: Annotated[
-        Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high; or OpenQuake\'s.', metavar="HAZARD.csv")
+        Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high; or OpenQuake\'s.', "HAZARD.csv")
     ],
-    displacement: common.Displacements,
-    site: Annotated[int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", metavar="N")] = None,
-    at: At = None,
+    displacement: Annotated[list[str], options.LENGTH],
+    site: Annotated[int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", "N")] = None,
+    at: options.At = None,
     output: Annotated[
-        list[Path] | None, written("Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated.")
+        options.Paths, written("Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated.")
     ] = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
+    overwrite: options.Overwrite = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Compute the mean annual rate of exceeding a displacement.
 
@@ -49,18 +45,18 @@ def hazard(
     paths = common.check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
     result = _read(file, at)
     g = float(result.attrs["g"])
-    lengths = common.displacements(displacement, g)
+    lengths = options.displacements(displacement, g)
     given = read_hazard_curve(curve, g, site)
     rates = displacement_hazard(result, given, lengths)
-
-    def figure() -> "Figure":
+    drawn = rates
+    if any(path.suffix in FIGURES for path in paths):
         from slipsweep.charts.limits import drawn_thresholds
 
         marked = rates["threshold"].values
-        drawn = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
-        return common.figure_of(displacement_hazard(result, given, drawn).assign_attrs(marked=marked))
-
-    common.write_outputs(paths, overwrite, figure, {".xml": lambda path: common.write_fragility(result, path, lengths)})
+        more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
+        drawn = displacement_hazard(result, given, more).assign_attrs(marked=marked)
+    writers = {".xml": lambda path: common.write_fragility(result, path, lengths)}
+    common.write_outputs(paths, overwrite, drawn, writers)
     if not quiet:
         _summarize(rates, g)
         echo(*paths)
@@ -76,7 +72,7 @@ def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
     table = result[[name for name in names if name in result]].load()
     if "g" not in table.attrs:
         raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
-    typed = own_names(result, common.cuts(at))
+    typed = own_names(result, options.cuts(at))
     chosen = selected(table, file, typed, ("amplitude", "motion", "threshold"))
     for name in typed:
         if chosen.sizes.get(name, 1) > 1:

@@ -1,48 +1,94 @@
-"""`slipsweep info`: what a result holds."""
+"""`slipsweep info` and `slipsweep export`: what a result holds, in words and as a table."""
 
+import functools
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from slipsweep.cli.common import LENGTH, At, command, cuts, echo, echo_suite, echo_tally
+from slipsweep.cli import common, options
+from slipsweep.cli.common import echo
+from slipsweep.cli.options import Text, Texts, command
 from slipsweep.errors import InputError
+
+TABLE = options.Panel("Table")
 
 
 @command("Read results", "slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
-def info(
-    file: Annotated[str, typer.Argument(metavar="OUT.nc|OUT.zarr", help="A file that slipsweep wrote.")],
-    displacement: Annotated[list[str] | None, LENGTH] = None,
-    at: At = None,
-) -> None:
+def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = None, at: options.At = None) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
-    from slipsweep.files import contents
-    from slipsweep.files.jobs import RUN
-    from slipsweep.files.motions import read_embedded
-    from slipsweep.files.opening import place_of, read_result
-    from slipsweep.files.selection import selected
-    from slipsweep.files.storing import nbytes_of
+    from slipsweep.files import contents, jobs, motions, opening, selection, storing
     from slipsweep.grid.resources import size_text
     from slipsweep.motion.records import Record
 
-    table = read_result(file)
-    echo(f"{Path(file)}  {size_text(nbytes_of(place_of(file)))}")
+    table = opening.read_result(file)
+    echo(f"{Path(file)}  {size_text(storing.nbytes_of(opening.place_of(file)))}")
     echo("coordinates:", *(f"  {name:<23} {text}" for name, text in contents.coordinate_texts(table).items()))
     echo("variables:", *(f"  {name:<23} {text}" for name, text in contents.variable_texts(table).items()))
-    recorded = read_embedded(table, Path(file))
+    recorded = motions.read_embedded(table, Path(file))
     if isinstance(recorded, Record):
         echo(f"record: {recorded.summary()}")
-    if motions := contents.motions_text(table):
-        echo("motions, as recorded:", *(f"  {line}" for line in motions))
+    if rows := contents.motions_text(table):
+        echo("motions, as recorded:", *(f"  {row}" for row in rows))
     try:
-        echo_tally(contents.tally_in(table))
+        common.echo_tally(contents.tally_in(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
         raise InputError(f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs")
-    echo_suite(selected(table, file, cuts(at), ("motion", "quantile", "threshold")), most=100, typed=displacement)
+    chosen = selection.selected(table, file, options.cuts(at), ("motion", "quantile", "threshold"))
+    common.echo_suite(chosen, most=100, typed=displacement)
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
-        if name != RUN:
+        if name != jobs.RUN:
             one = len(lines) == 1
             echo(f"{name}: {lines[0]}".rstrip() if one else f"{name}:", *(f"  {line}" for line in lines if not one))
+
+
+@command(
+    "Read results",
+    "slipsweep export paper.nc -o paper.csv --words",
+    "slipsweep export design_chart.nc -o t.parquet --at theta=5 --at amplitude=0.1g,0.2g,0.3g",
+    "slipsweep export design_chart.nc -o t.xlsx --at theta=5 --at mu_s=0.4 --columns frequency",
+)
+def export(
+    file: options.Result,
+    output: Annotated[Path, options.written("Write .csv, .parquet, .xlsx or .xml.")],
+    variables: Annotated[
+        Texts, TABLE("Result to export (default: all); may be repeated.", "NAME", "--variable")
+    ] = None,
+    words: Annotated[bool, TABLE.flag("Sliding modes and flags as words, not codes.", "--words")] = False,
+    in_g: Annotated[bool, TABLE.flag("Accelerations in g, not in m/s².", "--in-g")] = False,
+    at: options.At = None,
+    rows: Annotated[Text, TABLE("With --columns: axes of the rows (default: all others).", "NAME[,NAME]")] = None,
+    columns: Annotated[Text, TABLE("Axis whose values become columns; one table per result.", "NAME")] = None,
+    overwrite: options.Overwrite = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Write a result as a table: CSV, Parquet or .xlsx; or the fragility of a suite or of samples for OpenQuake (.xml).
+
+    One row per case, coordinates as columns, units in the header; with --columns a table of one result over two axes.
+    """
+    from slipsweep.files import export as tables
+    from slipsweep.files import opening, selection
+    from slipsweep.grid.resources import size_text
+
+    if output.suffix == ".xml":
+        paths = common.check_outputs([output], (".xml",), overwrite, [Path(file)])
+        # P(u > d) along the axis amplitude, of the values that --at takes of others
+        chosen = selection.selected(opening.read_result(file), file, options.cuts(at), ("motion", "quantile"))
+        common.write_outputs(paths, overwrite, chosen, {".xml": lambda path: common.write_fragility(chosen, path)})
+        echo(*([] if quiet else paths))
+        return
+    count = tables.export(
+        file,
+        output,
+        variables=variables or None,
+        words=words,
+        in_g=in_g,
+        at=options.cuts(at),
+        rows=rows.split(",") if rows else (),
+        columns=columns,
+        overwrite=overwrite,
+        progress=functools.partial(common.progress_bar, quiet=quiet, unit="rows"),
+    )
+    if not quiet:
+        echo(f"{output}  {count} rows, {size_text(output.stat().st_size)}")

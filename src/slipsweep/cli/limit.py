@@ -4,12 +4,11 @@ from collections.abc import Hashable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from slipsweep.cli import common
-from slipsweep.cli.common import FIGURES, Large, Overwrite, Panel, Quiet, command, echo, written
-from slipsweep.cli.options import chooses
+from slipsweep.cli import common, options
+from slipsweep.cli.common import FIGURES, echo
+from slipsweep.cli.options import Large, Text, Texts
 from slipsweep.errors import InputError
+from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus
 
 if TYPE_CHECKING:
@@ -19,33 +18,28 @@ if TYPE_CHECKING:
 _MOST_POINTS, _MOST_MOTIONS = 12, 60
 
 
-@command("Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png")
-@chooses(large=Large)
+@options.command("Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png", large=Large)
 def limit(
     *,
     sweep: Annotated[
-        Path,
-        typer.Argument(metavar="OUT.nc|SWEEP.toml", help="A result or sweep file: its model and axes but amplitude."),
+        Path, options.read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")
     ],
-    displacement: common.Displacements,
+    displacement: Annotated[list[str], options.LENGTH],
     output: Annotated[
-        list[str] | None, written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")
+        Texts, options.written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")
     ] = None,
     maximum_amplitude: Annotated[
-        str | None, Panel("Limit")("End of the search: 2g, 15 (m/s²).  [default: 5g]", metavar="ACCELERATION")
+        Text, options.Panel("Limit")("End of the search: 2g, 15 (m/s²).  [default: 5g]", "ACCELERATION")
     ] = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
+    overwrite: options.Overwrite = False,
+    quiet: options.Quiet = False,
     large: Large,
 ) -> None:
     """Find the limiting PGA for a tolerable displacement.
 
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
-    from slipsweep.files import spec
-    from slipsweep.files.jobs import limit_job
-    from slipsweep.files.opening import place_of, read_result
-    from slipsweep.model.units import quantity
+    from slipsweep.files import jobs, opening, spec
 
     results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
@@ -56,17 +50,18 @@ def limit(
     named = [Path(one) for one in output or () if one not in results]
     figures = common.check_outputs(named, (*FIGURES, ".nc", ".zarr"), overwrite, checked.files)
     g = checked.model.g
-    lengths = common.displacements(displacement, g)
+    lengths = options.displacements(displacement, g)
     highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
     # one is one number; several are a dimension, in order and without repetition
-    job = limit_job(checked, lengths if len(displacement) > 1 else lengths[0], highest)
+    job = jobs.limit_job(checked, lengths if len(displacement) > 1 else lengths[0], highest)
     if results:
-        table = read_result(common.run_job(job, place_of(results[0]), large, overwrite=overwrite, quiet=quiet).path)
+        place = opening.place_of(results[0])
+        table = opening.read_result(common.run_job(job, place, large, overwrite=overwrite, quiet=quiet).path)
     else:
         with checked.named(), common.progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)
     labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
-    common.write_outputs(figures, overwrite, lambda: common.figure_of(labelled))
+    common.write_outputs(figures, overwrite, labelled)
     if not quiet:
         _summarize(table)
         echo(*(output or ()))

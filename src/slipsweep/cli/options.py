@@ -1,18 +1,118 @@
-"""Options of commands made from what is declared once: choices (`slipsweep.model.choices`) and dataclasses."""
+"""The program, and the options of its commands: those that several take, and those that a choice declares."""
 
 import functools
 import inspect
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from slipsweep.cli.common import BLOCK, RARE, SHAKING, Panel
+import typer
+
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, Option, declared
+from slipsweep.model.parameters import check_values
+from slipsweep.model.units import quantity
+from slipsweep.model.variables import PARAMETERS
 
-#: The group of the options of a choice, by what names it on the command line.
-_PANELS = {"waveform": SHAKING, "model": BLOCK}
+#: The largest displacement that a number without a unit is taken for, m: more is likely to be meant in millimetres.
+_MOST_WITHOUT_UNIT = 2.0
+
+#: The program, to which each command adds itself.
+app = typer.Typer(context_settings={"help_option_names": ["-h", "--help"]}, pretty_exceptions_enable=False)
+
+
+class Panel(str):
+    """The name of a group of options in a command's help; called, it declares one of them."""
+
+    def __call__(self, about: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
+        """An option of the group; names where its parameter does not give it, and what else typer takes."""
+        return typer.Option(*names, help=about.replace("[", r"\["), metavar=metavar, rich_help_panel=self, **more)
+
+    def flag(self, about: str, *names: str) -> Any:
+        """An option of the group that takes no value."""
+        return self(about, None, *names)
+
+
+SHAKING, BLOCK, OUTPUT, LARGE = Panel("Shaking"), Panel("Block"), Panel("Output"), Panel("Large runs")
+
+#: The group of options that few cases need.
+RARE = Panel("Rare options")
+
+
+def read(metavar: str, about: str) -> Any:
+    """The argument that names what a command reads."""
+    return typer.Argument(metavar=metavar, help=about)
+
+
+def written(about: str, metavar: str = "FILE") -> Any:
+    """The option that names what a command writes."""
+    return OUTPUT(about, metavar, "--output", "-o")
+
+
+Text = str | None
+Texts = list[str] | None
+Paths = list[Path] | None
+
+THETA = BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", "VALUE")
+MuS = Annotated[float | None, BLOCK("Static friction coefficient.")]
+Phi = Annotated[Text, BLOCK("Friction angle instead of --mu-s: 21 (degrees).", "VALUE")]
+Overwrite = Annotated[bool, OUTPUT.flag("Replace an output that exists.", "--overwrite")]
+Quiet = Annotated[bool, OUTPUT.flag("No progress and no summary.", "--quiet", "-q")]
+Swept = Annotated[Path, read("OUT.nc", 'A result of "slipsweep run".')]
+Result = Annotated[str, read("OUT.nc|OUT.zarr", "A file that slipsweep wrote.")]
+
+#: What ``-d`` declares.
+LENGTH = Panel("Displacement")(
+    "Tolerable, or to be exceeded: 50mm, 0.05 (m); may be repeated.", "LENGTH", "--displacement", "-d"
+)
+_AT = "Values of an axis: theta=12, amplitude=0.1g,0.2g, case=LABEL (default: all); may be repeated."
+At = Annotated[Texts, Panel("Selection")(_AT, "NAME=VALUE")]
+
+
+@dataclass(frozen=True)
+class Large:
+    """Options of commands that may run for hours."""
+
+    resume: Annotated[bool, LARGE.flag("Continue an interrupted run from its finished chunks.", "--resume")] = False
+    memory: Annotated[Text, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", "SIZE")] = None
+    workers: Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", "N")] = None
+    scheduler: Annotated[Text, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", "ADDRESS")] = None
+
+
+def cuts(given: Sequence[str] | None) -> dict[str, str]:
+    """Take apart what was typed with ``--at``: names and values."""
+    found: dict[str, str] = {}
+    for text in given or ():
+        name, _, value = (part.strip() for part in text.partition("="))
+        if not (name and value):
+            raise InputError(f"--at {text}: must be NAME=VALUE, as in --at theta=12")
+        if name in found:
+            raise InputError(f"--at {text}: {name} is given twice")
+        found[name] = value
+    return found
+
+
+def displacements(texts: Sequence[str], g: float) -> list[float]:
+    """Return the displacements given with ``-d``, in m, in order and each once (InputError: its unit is in doubt)."""
+    found = set()
+    for text in map(str.strip, texts):
+        length = quantity("--displacement", text, "m", g)
+        if length > _MOST_WITHOUT_UNIT and not text[-1].isalpha():
+            units = f"give the unit: -d {text}mm or -d {text}m"
+            raise InputError(f"--displacement = {text}: without a unit that is {length:g} m; {units}")
+        found.add(length)
+    return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
+
+
+def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:
+    """Those of the parameters that were typed as text, in their own units."""
+    return {
+        name: quantity(option_name(name), text, about["units"], g)
+        for name, about in PARAMETERS.items()
+        if isinstance(text := typed.get(name), str)
+    }
 
 
 def option_name(text: str) -> str:
@@ -21,39 +121,36 @@ def option_name(text: str) -> str:
     return names.sub(lambda found: "--" + found[0].replace("_", "-").replace("+ ", "+ --"), text, count=1)
 
 
-def as_typed(text: str) -> str:
-    """A message with options as they are typed: ``--gaps linear`` for ``gaps = 'linear'``."""
-    return re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", text)
+def command(
+    task: str, *examples: str, **choices: Family[Any] | type[Any]
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add a command to the program, by what it is for; its examples stand below its help.
 
-
-def chooses(**choices: Family[Any] | type[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Replace parameters of a command by the options that are declared for them.
-
-    The command gets the choice made of a family, or None if its parameter may be and none of the options was typed; of
-    a single choice (`Reading`) the options typed, by name; of another dataclass, whose annotations are options of
-    typer, an object.
+    In place of parameters that are `choices` it has the options that are declared for them.  It gets the choice made
+    of a family, or None if its default is None and none of the options was typed; of a single choice (`Reading`) the
+    options typed, by name; of another dataclass, whose annotations are options of typer, an object.
     """
 
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        kinds: dict[str, tuple[Any, Any]] = {}
-        for name, old in inspect.signature(command).parameters.items():
-            kinds |= _options(choices[name], old.default) if name in choices else {name: (old.annotation, old.default)}
+    def add(function: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(function, assigned=("__module__", "__name__", "__doc__"))
+        def run(**given: Any) -> None:
+            function(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
 
-        @functools.wraps(command)
-        def wrapped(**given: Any) -> None:
-            command(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
-
-        wrapped.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        options: dict[str, tuple[Any, Any]] = {}
+        for name, one in inspect.signature(function).parameters.items():
+            options |= (
+                _options(choices[name], one.default) if name in choices else {name: (one.annotation, one.default)}
+            )
+        run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
             [
                 inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-                for name, (kind, default) in kinds.items()
+                for name, (kind, default) in options.items()
             ]
         )
-        wrapped.__annotations__ = {name: kind for name, (kind, _) in kinds.items()} | {"return": None}
-        del wrapped.__wrapped__
-        return wrapped
+        app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))(run)
+        return function
 
-    return decorate
+    return add
 
 
 def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:
@@ -92,12 +189,14 @@ def _options(choice: Family[Any] | type[Any], default: Any) -> dict[str, tuple[A
         if issubclass(choice, Choice):
             return {one.name: (_annotation(one, RARE), None) for one in declared(choice)}
         return {one.name: (one.type, one.default) for one in fields(choice)}
-    panel, may_be_none = _PANELS[choice.attribute], default is None
+    # the only families that a command takes
+    panel = SHAKING if choice.attribute == "waveform" else BLOCK
+    may_be_none = default is None
     note = f" (default: {choice.default})" if may_be_none else ""
     text = f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}."
     names: Any = Literal[tuple(choice.names)]
     kind: Any = names | None if may_be_none else names
-    which = Annotated[kind, panel(text, f"--{choice.attribute}", metavar="NAME")]
+    which = Annotated[kind, panel(text, "NAME", f"--{choice.attribute}")]
     found: dict[str, tuple[Any, Any]] = {choice.attribute: (which, None if may_be_none else choice.default)}
     for name, one in choice.options.items():
         of = [kind.name for kind in choice.choices if name in {other.name for other in declared(kind)}]
@@ -113,4 +212,4 @@ def _annotation(one: Option, panel: Panel, *notes: str) -> Any:
         notes += (f"default: {one.default}",)
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
-    return Annotated[kind | None, panel(text, option_name(one.name), metavar="A,B,..." if one.is_list else None)]
+    return Annotated[kind | None, panel(text, "A,B,..." if one.is_list else None, option_name(one.name))]

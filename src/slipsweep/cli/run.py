@@ -5,53 +5,45 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-
-from slipsweep.cli import common
-from slipsweep.cli.common import Large, Overwrite, Panel, Quiet, command, echo, written
-from slipsweep.cli.options import chooses
+from slipsweep.cli import common, options
+from slipsweep.cli.common import echo, range_text
+from slipsweep.cli.options import Large
 from slipsweep.errors import InputError
+from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
-from slipsweep.model.variables import PARAMETERS, STRENGTHS, VALUELESS, SlidingMode, Validity
+from slipsweep.model.variables import SlidingMode
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from slipsweep.grid.tally import Tally
 
-
 #: Cells, about, that are looked at for trends that no block has.
 _LOOKED_AT = 5000
 
 
-@command(
+@options.command(
     "Compute",
     "slipsweep run sweeps/design_chart.toml",
     "slipsweep run sweeps/paper.toml -o paper.nc --overwrite",
     "slipsweep run design_chart.nc -o again.nc --quiet",
+    large=Large,
 )
-@chooses(large=Large)
 def run(
     *,
-    sweep: Annotated[
-        Path, typer.Argument(metavar="SWEEP.toml|OUT.nc", help="Sweep file (-: standard input), or a result to repeat.")
-    ],
+    sweep: Annotated[Path, options.read("SWEEP.toml|OUT.nc", "Sweep file (-: standard input), or a result to repeat.")],
     solver: Annotated[
-        Literal["auto", "step", "cycle"] | None, Panel("Solver")("Solver, instead of solver.method.")
+        Literal["auto", "step", "cycle"] | None, options.Panel("Solver")("Solver, instead of solver.method.")
     ] = None,
     output: Annotated[
-        str | None,
-        written("File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr"),
+        str | None, options.written("File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr")
     ] = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
+    overwrite: options.Overwrite = False,
+    quiet: options.Quiet = False,
     large: Large,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
-    from slipsweep.files import spec
-    from slipsweep.files.jobs import sweep_job
-    from slipsweep.files.opening import place_of, read_result
-    from slipsweep.files.storing import nbytes_of
+    from slipsweep.files import jobs, opening, spec, storing
     from slipsweep.grid.resources import grid_text, size_text
 
     checked = spec.load(sweep)
@@ -62,45 +54,47 @@ def run(
     name = output or checked.output.path
     if name is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
-    path = place_of(name or f"{sweep.stem}.nc")
+    path = opening.place_of(name or f"{sweep.stem}.nc")
     common.check_ending(Path(path), (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
-    job = sweep_job(checked)
-    watch, unit = common.Watch(), "cells" if checked.sampling is None else "samples"
+    job, sampling, passed = jobs.sweep_job(checked), checked.sampling, common.stopwatch()
+    unit = "cells" if sampling is None else "samples"
     report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)
     if quiet:
         return
-    grid, template = grid_text(job.plan.sizes) or "no axes", job.plan.template()
+    template = job.plan.template()
     if not report.found:
-        cells, took, sampling = report.tally.cells, watch.text(report.tally.cells, unit), checked.sampling
+        cells, grid, (solving, once) = report.tally.cells, grid_text(job.plan.sizes) or "no axes", passed()
+        compiled = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
+        took = f"in {solving + once:.2f} s{compiled}, {cells / solving:.3g} {unit}/s"
         if sampling is None:
-            echo(f"{cells} cells ({grid}) in {took}")
+            echo(f"{cells} cells ({grid}) {took}")
         else:
-            runs, points = sampling.runs, math.prod(job.plan.sizes.values())
-            more = f", among {runs} runs each for Sobol indices" if sampling.sensitivity else ""
+            points = math.prod(job.plan.sizes.values())
+            more = f", among {sampling.runs} runs each for Sobol indices" if sampling.sensitivity else ""
             pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
             echo(f"{points} grid points ({grid}), {pooled}{sampling.samples} samples each{more}")
-            echo(f"{cells} samples solved in {took}")
+            echo(f"{cells} samples solved {took}")
     echo(f"inputs: {template.attrs['friction_inputs']}")
     for parameter, one in template.coords.items():
-        if parameter in PARAMETERS:
+        if parameter in variables.PARAMETERS:
             ends = [one.min().item(), one.max().item()][: 2 if one.size > 1 else 1]
-            echo(f"  {parameter:<24}{common.range_text(str(parameter), ends, checked.model.g)}")
+            echo(f"  {parameter:<24}{range_text(str(parameter), ends, checked.model.g)}")
     if checked.recorded is not None:
         echo(checked.recorded.summary())
     if "duplicate_motions" in template.attrs:
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
-    result = read_result(report.path)
-    echo(*(text for text in (_why_nothing_slides(template, report.tally), _unsound_text(result)) if text))
+    result = opening.read_result(report.path)
+    echo(*filter(None, (_why_nothing_slides(template, report.tally), _unsound_text(result))))
     common.echo_suite(result, most=20)
-    echo(f"{report.path}  {size_text(nbytes_of(report.path))}")
+    echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
 
 
 def _unsound_text(table: "xr.Dataset") -> str:
     """How many sliding cells have a trend that no block has; of many cells some, evenly spaced, are looked at."""
     from slipsweep.charts import solved
 
-    drive = [name for name in (*STRENGTHS, "displacement_amplitude") if name in table.coords]
+    drive = [name for name in (*variables.STRENGTHS, "displacement_amplitude") if name in table.coords]
     moved = table.get(solved.DISPLACEMENT)
     if moved is None or not drive or solved.is_newmark(table):
         return ""
@@ -108,7 +102,8 @@ def _unsound_text(table: "xr.Dataset") -> str:
     some = table.isel({dim: slice(None, None, each) for dim in moved.dims}).load()
     some = some.sortby([name for name in drive if name in some.dims])
     if "validity" in some:  # as charts leave out
-        some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(some["validity"] & Validity.NOT_RECOUPLED == 0)
+        reliable = some["validity"] & variables.Validity.NOT_RECOUPLED == 0
+        some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(reliable)
     falls, below = solved.unsound(some, solved.newmark(some))
     slides = max(int((some[solved.DISPLACEMENT] > 0).sum()), 1)
     text = solved.trend_text(falls, below, slides)
@@ -123,7 +118,7 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
     if not modes[SlidingMode.STUCK]:
-        flags = {flag: count for flag, count in (tally.flags or {}).items() if flag in VALUELESS}
+        flags = {flag: count for flag, count in (tally.flags or {}).items() if flag in variables.VALUELESS}
         why = max(flags, key=lambda flag: flags[flag]).text if flags else "validity is not among the variables"
         mu_s = float(coords["mu_s"].min()) if "mu_s" in coords else 0.0
         is_angle = mu_s > 3.0 and "phi" not in coords
@@ -133,5 +128,5 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     coulomb = g * np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max()))
     least, largest = float(coords.get("yield_acceleration", coulomb).min()), float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
-    texts = (common.range_text("amplitude", (one,), g) for one in (largest, least))
+    texts = (range_text("amplitude", (one,), g) for one in (largest, least))
     return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint

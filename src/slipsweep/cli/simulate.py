@@ -1,17 +1,17 @@
 """`slipsweep simulate`: one time history."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from slipsweep.cli import common
-from slipsweep.cli.common import BLOCK, RARE, SHAKING, Overwrite, Quiet, command, echo
-from slipsweep.cli.options import as_typed, chooses, option_name
+from slipsweep.cli import common, options
+from slipsweep.cli.common import echo
+from slipsweep.cli.options import BLOCK, RARE, SHAKING, Text
 from slipsweep.errors import InputError, RunError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
-from slipsweep.model.units import quantity
 from slipsweep.motion.formats import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
@@ -25,79 +25,76 @@ if TYPE_CHECKING:
 class Typed:
     """The parameters of a block and its shaking; text may have a unit."""
 
-    theta: Annotated[str | None, BLOCK.value("Inclination of the base: 5 (degrees), 0.1rad.")] = None
-    mu_s: common.MuS = None
-    phi: common.Phi = None
+    theta: Annotated[Text, options.THETA] = None
+    mu_s: options.MuS = None
+    phi: options.Phi = None
     yield_acceleration: Annotated[
-        str | None, BLOCK.value("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).")
+        Text, BLOCK("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", "VALUE")
     ] = None
     yield_coefficient: Annotated[float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")] = None
     decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = None
     delta_mu: Annotated[float | None, BLOCK("Friction above static Δμ (default: Eqs. 10, 11).")] = None
     minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = None
     structure_frequency: Annotated[
-        str | None, RARE.value("Natural frequency of the structure, Hz: flag flexible_block.")
+        Text, RARE("Natural frequency of the structure, Hz: flag flexible_block.", "VALUE")
     ] = None
-    amplitude: Annotated[str | None, SHAKING.value("Peak ground acceleration: 0.36g, 3.5 (m/s²).")] = None
+    amplitude: Annotated[Text, SHAKING("Peak ground acceleration: 0.36g, 3.5 (m/s²).", "VALUE")] = None
     displacement_amplitude: Annotated[
-        str | None, SHAKING.value("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.")
+        Text, SHAKING("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.", "VALUE")
     ] = None
-    frequency: Annotated[str | None, SHAKING.value("Excitation frequency, Hz; not with a record.")] = None
+    frequency: Annotated[Text, SHAKING("Excitation frequency, Hz; not with a record.", "VALUE")] = None
     scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = None
-    pgv: Annotated[str | None, RARE.value("Peak ground velocity to scale a record to: 40cm/s.")] = None
-    arias_intensity: Annotated[str | None, RARE.value("Arias intensity to scale a record to, m/s.")] = None
+    pgv: Annotated[Text, RARE("Peak ground velocity to scale a record to: 40cm/s.", "VALUE")] = None
+    arias_intensity: Annotated[Text, RARE("Arias intensity to scale a record to, m/s.", "VALUE")] = None
     time_scale: Annotated[float | None, RARE("Factor on a record's time (default: 1).")] = None
     polarity: Annotated[
         int | None, SHAKING("Sign of a record, 1 or -1; 1: positive drives downslope (default: 1).")
     ] = None
 
 
-@command(
+@options.command(
     "Compute",
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o a.png -o a.csv",
     "slipsweep simulate --theta 5 --mu-s 0.38 --record motion.AT2 --scale 2 -o history.nc",
+    typed=Typed,
+    excitation=WAVEFORMS,
+    model=MODELS,
+    reading=Reading,
 )
-@chooses(typed=Typed, excitation=WAVEFORMS, model=MODELS, reading=Reading)
 def simulate(
     *,
     typed: Typed,
     model: Model,
     excitation: Waveform | None = None,
     record: Annotated[
-        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", metavar="FILE")
+        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")
     ] = None,
     reading: Mapping[str, Any],
-    output: Annotated[
-        list[Path] | None, common.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")
-    ] = None,
-    overwrite: Overwrite = False,
+    output: Annotated[options.Paths, options.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")] = None,
+    overwrite: options.Overwrite = False,
     points: Annotated[
-        int | None, common.OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)
+        int | None, options.OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)
     ] = None,
-    quiet: Quiet = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
     paths = common.check_outputs(output, (".nc", ".csv", *common.FIGURES), overwrite, [record] if record else [])
-    with_unit: dict[str, Any] = {
-        name: quantity(option_name(name), text, about["units"], model.g)
-        for name, about in variables.PARAMETERS.items()
-        if isinstance(text := getattr(typed, name, None), str)
-    }
-    taken_as, given = common.taken_as(with_unit, model.g), vars(typed) | with_unit
+    with_unit = options.in_own_units(vars(typed), model.g)
+    taken_as = ", ".join(
+        f"{name.replace('_', ' ')} {common.range_text(name, (value,), model.g)}" for name, value in with_unit.items()
+    )
     motion = _motion(record, reading, excitation)
     from slipsweep.studies.history import simulate as simulated
 
+    given: dict[str, Any] = vars(typed) | with_unit
     table = simulated(**given, excitation=motion, model=model, points_per_cycle=points)
     if flags := variables.Validity(table["validity"].item()) & variables.VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags)
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
-    title, recorded = "Time history of a sliding block", None if isinstance(motion, Waveform) else motion
-    writers = {
-        ".nc": lambda path: common.write_netcdf(table, path, title, recorded),
-        ".csv": lambda path: _write_csv(table, path),
-    }
-    common.write_outputs(paths, overwrite, lambda: common.figure_of(table), writers)
+    table.attrs["title"] = "Time history of a sliding block"
+    recorded = None if isinstance(motion, Waveform) else motion
+    common.write_outputs(paths, overwrite, table, {".csv": lambda path: _write_csv(table, path)}, recorded)
     if quiet:
         return
     if recorded is not None:
@@ -123,7 +120,7 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
     """The motion of the base that the options name."""
     if record is None:
         for name in reading:
-            raise InputError(f"{option_name(name)}: only with --record, the file of a recorded motion")
+            raise InputError(f"{options.option_name(name)}: only with --record, the file of a recorded motion")
         return waveform or WAVEFORMS.of(WAVEFORMS.default)
     if waveform is not None:
         raise InputError(f"--waveform {waveform.name}: not allowed with --record, which is the shaking itself")
@@ -131,8 +128,8 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
 
     try:
         return read_record(record, **reading)
-    except InputError as error:
-        raise InputError(as_typed(str(error))) from None
+    except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
+        raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
 
 
 def _write_csv(table: "xr.Dataset", path: Path) -> None:
