@@ -82,22 +82,6 @@ def test_simulate_without_a_value_says_why_and_fails(
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_run_writes_no_file_that_its_name_belies(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    sweep = tmp_path / "a.toml"
-    sweep.write_text(SWEEP)
-    for ending in ("pdf", "CSV"):
-        path = tmp_path / f"a.{ending}"
-        assert f"a.{ending}: the name must end in one of .nc, .zarr" in told(
-            capsys, "run", str(sweep), "-o", str(path), status=2
-        )
-        assert not path.exists()
-    sweep.write_text(f'{SWEEP}[output]\npath = "b.pdf"\n')
-    assert "b.pdf: the name must end in one of .nc, .zarr" in told(capsys, "run", str(sweep), status=2)
-    assert "a.pdf: the name must end in one of .html, .htm" in told(
-        capsys, "explore", str(tmp_path / "a.nc"), "-o", str(tmp_path / "a.pdf"), status=2
-    )
-
-
 def test_reasons_and_remedies(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

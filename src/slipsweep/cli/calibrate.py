@@ -66,15 +66,13 @@ def friction(
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
-    angle, phi_angle = _angles(theta, phi, g)
+    block = options.in_own_units({"theta": theta, "phi": phi}, g) | {"mu_s": mu_s}
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
 
     span, offsets, drifts = None if rest is None else _times(rest), _channels(offset), _channels(drift)
-    table = measured_friction(
-        test, angle, mu_s, phi=phi_angle, g=g, offset=offsets, drift=drifts, rest=span, threshold=least
-    )
+    table = measured_friction(test, **block, g=g, offset=offsets, drift=drifts, rest=span, threshold=least)
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
@@ -110,22 +108,18 @@ def calibrate(
     quiet: options.Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
-    angle, phi_angle = _angles(theta, phi, model.g)
+    block = options.in_own_units({"theta": theta, "phi": phi}, model.g) | {"mu_s": mu_s}
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
     offsets, drifts = _channels(offset), _channels(drift)
-    table = calibrated(tests, angle, mu_s, phi=phi_angle, model=model, offset=offsets, drift=drifts, cycles=cycles)
+    table = calibrated(tests, **block, model=model, offset=offsets, drift=drifts, cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
-    common.write_outputs(paths, overwrite, table, {".toml": lambda path: path.write_text(text, encoding="utf-8")})
+    common.write_outputs(paths, overwrite, table, toml=lambda path: path.write_text(text, encoding="utf-8"))
     if not quiet:
         _summarize(table)
         echo("", text, *paths)
-
-
-def _angles(theta: str, phi: str | None, g: float) -> tuple[float, float | None]:
-    return quantity("--theta", theta, "degree", g), None if phi is None else quantity("--phi", phi, "degree", g)
 
 
 def _channels(given: list[str] | None) -> str | list[str]:

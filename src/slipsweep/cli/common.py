@@ -1,11 +1,10 @@
 """What commands share that write and print: outputs checked before anything is computed, runs, figures, summaries."""
 
-import functools
 import io
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,8 +52,8 @@ def write_outputs(
     paths: Sequence[Path],
     overwrite: bool,
     table: "xr.Dataset",
-    writers: Mapping[str, Callable[[Path], object]] | None = None,
     recorded: "Record | None" = None,
+    **writers: Callable[[Path], object],
 ) -> None:
     """Write each output of a command, complete or not at all.
 
@@ -63,23 +62,20 @@ def write_outputs(
     """
     from slipsweep.files import netcdf, outputs
 
-    def write_netcdf(path: Path) -> None:
-        plain, title = netcdf.without_time_axis(table), table.attrs["title"]
-        netcdf.write_table(netcdf.described(plain, title=title, command=typed_command(), recorded=recorded), path)
-
-    @functools.cache
-    def figure() -> "Figure":
-        from slipsweep.charts import kinds
-
-        return kinds.figure_of(table)
-
-    known = {".nc": write_netcdf, **(writers or {})}
+    figure = None
     for path in paths:
         with outputs.complete_or_absent(path, overwrite) as temporary:
-            if path.suffix in FIGURES:
-                save(figure(), temporary, path.suffix)
+            if path.suffix[1:] in writers:
+                writers[path.suffix[1:]](temporary)
+            elif path.suffix == ".nc":
+                plain, title = netcdf.without_time_axis(table), table.attrs["title"]
+                found = netcdf.described(plain, title=title, command=typed_command(), recorded=recorded)
+                netcdf.write_table(found, temporary)
             else:
-                known[path.suffix](temporary)
+                from slipsweep.charts import kinds
+
+                figure = figure or kinds.figure_of(table)
+                save(figure, temporary, path.suffix)
 
 
 def save(figure: "Figure", path: Path, ending: str) -> None:

@@ -55,8 +55,7 @@ def hazard(
         marked = rates["threshold"].values
         more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
         drawn = displacement_hazard(result, given, more).assign_attrs(marked=marked)
-    writers = {".xml": lambda path: common.write_fragility(result, path, lengths)}
-    common.write_outputs(paths, overwrite, drawn, writers)
+    common.write_outputs(paths, overwrite, drawn, xml=lambda path: common.write_fragility(result, path, lengths))
     if not quiet:
         _summarize(rates, g)
         echo(*paths)

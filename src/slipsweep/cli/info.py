@@ -75,7 +75,7 @@ def export(
         paths = common.check_outputs([output], (".xml",), overwrite, [Path(file)])
         # P(u > d) along the axis amplitude, of the values that --at takes of others
         chosen = selection.selected(opening.read_result(file), file, options.cuts(at), ("motion", "quantile"))
-        common.write_outputs(paths, overwrite, chosen, {".xml": lambda path: common.write_fragility(chosen, path)})
+        common.write_outputs(paths, overwrite, chosen, xml=lambda path: common.write_fragility(chosen, path))
         echo(*([] if quiet else paths))
         return
     count = tables.export(

@@ -103,7 +103,7 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
             units = f"give the unit: -d {text}mm or -d {text}m"
             raise InputError(f"--displacement = {text}: without a unit that is {length:g} m; {units}")
         found.add(length)
-    return [float(one) for one in check_values("displacement", sorted(found), "--displacement")]
+    return check_values("displacement", sorted(found), "--displacement").tolist()
 
 
 def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:
@@ -136,17 +136,10 @@ def command(
         def run(**given: Any) -> None:
             function(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
 
-        options: dict[str, tuple[Any, Any]] = {}
+        parameters: list[inspect.Parameter] = []
         for name, one in inspect.signature(function).parameters.items():
-            options |= (
-                _options(choices[name], one.default) if name in choices else {name: (one.annotation, one.default)}
-            )
-        run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [
-                inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-                for name, (kind, default) in options.items()
-            ]
-        )
+            parameters += _options(choices[name], one.default) if name in choices else [one]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))(run)
         return function
 
@@ -183,33 +176,37 @@ def _typed(given: dict[str, Any], options: Mapping[str, Option]) -> dict[str, An
     return found
 
 
-def _options(choice: Family[Any] | type[Any], default: Any) -> dict[str, tuple[Any, Any]]:
-    """The options of a choice, of a family first which one: annotations and defaults."""
+def _options(choice: Family[Any] | type[Any], default: Any) -> list[inspect.Parameter]:
+    """The options of a choice, of a family first which one."""
     if not isinstance(choice, Family):
         if issubclass(choice, Choice):
-            return {one.name: (_annotation(one, RARE), None) for one in declared(choice)}
-        return {one.name: (one.type, one.default) for one in fields(choice)}
-    # the only families that a command takes
+            return [_declared(one, RARE) for one in declared(choice)]
+        return [_parameter(one.name, one.type, one.default) for one in fields(choice)]
     panel = SHAKING if choice.attribute == "waveform" else BLOCK
-    may_be_none = default is None
-    note = f" (default: {choice.default})" if may_be_none else ""
-    text = f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}."
     names: Any = Literal[tuple(choice.names)]
-    kind: Any = names | None if may_be_none else names
-    which = Annotated[kind, panel(text, "NAME", f"--{choice.attribute}")]
-    found: dict[str, tuple[Any, Any]] = {choice.attribute: (which, None if may_be_none else choice.default)}
+    named, note = choice.default, ""
+    if default is None:
+        names, named, note = names | None, None, f" (default: {choice.default})"
+    text = f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}."
+    which = Annotated[names, panel(text, "NAME", f"--{choice.attribute}")]
+    found = [_parameter(choice.attribute, which, named)]
     for name, one in choice.options.items():
-        of = [kind.name for kind in choice.choices if name in {other.name for other in declared(kind)}]
+        of = choice.having(name)
         every = len(of) == len(choice.choices)
-        found[name] = _annotation(one, *([panel] if every else [RARE, f"with {', '.join(of)}"])), None
+        found.append(_declared(one, panel) if every else _declared(one, RARE, f"with {', '.join(of)}"))
     return found
 
 
-def _annotation(one: Option, panel: Panel, *notes: str) -> Any:
-    """An option of a command in a group; None where it is not typed."""
+def _declared(one: Option, panel: Panel, *notes: str) -> inspect.Parameter:
+    """An option of a choice, in a group; None where it is not typed."""
     kind: Any = Literal[one.words] if one.words else str if one.is_list else one.kind
     if one.default is not None and not one.is_list:
         notes += (f"default: {one.default}",)
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
-    return Annotated[kind | None, panel(text, "A,B,..." if one.is_list else None, option_name(one.name))]
+    typed = panel(text, "A,B,..." if one.is_list else None, option_name(one.name))
+    return _parameter(one.name, Annotated[kind | None, typed], None)
+
+
+def _parameter(name: str, kind: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)

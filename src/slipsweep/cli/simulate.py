@@ -94,7 +94,7 @@ def simulate(
 
     table.attrs["title"] = "Time history of a sliding block"
     recorded = None if isinstance(motion, Waveform) else motion
-    common.write_outputs(paths, overwrite, table, {".csv": lambda path: _write_csv(table, path)}, recorded)
+    common.write_outputs(paths, overwrite, table, recorded, csv=lambda path: _write_csv(table, path))
     if quiet:
         return
     if recorded is not None:

@@ -12,15 +12,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from slipsweep.errors import InputError, did_you_mean
-from slipsweep.model.parameters import (
-    BOUNDS,
-    check_choice,
-    check_finite,
-    check_list,
-    check_single,
-    check_whole,
-    shown,
-)
+from slipsweep.model import parameters
+from slipsweep.model.parameters import check_choice, shown
 
 
 def option(about: str, default: Any = dataclasses.MISSING, *, least: int = 0, most: int | None = None) -> Any:
@@ -50,15 +43,17 @@ class Option:
             return None
         if not self.is_list:
             return self._single(self.name, value)
-        numbers = check_list(self.name, value, "numbers")
+        numbers = parameters.check_list(self.name, value, "numbers")
         return tuple(self._single(f"{self.name}[{at}]", one) for at, one in enumerate(numbers))
 
     def _single(self, name: str, value: Any) -> Any:
         if self.words:
             return check_choice(name, value, self.words)
         if self.kind is int:
-            return check_whole(name, value, self.least, self.most)
-        return check_single(self.name, value, name) if self.name in BOUNDS else check_finite(name, value)
+            return parameters.check_whole(name, value, self.least, self.most)
+        if self.name in parameters.BOUNDS:
+            return parameters.check_single(self.name, value, name)
+        return parameters.check_finite(name, value)
 
 
 @dataclass(frozen=True)
@@ -79,25 +74,19 @@ class Choice:
     @property
     def options(self) -> dict[str, Any]:
         """The options by name, but for those that are None."""
-        values = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name, value in vars(self).items() if value is not None}
 
     def but(self, **options: Any) -> Self:
         """The same choice with other options."""
         return dataclasses.replace(self, **options)
 
 
-def declared(choice: type[Choice]) -> tuple[Option, ...]:
-    """The options of a choice, in the order of its fields."""
-    key: Any = choice  # mypy takes the hash of its objects for that of the class
-    return _declared(key)
-
-
 @functools.cache  # every object made asks for them, and hints take long to look up
-def _declared(choice: Any) -> tuple[Option, ...]:
-    found = []
+def declared(choice: Any) -> tuple[Option, ...]:
+    """The options of a class of choices, in the order of its fields."""
+    found, hints = [], get_type_hints(choice)
     for field in dataclasses.fields(choice):
-        hint = get_type_hints(choice)[field.name]
+        hint = hints[field.name]
         if get_origin(hint) in (Union, types.UnionType):
             hint = next(part for part in get_args(hint) if part is not type(None))
         is_list = get_origin(hint) is Sequence
@@ -112,28 +101,14 @@ Some = TypeVar("Some", bound=Choice)
 
 @dataclass(frozen=True)
 class Family(Generic[Some]):
-    """Choices of which one is taken.
+    """Choices of which one is taken."""
 
-    Attributes
-    ----------
-    keyword : str
-        Python's argument, and the table of a sweep file.
-    key : str
-        What names the choice in that table.
-    choices : tuple of type
-    default : str
-    attribute : str
-        What names the choice in the attributes of a result, and on the command line.
-    aliases : dict of str to str
-        Other names of choices.
-    """
-
-    keyword: str
-    key: str
+    keyword: str  # Python's argument, and the table of a sweep file
+    key: str  # what names the choice in that table
     choices: tuple[type[Some], ...]
     default: str
-    attribute: str
-    aliases: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    attribute: str  # what names the choice in the attributes of a result, and on the command line
+    aliases: Mapping[str, str] = dataclasses.field(default_factory=dict)  # other names of choices
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -149,30 +124,31 @@ class Family(Generic[Some]):
         """The class of a choice, by name."""
         return {choice.name: choice for choice in self.choices}[self.aliases.get(name, name)]
 
+    def having(self, name: str) -> list[str]:
+        """Names of the choices that have an option."""
+        return [choice.name for choice in self.choices if name in {one.name for one in declared(choice)}]
+
     def of(self, given: Any) -> Some:
         """The choice that a caller gives: an object, or the name of one with its defaults."""
         if isinstance(given, self.choices):
             return given
         if isinstance(given, str) and given in self.names:
             return self.made(given, {})
-        objects = ", ".join(f"{choice.__name__}(...)" for choice in self.choices)
-        raise InputError(
-            f"{self.keyword} = {shown(given)}: must be one of {', '.join(map(repr, self.names))}, or {objects}"
-        )
+        names, objects = map(repr, self.names), (f"{choice.__name__}(...)" for choice in self.choices)
+        allowed = f"{', '.join(names)}, or {', '.join(objects)}"
+        raise InputError(f"{self.keyword} = {shown(given)}: must be one of {allowed}")
 
     def made(self, name: Any, options: Mapping[str, Any], key: Callable[[str], str] = str) -> Some:
         """The choice of a name, with options as a table or a command gives them.
 
         `key` is what an option's name is called there, in errors.
         """
-        check_choice(key(self.key), name, self.names)
-        choice = self.called(name)
+        choice = self.called(check_choice(key(self.key), name, self.names))
         known = {one.name: one for one in declared(choice)}
         for unknown in (one for one in options if one not in known):
             if unknown not in self.options:
                 raise InputError(f"{key(unknown)}: unknown; {did_you_mean(unknown, tuple(known))}")
-            having = [one for one in self.choices if unknown in {option.name for option in declared(one)}]
-            allowed = ", ".join(repr(one.name) for one in having)
+            allowed = ", ".join(map(repr, self.having(unknown)))
             raise InputError(f"{key(unknown)}: not allowed with {key(self.key)} = {name!r}, only with {allowed}")
         for one in known.values():
             if one.default is dataclasses.MISSING and one.name not in options:
@@ -191,8 +167,7 @@ class Family(Generic[Some]):
         """The choice that the attributes of a result tell of (InputError: they tell of none)."""
         if self.attribute not in attributes:
             raise InputError(f"attribute {self.attribute!r}: missing")
-        check_choice(f"attribute {self.attribute}", attributes[self.attribute], self.names)
-        choice = self.called(attributes[self.attribute])
+        choice = self.called(check_choice(f"attribute {self.attribute}", attributes[self.attribute], self.names))
         options = {one.name: attributes[one.name] for one in declared(choice) if one.name in attributes}
         for name in options:  # files give a list of one number as a number
             if self.options[name].is_list and not isinstance(options[name], Sequence):

@@ -16,15 +16,10 @@ _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR}){{0,8}}")
 
 
 def conversion(key: str, own: str, units: str | None, g: float) -> float:
-    """Return what to multiply a number in `units` by, to have it in the unit `own`.
+    """What to multiply a number in `units` by, to have it in the unit `own` (InputError: they do not convert).
 
     `key` is what the units are called in errors.  "g" as a unit of acceleration is `g`, the sweep's own gravity: an
     amplitude "in g" is meant against the gravity that the block feels.
-
-    Raises
-    ------
-    InputError
-        They do not convert.
     """
     if units is None or _SPELLINGS.get(units, units) == own:
         return 1.0
@@ -56,14 +51,9 @@ def conversion(key: str, own: str, units: str | None, g: float) -> float:
 
 
 def without_unit(key: str, own: str, values: Any, g: float) -> Any:
-    """Return what brings a unit, a pint Quantity or an array of xarray with the attribute `units`, in the unit `own`.
+    """What brings a unit, a pint Quantity or an array of xarray with the attribute `units`, in the unit `own`.
 
-    Other values are returned as they are; "g" is `g` m/s².
-
-    Raises
-    ------
-    InputError
-        Its unit does not convert.
+    Other values are returned as they are; "g" is `g` m/s².  InputError: its unit does not convert.
 
     Examples
     --------
@@ -84,7 +74,7 @@ def without_unit(key: str, own: str, values: Any, g: float) -> Any:
 
 
 def quantity(key: str, text: str, own: str, g: float) -> float:
-    """Return a number with a unit, such as "50 mm" or "1.5g", in the unit `own` (InputError: it is none).
+    """A number with a unit, such as "50 mm" or "1.5g", in the unit `own` (InputError: it is none).
 
     `key` is what it is called in errors, `g` what "g" as a unit of acceleration stands for, m/s².
     """
