@@ -184,12 +184,11 @@ def _options(choice: Family[Any] | type[Any], default: Any) -> list[inspect.Para
         return [_parameter(one.name, one.type, one.default) for one in fields(choice)]
     panel = SHAKING if choice.attribute == "waveform" else BLOCK
     names: Any = Literal[tuple(choice.names)]
-    named, note = choice.default, ""
-    if default is None:
-        names, named, note = names | None, None, f" (default: {choice.default})"
-    text = f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}."
-    which = Annotated[names, panel(text, "NAME", f"--{choice.attribute}")]
-    found = [_parameter(choice.attribute, which, named)]
+    may_be_none = default is None
+    note = f" (default: {choice.default})" if may_be_none else ""
+    about = panel(f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}.", "NAME", f"--{choice.attribute}")
+    which = Annotated[names | None, about] if may_be_none else Annotated[names, about]
+    found = [_parameter(choice.attribute, which, None if may_be_none else choice.default)]
     for name, one in choice.options.items():
         of = choice.having(name)
         every = len(of) == len(choice.choices)

@@ -81,9 +81,7 @@ class Choice:
         return dataclasses.replace(self, **options)
 
 
-@functools.cache  # every object made asks for them, and hints take long to look up
-def declared(choice: Any) -> tuple[Option, ...]:
-    """The options of a class of choices, in the order of its fields."""
+def _declared(choice: Any) -> tuple[Option, ...]:
     found, hints = [], get_type_hints(choice)
     for field in dataclasses.fields(choice):
         hint = hints[field.name]
@@ -95,6 +93,9 @@ def declared(choice: Any) -> tuple[Option, ...]:
         found.append(Option(field.name, field.default, str if words else kind, words, is_list, **field.metadata))
     return tuple(found)
 
+
+#: The options of a class of choices, in the order of its fields; every object made asks for them, and hints take long.
+declared: Callable[[Any], tuple[Option, ...]] = functools.cache(_declared)
 
 Some = TypeVar("Some", bound=Choice)
 
