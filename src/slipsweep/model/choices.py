@@ -74,7 +74,8 @@ class Choice:
     @property
     def options(self) -> dict[str, Any]:
         """The options by name, but for those that are None."""
-        return {name: value for name, value in vars(self).items() if value is not None}
+        values = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
 
     def but(self, **options: Any) -> Self:
         """The same choice with other options."""
