@@ -101,6 +101,20 @@ def test_reasons_and_remedies(
     assert 'frequncy = 2: no such axis; did you mean "frequency"?' in message
 
 
+def test_hazard_of_samples_has_a_table_for_each_frequency(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "curve.csv").write_text("PGA (g),annual rate\n0.1,0.01\n1,0.0001\n")
+    uncertain = '[uncertainty]\nsamples = 8\nthresholds = ["1cm"]\n'
+    uncertain += '[uncertainty.mu_s]\ndistribution = "lognorm"\ns = 0.1\nscale = 0.4\n'
+    axes = SWEEP.replace("[axes.mu_s]\nvalues = [0.4]\n", "").replace("[4]", "[2, 5, 8]").replace("[2]", "[1, 2]")
+    (tmp_path / "a.toml").write_text(axes + uncertain)
+    result = str(tmp_path / "a.nc")
+    told(capsys, "run", str(tmp_path / "a.toml"), "-o", result)
+    out = told(capsys, "hazard", result, "--curve", str(tmp_path / "curve.csv"), "-d", "1cm")
+    for frequency in (1, 2):
+        assert f"theta = 5, frequency = {frequency}\n" in out
+    assert out.count("annual rate") == 2
+
+
 def test_limit_says_what_it_took(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     sweep = tmp_path / "a.toml"
     sweep.write_text(SWEEP)

@@ -90,7 +90,8 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
     first, last = max(low, start), min(high, end)
     echo(f"P(u > d | PGA): share over {rates.attrs['suite_dimensions'].replace(' ', ' and ')}")
     echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
-    sizes = rates["valueless_share"].sizes
+    # a share without a value may lie along fewer dimensions: it does not depend on the frequency
+    sizes = {dim: size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
     for index, point in zip(np.ndindex(*sizes.values()), point_names(rates, sizes), strict=True):
         echo(*([point] if point else ()))
         _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
