@@ -8,27 +8,21 @@ from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import Text, Texts, command, written
 from slipsweep.errors import InputError
 
-#: Groups of options.
 CHART, AXES, LOOK = options.Panel("Chart"), options.Panel("Axes"), options.Panel("Look")
+
+_KINDS = (
+    "contours, modes, families, curve, dimensionless, newmark or spread; of uncertain inputs fragility, quantiles or "
+    "sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated (default: all that "
+    "fit; with one axis left, its curve)."
+)
 
 
 @command("Draw", "slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf")
 def chart(
     file: options.Swept,
-    kind: Annotated[
-        Texts,
-        CHART(
-            "contours, modes, families, curve, dimensionless, newmark or spread; of uncertain inputs fragility, "
-            "quantiles or sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated "
-            "(default: all that fit; with one axis left, its curve).",
-            "KIND",
-            "--kind",
-            "-k",
-        ),
-    ] = None,
+    kind: Annotated[Texts, CHART(_KINDS, "KIND", "--kind", "-k")] = None,
     at: Annotated[
-        Texts,
-        CHART("Value of another axis, by default the middle; several select curves: theta=8,11.", "NAME=VALUE"),
+        Texts, CHART("Value of another axis, by default the middle; several select curves: theta=8,11.", "NAME=VALUE")
     ] = None,
     x: Annotated[Text, AXES("Axis to draw over; of intensity the measure: pgv, cav.", "NAME")] = None,
     y: Annotated[Text, AXES("Vertical axis of a map, or the curve parameter.", "NAME")] = None,
