@@ -22,7 +22,7 @@ from slipsweep.files import spec
 from slipsweep.model.choices import declared
 from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.model.variables import Validity
-from slipsweep.motion.formats import Reading
+from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
 from tests.support.commands import command, working_folder
 

@@ -12,7 +12,7 @@ from slipsweep.cli.options import BLOCK, RARE, SHAKING, Text
 from slipsweep.errors import InputError, RunError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
-from slipsweep.motion.formats import Reading
+from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:

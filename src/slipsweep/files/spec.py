@@ -19,7 +19,7 @@ from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import motions, opening
 from slipsweep.grid.inputs import Inputs
 from slipsweep.model import choices, options, parameters, units, variables
-from slipsweep.motion import formats, records, suites
+from slipsweep.motion import reading, records, suites
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _MODEL_PARAMETERS = (
 )  # fmt: skip
 
 #: Keys of [excitation] that go with recorded motions.
-_RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in choices.declared(formats.Reading)), "polarity")
+_RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in choices.declared(reading.Reading)), "polarity")
 
 #: The keys of each table, and their defaults where these are not declared elsewhere; None: there is none.
 KEYS: dict[str, dict[str, Any]] = {
@@ -285,7 +285,7 @@ def _recorded_motion(key: str, tables: Mapping[str, _Table], folder: Path, recor
         return recorded
     given = {name: value for name, value in table.items() if name not in ("record", "records", "pairs")}
     try:
-        how = formats.Reading(**given)
+        how = reading.Reading(**given)
         if key == "record":
             return records.read_record(folder / table["record"], **how.options)
         return suites.suite_in(folder, table["records"], table.get("pairs"), how)

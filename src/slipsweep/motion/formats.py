@@ -5,50 +5,20 @@ docs/records.md#files describes the formats.
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.choices import Choice, option
 from slipsweep.model.parameters import LARGEST, shown
+from slipsweep.motion.reading import UNITS, Reading
 
 Floats = NDArray[np.float64]
 
-#: Standard gravity, m/s²: what "g" means in a record, whatever gravity a sweep takes.
-STANDARD_GRAVITY = 9.80665
-
-#: Units of a recorded acceleration, in m/s².
-UNITS: dict[str, float] = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "cm/s2": 0.01, "gal": 0.01}
-
 #: Other spellings of units in headers.
 _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
-
-Unit: TypeAlias = Literal["m/s2", "g", "cm/s2", "gal"]
-Baseline: TypeAlias = Literal["none", "mean", "linear"]
-Gaps: TypeAlias = Literal["refuse", "linear"]
-Implausible: TypeAlias = Literal["refuse", "accept"]
-Format: TypeAlias = Literal["auto", "csv", "values", "at2", "esm", "cosmos", "knet"]
-
-
-@dataclass(frozen=True)
-class Reading(Choice):
-    """How a file of a recorded motion is read."""
-
-    name: ClassVar[str] = "reading"
-    units: Unit | None = option("unit of the file's accelerations, if it does not name it", None)
-    interval: float | None = option("sampling interval of a file without times, s", None)
-    baseline: Baseline = option("what is subtracted from the accelerations", "none")
-    gaps: Gaps = option("missing samples and fill values: refused, or interpolated", "refuse")
-    implausible: Implausible = option(
-        "peak above 3 g or below 0.001 g, ground that drifts by metres: refused, or accepted", "refuse"
-    )
-    format: Format = option("format of the file", "auto")
-    channel: int | None = option("channel of acceleration in a COSMOS file that holds several, from 1", None, least=1)
-
 
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _COUNT = r"(\d{1,9})\b"

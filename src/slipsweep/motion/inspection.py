@@ -6,8 +6,8 @@ Findings are texts, with the time and the value; no text is no finding.
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.formats import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.intensity import Motion, peak_displacement, peak_velocity
+from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 
 Floats = NDArray[np.float64]
 

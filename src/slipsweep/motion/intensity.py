@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.formats import STANDARD_GRAVITY
+from slipsweep.motion.reading import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
-from slipsweep.motion.formats import UNITS, Reading
 from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
 from slipsweep.motion.intensity import peak_velocity
+from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
 Floats = NDArray[np.float64]
 
@@ -92,12 +92,12 @@ class Record:
     def from_obspy(
         cls,
         trace: Any,
-        units: formats.Unit,
+        units: Unit,
         *,
         name: str | None = None,
-        baseline: formats.Baseline = "none",
-        gaps: formats.Gaps = "refuse",
-        implausible: formats.Implausible = "refuse",
+        baseline: Baseline = "none",
+        gaps: Gaps = "refuse",
+        implausible: Implausible = "refuse",
     ) -> "Record":
         """The record in a trace of ObsPy, which reads miniSEED, SAC and some forty other formats.
 
@@ -129,7 +129,7 @@ class Record:
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
         return _inspected(own, times, values, units, reading, {"record_format": "obspy"})
 
-    def corrected(self, baseline: formats.Baseline) -> "Record":
+    def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
         degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
         values = self.acceleration
@@ -150,7 +150,7 @@ class Record:
         read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
         return (
             f"{self.name}: {np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
-            f"{self.peak / formats.STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
+            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
         )
 
 
@@ -171,12 +171,12 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
 def read_record(
     path: str | Path,
     *,
-    units: formats.Unit | None = None,
+    units: Unit | None = None,
     interval: float | None = None,
-    baseline: formats.Baseline = "none",
-    gaps: formats.Gaps = "refuse",
-    implausible: formats.Implausible = "refuse",
-    format: formats.Format = "auto",
+    baseline: Baseline = "none",
+    gaps: Gaps = "refuse",
+    implausible: Implausible = "refuse",
+    format: Format = "auto",
     channel: int | None = None,
 ) -> Record:
     """Read a recorded acceleration from a file.

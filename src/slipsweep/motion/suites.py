@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import check_list, check_single, shown
 from slipsweep.model.variables import INTENSITY_MEASURES
-from slipsweep.motion.formats import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.intensity import intensity_measures
+from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.records import Record, read_record
 
 Floats = NDArray[np.float64]
