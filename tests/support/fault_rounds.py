@@ -49,7 +49,7 @@ OUTPUTS = ("out.nc", "out.zarr")
 
 #: Processes begin as copies of one that has imported what the command needs.
 _PROCESSES = multiprocessing.get_context("forkserver")
-_PROCESSES.set_forkserver_preload(["slipsweep.cli", "slipsweep.files.running", "slipsweep.grid.graph", __name__])
+_PROCESSES.set_forkserver_preload(["slipsweep.cli", "slipsweep.files.running", "dask.array", __name__])
 
 
 @dataclass

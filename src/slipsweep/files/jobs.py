@@ -15,7 +15,7 @@ from slipsweep.errors import InputError
 from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec
-from slipsweep.grid.anyplan import AnyPlan
+from slipsweep.grid.chunks import AnyPlan
 from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
 
 #: Attribute by which a run knows whether a file is its own.

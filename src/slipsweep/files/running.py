@@ -14,8 +14,7 @@ from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.storing import Chunks, NetcdfChunks, Place, ZarrChunks
-from slipsweep.grid.anyplan import AnyPlan
-from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths, grid_chunks
+from slipsweep.grid.chunks import CHUNK_CELLS, AnyPlan, chunk_lengths, grid_chunks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
 

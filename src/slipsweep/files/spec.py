@@ -23,7 +23,7 @@ from slipsweep.motion import reading, records, suites
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.anyplan import AnyPlan
+    from slipsweep.grid.chunks import AnyPlan
     from slipsweep.studies.sampling import Sampling
 
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].

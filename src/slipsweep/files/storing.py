@@ -1,7 +1,7 @@
 """Where a chunk is written, and how a run goes on after an interruption.
 
-The chunks of a run, elements of the dask array that `slipsweep.grid.graph.solved_chunks` makes of its plan, are written
-while others are computed, each once: to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
+The chunks of a run, elements of the dask array that `grid.chunks.solved_chunks` makes of its plan, are written while
+others are computed, each once: to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
 there (in a netCDF file: on the disk itself), an empty file ``000012.chunk`` beside them says so; `identity.json` says
 what they are chunks of.
 
@@ -32,7 +32,7 @@ from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
 from slipsweep.files.outputs import EXISTS, appear, writing
-from slipsweep.grid.chunks import Chunk, places
+from slipsweep.grid.chunks import Chunk, chunk_at, places, solved_chunks
 from slipsweep.grid.resources import size_text
 
 #: A file or folder, or the address of a store.
@@ -80,8 +80,6 @@ class Chunks:
     @property
     def solved(self) -> Any:
         """The dask array of the results of all chunks."""
-        from slipsweep.grid.graph import solved_chunks  # imports dask: only for runs in chunks
-
         return solved_chunks(self.job.plan, self.cut)
 
     def missing(self) -> Iterator[tuple[int, tuple[int, ...]]]:
@@ -90,8 +88,6 @@ class Chunks:
 
     def chunk(self, number: int) -> Chunk:
         """Where a chunk lies in the grid."""
-        from slipsweep.grid.graph import chunk_at
-
         return chunk_at(self.cut, tuple(map(int, np.unravel_index(number, self.shape))))
 
     @contextmanager
@@ -320,8 +316,6 @@ def _write_region(
     block_id: tuple[int, ...],
 ) -> NDArray[np.bool_]:
     """Write a chunk to its region of a Zarr store, then its mark, in this process or a worker."""
-    from slipsweep.grid.graph import chunk_at
-
     arrays, chunk = solved.item() if isinstance(solved, np.ndarray) else solved, chunk_at(cut, block_id)
     for name, (dims, dtype) in results.items():
         one = xr.Dataset({name: (dims, arrays[name].astype(dtype, copy=False))})

@@ -1,6 +1,7 @@
-"""The parameters of a block and its shaking as a caller gives them, checked and laid out."""
+"""What a caller gives, checked and laid out: what all cells share, and the parameters that span the grid."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -9,21 +10,30 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid.problem import Problem
+from slipsweep.model import parameters
 from slipsweep.model import variables as known
-from slipsweep.model.options import Model, Newmark
-from slipsweep.model.parameters import (
-    BOUNDS,
-    check_given,
-    check_numbers,
-    check_values,
-    number_text,
-    shown,
-    with_friction_coefficient,
-)
+from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Solver
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
-from slipsweep.motion.waveforms import Waveform, peak_acceleration
+from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What all cells of a grid share."""
+
+    model: Model
+    excitation: Waveform | Record | Suite
+    solver: Solver
+
+
+def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
+    """What is to be solved, and how; each is an object, or the name of one with its defaults."""
+    motion = excitation if isinstance(excitation, (Record, Suite)) else WAVEFORMS.of(excitation)
+    chosen = SOLVERS.of(solver)
+    if isinstance(motion, (Record, Suite)) and not isinstance(chosen, Cycle):
+        raise InputError(f"solver = {chosen}: not allowed with a {type(motion).__name__}, to which Cycle() is exact")
+    return Problem(MODELS.of(model), motion, chosen)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +72,9 @@ class Inputs:
     def given(self) -> dict[str, Any]:
         """The parameters that are given; of `phi` the friction coefficient, an array that has it as a coordinate."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
-        return with_friction_coefficient({name: value for name, value in values.items() if value is not None})
+        return parameters.with_friction_coefficient(
+            {name: value for name, value in values.items() if value is not None}
+        )
 
     def but(self, others: Mapping[str, Any]) -> "Inputs":
         """The same with other values of some parameters; None leaves one out."""
@@ -71,44 +83,59 @@ class Inputs:
 
 def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]:
     """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
-    motion = problem.excitation
-    parameters = inputs.given
+    motion, given = problem.excitation, inputs.given
     if isinstance(motion, Waveform):
-        check_inputs(parameters, known.WAVEFORM_INPUTS, "a waveform")
-        if ("amplitude" in parameters) == ("displacement_amplitude" in parameters):
+        _refuse_others(given, "a waveform", known.WAVEFORM_INPUTS)
+        if ("amplitude" in given) == ("displacement_amplitude" in given):
             raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
-        _check_interface(problem.model, parameters)
-        check_given(parameters, ("frequency",))
-        return checked(parameters, problem.model.g)
-    check_inputs(parameters, known.RECORD_INPUTS, "a Suite" if isinstance(motion, Suite) else "a Record")
-    _check_interface(problem.model, parameters)
-    strengths = [name for name in known.STRENGTHS if name in parameters]
+        _check_interface(problem.model, given)
+        parameters.check_given(given, ("frequency",))
+        found = checked(given, problem.model.g)
+        if "displacement_amplitude" in found:
+            # A grows with both
+            d, f = (found[name].values.max() for name in ("displacement_amplitude", "frequency"))
+            bound, texts = parameters.BOUNDS["amplitude"], [parameters.number_text(float(one)) for one in (d, f)]
+            if not bound.holds(peak_acceleration(d, f)):
+                raise InputError(
+                    f"displacement_amplitude = {texts[0]}: with frequency = {texts[1]} its amplitude "
+                    f"A = (2 pi f)^2 d must be {bound.text}"
+                )
+        return found
+    _refuse_others(given, f"a {type(motion).__name__}", known.RECORD_INPUTS)
+    _check_interface(problem.model, given)
+    strengths = [name for name in known.STRENGTHS if name in given]
     if len(strengths) > 1:
         raise InputError(f"{', '.join(strengths[:2])}: must not both be given; either is the strength of the motion")
-    if isinstance(motion, Suite) and motion.has_pairs:
-        if "azimuth" not in parameters:
-            raise InputError("azimuth: must be given with pairs of components")
-    elif "azimuth" in parameters:
+    has_pairs = isinstance(motion, Suite) and motion.has_pairs
+    if has_pairs and "azimuth" not in given:
+        raise InputError("azimuth: must be given with pairs of components")
+    if not has_pairs and "azimuth" in given:
         raise InputError("azimuth: only with a Suite of pairs of components (read_suite: pairs)")
-    if isinstance(problem.model, Newmark):
-        for name in ("decay_rate", "delta_mu", "minimum_friction"):
-            if name in parameters:
-                raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
-    polarity = _polarity(parameters.pop("polarity", 1))
-    defaults = {"time_scale": 1.0} if strengths else {"scale": 1.0, "time_scale": 1.0}
-    parameters = defaults | parameters
-    found = checked({name: parameters[name] for name in known.PARAMETERS if name in parameters}, problem.model.g)
+    for name in ("decay_rate", "delta_mu", "minimum_friction"):
+        if name in given and isinstance(problem.model, Newmark):
+            raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
+    polarity = _polarity(given.pop("polarity", 1))
+    given = {"time_scale": 1.0} | ({} if strengths else {"scale": 1.0}) | given
+    found = checked({name: given[name] for name in known.PARAMETERS if name in given}, problem.model.g)
     found["polarity"] = polarity
-    found |= motion_coordinates(motion, found)
+    if isinstance(motion, Suite):
+        found |= _motion_coordinates(motion, found)
     if strengths and strengths != ["scale"]:
         _check_moving(motion, found, strengths[0])
     return found
 
 
-def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
+def _refuse_others(given: Mapping[str, Any], what: str, taken: tuple[str, ...]) -> None:
+    """Refuse inputs of another kind of shaking."""
+    for name in given:
+        if name in {*known.WAVEFORM_INPUTS, *known.RECORD_INPUTS} - {*taken}:
+            raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(taken)}")
+
+
+def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
     """Refuse an interface that is not known, or known twice."""
-    if "yield_coefficient" not in parameters:
-        check_given(parameters, ("theta", "mu_s"))
+    if "yield_coefficient" not in given:
+        parameters.check_given(given, ("theta", "mu_s"))
         return
     if not isinstance(model, Newmark):
         raise InputError(
@@ -116,99 +143,69 @@ def _check_interface(model: Model, parameters: Mapping[str, Any]) -> None:
             "only with model = 'newmark'"
         )
     for name in known.INTERFACE_INPUTS:
-        if name in parameters:
+        if name in given:
             raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
 
 
-def check_inputs(given: Collection[str], shaking: Collection[str], what: str) -> None:
-    """Refuse inputs of another kind of shaking."""
-    others = {*known.WAVEFORM_INPUTS, *known.RECORD_INPUTS} - {*shaking}
-    for name in given:
-        if name in others:
-            raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(shaking)}")
+def _polarity(given: Any) -> xr.Variable:
+    """The signs asked for: 1, -1, both."""
+    values = np.empty(0)
+    with suppress(InputError):
+        values = parameters.check_numbers("polarity", (1, -1) if isinstance(given, str) and given == "both" else given)
+    if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
+        raise InputError(f"polarity = {parameters.shown(given)}: must be 1, -1, a list of these, or 'both'")
+    return xr.Variable(("polarity",) * values.ndim, values.astype(np.int8), known.PARAMETERS["polarity"])
 
 
-def motion_coordinates(motion: Record | Suite, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+def _motion_coordinates(suite: Suite, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
-    if not isinstance(motion, Suite):
-        return {}
-    found = {"motion": xr.Variable(("motion",), np.array(motion.labels), known.MOTION)}
-    found |= {
-        name: xr.Variable(("motion",), one, known.MOTION_COORDINATES[name]) for name, one in motion.measures.items()
-    }
-    if motion.has_pairs:
-        azimuth, places = coords["azimuth"], xr.Variable(("motion",), np.arange(len(motion)))
-        sizes = grid_sizes({"azimuth": azimuth, "motion": places})
-        both = aligned({"motion": places, "azimuth": azimuth}, sizes)
-        at = np.broadcast_arrays(both["motion"], both["azimuth"], np.empty(tuple(sizes.values())))
-        for name, one in motion.intensities(at[0], at[1]).items():
-            found[name] = xr.Variable(tuple(sizes), one, known.MOTION_COORDINATES[name])
+    about = known.MOTION_COORDINATES
+    found = {"motion": xr.Variable("motion", np.array(suite.labels), known.MOTION)}
+    found |= {name: xr.Variable("motion", one, about[name]) for name, one in suite.measures.items()}
+    if suite.has_pairs:
+        both = {"azimuth": coords["azimuth"], "motion": xr.Variable("motion", np.arange(len(suite)))}
+        sizes = grid_sizes(both)
+        azimuths, places = (one.set_dims(sizes).values for one in both.values())
+        measures = suite.intensities(places, azimuths)
+        found |= {name: xr.Variable(tuple(sizes), one, about[name]) for name, one in measures.items()}
     return found
 
 
 def _check_moving(motion: Record | Suite, coords: Mapping[str, xr.Variable], strength: str) -> None:
     """Refuse to scale a motion that has no acceleration."""
-    if isinstance(motion, Record):
-        if not motion.peak > 0.0:
-            raise InputError(f"{strength}: {motion.name} has no acceleration to scale; give scale")
-        return
-    peaks = coords["motion_pga"]
-    still = np.argwhere(~(peaks.values > 0.0))
-    if still.size:
-        at = dict(zip(peaks.dims, still[0], strict=True))
-        where = f" at azimuth {float(coords['azimuth'].isel(at, missing_dims='ignore')):g}" if motion.has_pairs else ""
-        raise InputError(f"{strength}: {motion.labels[at['motion']]}{where} has no acceleration to scale; give scale")
+    peaks = xr.Variable((), motion.peak) if isinstance(motion, Record) else coords["motion_pga"]
+    for place in np.argwhere(~(peaks.values > 0.0))[:1]:
+        at = dict(zip(peaks.dims, place, strict=True))
+        name = motion.name if isinstance(motion, Record) else motion.labels[at["motion"]]
+        if "azimuth" in coords:
+            name += f" at azimuth {float(coords['azimuth'].isel(at, missing_dims='ignore')):g}"
+        raise InputError(f"{strength}: {name} has no acceleration to scale; give scale")
 
 
-def _polarity(given: Any) -> xr.Variable:
-    """The signs asked for: 1, -1, both."""
-    both = isinstance(given, str) and given == "both"
-    try:
-        values = check_numbers("polarity", (1, -1) if both else given)
-    except InputError:
-        values = np.empty(0)
-    if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
-        raise InputError(f"polarity = {shown(given)}: must be 1, -1, a list of these, or 'both'")
-    dims = ("polarity",) if values.ndim else ()
-    return xr.Variable(dims, values.astype(np.int8), known.PARAMETERS["polarity"])
-
-
-def checked(parameters: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
+def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
     """Every parameter as a float64 array with named dimensions, within its bounds, described.
 
     `g` is what "g" as the unit of an array stands for.
     """
     checked = {}
-    for name, given in parameters.items():
-        if isinstance(given, (xr.Variable, xr.DataArray)):
-            dims = tuple(map(str, given.dims))
-            if len(set(dims)) < len(dims):
+    for name, one in given.items():
+        values, attrs = parameters.check_values(name, one, g=g), known.PARAMETERS[name]
+        dims = (name,) * values.ndim
+        if isinstance(one, (xr.Variable, xr.DataArray)):
+            dims, attrs = tuple(map(str, one.dims)), {**one.attrs, **attrs}
+            if len({*dims}) < len(dims):
                 raise InputError(f"{name}: dimensions {', '.join(dims)}: must be named each once")
-            variable = xr.Variable(dims, check_values(name, given, g=g), {**given.attrs, **known.PARAMETERS[name]})
-        else:
-            values = check_values(name, given, g=g)
-            if values.ndim > 1:
-                raise InputError(
-                    f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
-                    "that names its dimensions"
-                )
-            variable = xr.Variable((name,) if values.ndim else (), values, known.PARAMETERS[name])
-        if variable.values.size == 0:
+        elif values.ndim > 1:
+            raise InputError(
+                f"{name}: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray "
+                "that names its dimensions"
+            )
+        if values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
-        checked[name] = variable
-        if name == "mu_s" and isinstance(given, xr.DataArray) and "phi" in given.coords:
-            checked["phi"] = given["phi"].variable.to_base_variable()
+        checked[name] = xr.Variable(dims, values, attrs)
+        if name == "mu_s" and isinstance(one, xr.DataArray) and "phi" in one.coords:
+            checked["phi"] = one["phi"].variable.to_base_variable()
     return checked
-
-
-def check_amplitudes(displacement_amplitude: xr.Variable, frequency: xr.Variable) -> None:
-    """Refuse peak displacements that make an amplitude out of its bounds: A grows with both."""
-    d, f = displacement_amplitude.values.max(), frequency.values.max()
-    if not BOUNDS["amplitude"].holds(peak_acceleration(d, f)):
-        raise InputError(
-            f"displacement_amplitude = {number_text(float(d))}: with frequency = {number_text(float(f))} its amplitude "
-            f"A = (2 pi f)^2 d must be {BOUNDS['amplitude'].text}"
-        )
 
 
 def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
@@ -218,19 +215,13 @@ def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
         for dim, size in zip(map(str, variable.dims), variable.shape, strict=True):
             if sizes.setdefault(dim, size) != size:
                 raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
-    ordered = [dim for dim in known.DIMENSION_ORDER if dim in sizes] + [
-        dim for dim in sizes if dim not in known.DIMENSION_ORDER
-    ]
-    return {dim: sizes[dim] for dim in ordered}
+    order = [*dict.fromkeys((*known.DIMENSION_ORDER, *sizes))]
+    return {dim: sizes[dim] for dim in order if dim in sizes}
 
 
 def aligned(variables: Mapping[str, xr.Variable], sizes: Mapping[str, int]) -> dict[str, NDArray[Any]]:
     """Plain arrays with all dimensions, of length 1 where they do not vary."""
-    aligned = {}
-    for name, variable in variables.items():
-        own = variable.values.transpose([variable.dims.index(dim) for dim in sizes if dim in variable.dims])
-        aligned[name] = own.reshape([variable.sizes.get(dim, 1) for dim in sizes])
-    return aligned
+    return {name: one.set_dims(tuple(sizes)).values for name, one in variables.items()}
 
 
 def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:

@@ -6,9 +6,6 @@ from pathlib import Path
 
 from slipsweep.errors import InputError
 
-#: Bytes that are always there: to ask the system takes longer than to solve a small grid.
-_LITTLE = 1_000_000
-
 
 def available_memory() -> int | None:
     """Bytes of memory that can be had without swapping, or None where the system does not say."""
@@ -21,14 +18,8 @@ def available_memory() -> int | None:
 
 
 def check_memory(what: str, needed: int, advice: str) -> None:
-    """Refuse what memory cannot hold, before any of it is taken.
-
-    Raises
-    ------
-    InputError
-        Naming what takes how much, and what to do about it.
-    """
-    free = available_memory() if needed > _LITTLE else None
+    """Refuse what memory cannot hold, before any of it is taken; InputError: what takes how much, and the advice."""
+    free = available_memory()
     if free is not None and needed > free:
         raise InputError(f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}")
 
@@ -48,13 +39,7 @@ def size_text(size: float) -> str:
 
 
 def parse_size(name: str, text: str) -> int:
-    """Return the bytes that a text like "512MiB" or "1.5 GB" means.
-
-    Raises
-    ------
-    InputError
-        It is none; `name` is what the user knows it by.
-    """
+    """Return the bytes that a text like "512MiB" or "1.5 GB" means (InputError: none); users know it by its `name`."""
     match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kKMGT])(i?)B?\s*", text)
     if match is None:
         raise InputError(f"{name} = {text}: must be a number with a unit, like 512MiB or 2GB")

@@ -1,11 +1,11 @@
 """Which kernel solves a problem: the sine's SIMD batches, the exact walk under a wave or a record, or steps."""
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.grid.problem import Problem
+from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.exact import workspace_of
 from slipsweep.kernels.grid import find_parameters
@@ -15,12 +15,12 @@ from slipsweep.kernels.step import solve_steps
 from slipsweep.kernels.waves import solve_waves
 from slipsweep.model.options import Mendez, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS
-from slipsweep.motion import cutting
-from slipsweep.motion.pieces import RECTANGLE, SIMPSON, TRAPEZOID, own_steps, steps_of
+from slipsweep.motion import cutting, pieces
 from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform
 
-RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
+RULES = {"rectangle": pieces.RECTANGLE, "trapezoid": pieces.TRAPEZOID, "simpson": pieces.SIMPSON}
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
@@ -31,10 +31,18 @@ ROWS = {_NAMES.get(field, field): row for row, field in enumerate(physics.Motion
 ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 
 #: The same of `find_parameters`.
-PARAMETER_ROWS = {name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))}
+_PARAMETER_ROWS = {name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))}
 
-#: Solves cells, of dtype `kernels.grid.CELL`, into rows of results, (rows, cells).
-Solve = Callable[[np.ndarray, np.ndarray], Any]
+#: Cells of the cycle solver that a cell of a record takes, about.
+_RECORD_COST = 200
+
+
+class Solver(NamedTuple):
+    """What solves cells, of dtype `kernels.grid.CELL`, into results, (rows, cells)."""
+
+    solve: Callable[[np.ndarray, np.ndarray], Any]
+    rows: Mapping[str, int]  # of the results
+    cost: int  # the time of a cell in those of the sine's
 
 
 def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
@@ -49,37 +57,19 @@ def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
     )
 
 
-def find_friction_parameters(problem: Problem) -> Solve:
+def parameter_solver(problem: Problem) -> Solver:
     """What finds Eqs. 7-11 and λ of cells."""
     options = options_of(problem, wants_peak=False)
-    return lambda cells, results: find_parameters(cells, options, results)
+    return Solver(lambda cells, results: find_parameters(cells, options, results), _PARAMETER_ROWS, 1)
 
 
-def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solve, int]:
-    """What solves the cells of a problem that one motion shakes, and the time of a cell in those of the sine's."""
+def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
+    """What solves the cells of a problem that one motion shakes."""
     motion, options = problem.excitation, options_of(problem, wants_peak)
-    if isinstance(motion, Record):
-        recorded = cutting.wave_of_record(motion, polarity)
-
-        def under_record(cells: np.ndarray, results: np.ndarray) -> None:
-            solve_record(cells, options, recorded, workspace_of(recorded), results)
-
-        return under_record, max(64, recorded.pieces.shape[0] // 8)
-    assert isinstance(motion, Waveform)
-    if isinstance(problem.solver, Step):
-        steps = steps_of(cutting.wave_of(motion), RULES[problem.solver.rule], problem.solver.steps_per_cycle)
-
-        def by_steps(cells: np.ndarray, results: np.ndarray) -> None:
-            solve_steps(cells, options, cutting.wave_of(motion), own_steps(steps), results)
-
-        return by_steps, 1 + problem.solver.steps_per_cycle // 16
 
     def under_wave(cells: np.ndarray, results: np.ndarray) -> None:
         wave = cutting.wave_of(motion)
         solve_waves(cells, options, wave, workspace_of(wave), results)
-
-    if not isinstance(motion, Sine) or motion.ramp_in or motion.ramp_out:
-        return under_wave, 16
 
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
         if solve_sine(cells, options, results):
@@ -88,4 +78,40 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> tuple[Solv
             under_wave(cells[left], found)
             results[:, left] = found
 
-    return under_sine, 1
+    if isinstance(motion, Record):
+        recorded = cutting.wave_of_record(motion, polarity)
+        return Solver(
+            lambda cells, results: solve_record(cells, options, recorded, workspace_of(recorded), results),
+            ROWS,
+            max(64, recorded.pieces.shape[0] // 8),
+        )
+    assert isinstance(motion, Waveform)
+    if isinstance(problem.solver, Step):
+        wave = cutting.wave_of(motion)
+        steps = pieces.steps_of(wave, RULES[problem.solver.rule], problem.solver.steps_per_cycle)
+        return Solver(
+            lambda cells, results: solve_steps(cells, options, wave, pieces.own_steps(steps), results),
+            ROWS,
+            1 + problem.solver.steps_per_cycle // 16,
+        )
+    if isinstance(motion, Sine) and not motion.ramp_in and not motion.ramp_out:
+        return Solver(under_sine, ROWS, 1)
+    return Solver(under_wave, ROWS, 16)
+
+
+def cost_of(problem: Problem) -> float:
+    """What a cell takes, in cells of the cycle solver."""
+    if isinstance(problem.excitation, (Record, Suite)):
+        return _RECORD_COST
+    return 1.0 + problem.solver.steps_per_cycle / 16 if isinstance(problem.solver, Step) else 1.0
+
+
+def memory_of(problem: Problem) -> int:
+    """Bytes of the tables of pieces of recorded motions, while cells are solved."""
+    if isinstance(problem.excitation, Waveform):
+        return 0
+    suite = problem.excitation
+    lengths = [one.times.size for one in (suite if isinstance(suite, Suite) else (suite,))]
+    # of two polarities; one table is made beside those that are kept
+    kept = sorted(2 * lengths)[-cutting.MOST_TABLES :]
+    return cutting.TABLE_BYTES * (max(lengths) + sum(kept))

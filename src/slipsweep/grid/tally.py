@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,22 +42,12 @@ class Ratios:
 
 @dataclass
 class Indices:
-    """Sobol indices of grid points, counted.
+    """Sobol indices of grid points, counted."""
 
-    Attributes
-    ----------
-    status : dict of SensitivityStatus to int
-        Grid points with indices, and without for each reason.
-    first, total : dict of str to float
-        Sums of the indices of each input.
-    largest : dict of str to int
-        Grid points at which the total index of this input is the largest.
-    """
-
-    status: dict[SensitivityStatus, int]
-    first: dict[str, float]
+    status: dict[SensitivityStatus, int]  # grid points with indices, and without for each reason
+    first: dict[str, float]  # sums of the indices of each input
     total: dict[str, float]
-    largest: dict[str, int]
+    largest: dict[str, int]  # grid points at which the total index of an input is the largest
 
     @classmethod
     def counted(
@@ -98,12 +88,8 @@ class Tally:
         if "sliding_mode" in results:
             tally.modes = {mode: int(np.count_nonzero(results["sliding_mode"] == int(mode))) for mode in SlidingMode}
         if "validity" in results:
-            counts = np.bincount(results["validity"].astype(np.int16, copy=False).ravel().view(np.uint16))
-            validity = dict.fromkeys(Validity, 0)
-            for code in np.flatnonzero(counts).tolist():
-                for flag in Validity(code & sum(Validity)):
-                    validity[flag] += int(counts[code])
-            tally.flags = validity
+            validity = results["validity"].astype(np.int16, copy=False)
+            tally.flags = {flag: int(np.count_nonzero(validity & flag.value)) for flag in Validity}
         if {"permanent_displacement", "newmark_displacement"} <= results.keys():
             tally.ratios = Ratios.of(results["permanent_displacement"], results["newmark_displacement"])
         return tally
@@ -114,21 +100,15 @@ class Tally:
 
     def merge(self, other: "Tally") -> None:
         """Add the counts of other cells."""
-        self.cells += other.cells
-        self.counted += other.counted
-        self.modes = _added(self.modes, other.modes)
-        self.flags = _added(self.flags, other.flags)
-        if other.ratios is not None:
-            self.ratios = Ratios(other.ratios.counts + (self.ratios.counts if self.ratios else 0))
-        if other.indices is not None:
-            own, more = self.indices, other.indices
-            names = ("status", "first", "total", "largest")
-            mine: list[Any] = [own and getattr(own, name) for name in names]
-            self.indices = Indices(*(_added(one, getattr(more, name)) for one, name in zip(mine, names, strict=True)))
+        vars(self).update(vars(_added(self, other)))
 
 
-def _added(one: Mapping[Any, Any] | None, other: Mapping[Any, Any] | None) -> Any:
-    """Counts by name, added."""
+def _added(one: Any, other: Any) -> Any:
+    """Counts, or dictionaries or classes of them, added one by one; None is not stored."""
     if one is None or other is None:
-        return dict(one or other or {}) or None
-    return {name: one[name] + count for name, count in other.items()}
+        return one if other is None else other
+    if isinstance(one, dict):
+        return {name: _added(count, other[name]) for name, count in one.items()}
+    if isinstance(one, (Ratios, Indices, Tally)):
+        return replace(one, **_added(vars(one), vars(other)))
+    return one + other

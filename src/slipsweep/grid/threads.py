@@ -2,15 +2,12 @@
 
 One policy, here and nowhere else:
 
-* Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, so
-  no numba threading layer is ever started and none can abort.
-* A call from the main thread of a process spreads its cells over Python threads.
-* A call from any other thread (dask's threaded scheduler, a dask.distributed worker, a
-  user's own pool) computes on that thread: whoever started it already shares the cores.
-* The number of threads is the least of the processor affinity, `NUMBA_NUM_THREADS` and
-  `OMP_NUM_THREADS`; 1 computes everything on the caller.
-* Threads live as long as the call: none is left to be lost in a fork or to hold up the
-  exit.  Ctrl-C is heard between two calls of a kernel, a fraction of a second apart.
+* Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, whose threading layers can abort.
+* A call from the main thread of a process spreads its cells over Python threads.  A call from any other (dask's
+  scheduler, a worker, a user's own pool) computes on that thread: whoever started it already shares the cores.
+* The number of threads is the least of the processor affinity, `NUMBA_NUM_THREADS` and `OMP_NUM_THREADS`.
+* Threads live as long as the call: none is left to be lost in a fork or to hold up the exit.  Ctrl-C is heard between
+  two calls of a kernel, a fraction of a second apart.
 """
 
 import os
@@ -24,8 +21,10 @@ import numba
 Part = TypeVar("Part")
 
 
-def cores() -> int:
-    """Processors that this process may use: the least of the affinity, `NUMBA_NUM_THREADS` and `OMP_NUM_THREADS`."""
+def thread_count() -> int:
+    """Number of threads a call from here may use."""
+    if threading.current_thread() is not threading.main_thread():
+        return 1
     affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     # the setting, not numba.get_num_threads(): that call starts a threading layer
     limits = [numba.config.NUMBA_NUM_THREADS, affinity]
@@ -34,13 +33,6 @@ def cores() -> int:
     if requested.isdigit() and int(requested) > 0:
         limits.append(int(requested))
     return int(min(limits))
-
-
-def thread_count() -> int:
-    """Number of threads a call from here may use."""
-    if threading.current_thread() is not threading.main_thread():
-        return 1
-    return cores()
 
 
 def spread(parts: Collection[Part], work: Callable[[Part], None]) -> None:

@@ -11,6 +11,7 @@ import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
+from slipsweep.grid.chunks import lazy_dataset
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_friction_parameters, plan_sweep
 from slipsweep.model.choices import declared
@@ -284,8 +285,6 @@ def brought_coordinates(
 def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
     """The results as dask arrays; "auto" leaves frequency, which costs next to nothing, whole."""
     from dask.array.core import normalize_chunks
-
-    from slipsweep.grid.graph import lazy_dataset
 
     dims, wanted = ", ".join(plan.sizes), chunks
     if isinstance(chunks, str) and chunks == "auto":

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
-from slipsweep.grid import problem as problems
-from slipsweep.grid.inputs import Inputs
+from slipsweep.grid import inputs as grid_inputs
 from slipsweep.kernels import exact
 from slipsweep.kernels import history as kernels
 from slipsweep.kernels.block import Cell
@@ -106,14 +105,14 @@ def simulate(
     >>> print(f"{history.permanent_displacement.item() * 1000:.0f} mm after {history.time.values[-1]:.2f} s")
     331 mm after 2.78 s
     """
-    inputs = Inputs(
+    inputs = grid_inputs.Inputs(
         theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, frequency=frequency,
         displacement_amplitude=displacement_amplitude, scale=scale, pgv=pgv, arias_intensity=arias_intensity,
         time_scale=time_scale, polarity=polarity, yield_acceleration=yield_acceleration,
         yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
         minimum_friction=minimum_friction, structure_frequency=structure_frequency,
     )  # fmt: skip
-    problem = problems.check_problem(excitation, model, "cycle")
+    problem = grid_inputs.check_problem(excitation, model, "cycle")
     if isinstance(problem.excitation, Suite):
         label = problem.excitation.labels[0]
         of = ".rotated(azimuth)" if problem.excitation.has_pairs else ""
@@ -149,7 +148,7 @@ class _History:
     Phases are ωt; under a record the times at time scale 1 take their place.
     """
 
-    def __init__(self, problem: problems.Problem, inputs: Mapping[str, Floats], summary: xr.Dataset) -> None:
+    def __init__(self, problem: grid_inputs.Problem, inputs: Mapping[str, Floats], summary: xr.Dataset) -> None:
         self.problem, self.inputs, self.summary = problem, inputs, summary
         given, motion = engine.cell_inputs(problem, inputs), problem.excitation
         self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))

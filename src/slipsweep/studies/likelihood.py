@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.grid.problem import Problem
+from slipsweep.grid.inputs import Problem
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
 from slipsweep.kernels.exact import workspace_of

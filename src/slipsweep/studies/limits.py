@@ -192,19 +192,20 @@ def plan_limits(
     plan = plan_sweep(swapped, excitation=excitation, model=model, variables=["permanent_displacement"])
     task = plan.tasks[0]
     if maximum_amplitude is None:
-        maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * task.problem.model.g
+        maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * task.request.problem.model.g
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
-    arrays = dict(task.inputs)
+    arrays = dict(task.request.arrays)
     arrays["displacement"] = arrays.pop("amplitude")
     blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in _AFTER_SCAN))
     scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
     # in which mode a block slides, or in how many pulses of a record
     codes = variables.RECORD_COUNTS if "time_scale" in arrays else ("sliding_mode",)
     names = (*variables.LIMIT_RESULTS, *codes, "validity")
+    request = replace(task.request, arrays=arrays, wanted=names)
     return Plan(
         plan.sizes,
         {name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
-        (replace(task, solver=partial(_solve, highest, steps), names=names, inputs=arrays),),
+        (replace(task, solver=partial(_solve, highest, steps), request=request),),
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
         # one scan of a block serves all its targets

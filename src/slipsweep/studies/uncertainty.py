@@ -15,9 +15,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid import chunks, engine, plans, resources, tally, threads
+from slipsweep.grid import chunks, engine, plans, resources, solvers, tally, threads
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.grid import problem as problems
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
@@ -211,7 +210,7 @@ def plan_samples(
     """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
     # friction may be given, or drawn about, by its angle
     given = ["phi" if name == "mu_s" and inputs.phi is not None else name for name in inputs.given]
-    problem = problems.check_problem(excitation, model, solver)
+    problem = grid_inputs.check_problem(excitation, model, solver)
     _check_drawn(sampling, given, problem)
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
@@ -229,7 +228,7 @@ def plan_samples(
     return SamplePlan(sampling, problem, coords, attrs)
 
 
-def _check_drawn(sampling: Sampling, given: Sequence[str], problem: problems.Problem) -> None:
+def _check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
     """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
     if "structure_frequency" in given:
         raise InputError(
@@ -261,13 +260,13 @@ class SamplePlan:
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
     Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.  A plan as all
-    others are (`anyplan.AnyPlan`).
+    others are (`chunks.AnyPlan`).
     """
 
     cell_memory = 0
 
     def __init__(
-        self, sampling: Sampling, problem: problems.Problem, coords: dict[str, xr.Variable], attrs: dict[str, Any]
+        self, sampling: Sampling, problem: grid_inputs.Problem, coords: dict[str, xr.Variable], attrs: dict[str, Any]
     ) -> None:
         self.sampling, self.problem, self.coords = sampling, problem, coords
         is_wave, drawn = isinstance(problem.excitation, Waveform), sampling.distributions
@@ -309,12 +308,12 @@ class SamplePlan:
         #: Samples and runs of a grid point, all draws with all that is pooled; how many points are solved together.
         self.samples, self.runs = (n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs))
         self.points = max(_CELLS // self.runs, 1)
-        # as in `anyplan.AnyPlan`
+        # as in `chunks.AnyPlan`
         self.cells = math.prod(self.solved.values()) * self.runs
         self.together = tuple(self.scaled)
-        self.cost = max(1.0, problems.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
+        self.cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
         run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
-        self.memory = self.runs * run + problems.memory_of(problem)
+        self.memory = self.runs * run + solvers.memory_of(problem)
         if sampling.sensitivity:
             self.cost += _SOBOL_COST
             self.memory += SOBOL_MEMORY + 64 * sampling.runs
