@@ -1,6 +1,5 @@
 """The elementary functions of the kernels, in loops, against mpmath; errors in units in the last place."""
 
-import inspect
 import math
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.coefficients import APPROXIMATIONS
 from slipsweep.jit import elementary
-from slipsweep.jit.compiling import Kernel
+from slipsweep.jit.compiling import kernel
 
 HALF_PI = 0.5 * math.pi
 
@@ -27,16 +26,16 @@ def over(function: Callable[..., float], *arguments: Array) -> Array:
             for i in range(x.size):
                 found[i] = function(x[i])
 
-        kernel = Kernel(loop)
+        compiled = kernel(loop)
     else:
 
         def loop_of_two(x: Array, y: Array, found: Array) -> None:
             for i in range(x.size):
                 found[i] = function(x[i], y[i])
 
-        kernel = Kernel(loop_of_two)
+        compiled = kernel(loop_of_two)
     found = np.empty_like(arguments[0])
-    kernel(*arguments, found)
+    compiled(*arguments, found)
     return found
 
 
@@ -97,10 +96,7 @@ def test_beyond_their_ranges() -> None:
 
 @pytest.mark.parametrize("name", APPROXIMATIONS)
 def test_coefficients_are_those_of_the_script(name: str) -> None:
-    approximation = APPROXIMATIONS[name]
-    wanted = approximation.coefficients()
-    after = ""
+    wanted = APPROXIMATIONS[name].coefficients()
     if name == "exp":  # the beginning of the series, exact
-        wanted[-1], after = 0.5, "\n    p = p * r + 1.0\n    p = p * r + 1.0"
-    source = inspect.getsource(elementary)
-    assert approximation.source(wanted) + after in source.partition(f"def {name}(")[2].partition("\n\n\n")[0]
+        wanted[0] = 0.5
+    assert list(vars(elementary)[f"_{name.upper()}"]) == wanted

@@ -26,6 +26,8 @@ import filelock
 import numba
 import platformdirs
 
+from slipsweep.jit.decorators import part
+
 #: Versions of the sources whose kernels are kept.
 _KEPT = 4
 
@@ -35,65 +37,65 @@ _PATIENCE = 300.0
 #: Called when this process begins to compile, with the kernel's name, and with None when it is done.
 Watcher = Callable[[str | None], None]
 
-_first_call = threading.RLock()
+_compiling = threading.Lock()
 _watchers: list[Watcher] = []
 _seconds = 0.0
 
 
-class Kernel:
-    """A function compiled by `numba.njit` when first called, or loaded from disk; it runs without the GIL.
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
 
-    Its arguments have the same types in every call.
+    It is compiled by `numba.njit` when first called, or loaded from disk, and runs without the GIL.  Its arguments have
+    the same types in every call.
     """
+    compiled: Any = function if numba.config.DISABLE_JIT else None
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        functools.update_wrapper(self, function)
-        self._function = function
-        self._compiled: Callable[..., Any] | None = function if numba.config.DISABLE_JIT else None
-
-    def __call__(self, *args: Any) -> Any:
-        """Run on `args`."""
-        if self._compiled is None:
-            with _first_call:
-                if self._compiled is None:
+    @functools.wraps(function)
+    def call(*args: Any) -> Any:
+        nonlocal compiled
+        if compiled is None:
+            with _compiling:
+                if compiled is None:
                     # on a thread, which Ctrl-C does not strike: in a callback of LLVM it would be lost
                     with ThreadPoolExecutor(1) as pool:
-                        return pool.submit(self._call_first, args).result()
-        return self._compiled(*args)
+                        compiled = pool.submit(_compiled, function, tuple(map(numba.typeof, args))).result()
+        return compiled(*args)
 
-    def _call_first(self, args: tuple[Any, ...]) -> Any:
-        with warnings.catch_warnings():
-            # numba's advice is for us, not for those who run a sweep
-            warnings.simplefilter("ignore", numba.NumbaWarning)
-            if (folder := cache_folder()) is not None:
-                # no lock to be had, as on some network folders, or a full disk: each process compiles for itself
-                lock = filelock.FileLock(folder / "compiling.lock", timeout=_PATIENCE)
-                with contextlib.suppress(OSError, NotImplementedError), lock:
-                    return self._compile(args, folder)
-            return self._compile(args, None)
-
-    def _compile(self, args: tuple[Any, ...], folder: Path | None) -> Any:
-        compiled, name = _jitted(self._function, folder), self._function.__name__
-        kept = folder is not None and any(folder.glob(f"**/*.{name}-*.nbi"))
-        with contextlib.nullcontext() if kept else _noted(name):
-            result = compiled(*args)
-        self._compiled = compiled
-        return result
+    return call
 
 
-#: Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
-kernel = Kernel
+def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
+    """The machine code of a kernel for arguments of these types, from disk or kept there for other processes."""
+    folder = cache_folder()
+    with warnings.catch_warnings():
+        # numba's advice is for us, not for those who run a sweep
+        warnings.simplefilter("ignore", numba.NumbaWarning)
+        if folder is not None:
+            # no lock to be had, as on some network folders, or a full disk: each process compiles for itself
+            lock = filelock.FileLock(folder / "compiling.lock", timeout=_PATIENCE)
+            with contextlib.suppress(OSError, NotImplementedError), lock:
+                return _compiled_in(folder, function, types)
+        return _compiled_in(None, function, types)
 
 
-def _jitted(function: Callable[..., Any], folder: Path | None) -> Callable[..., Any]:
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "arcp"}}
-    if folder is None:
-        return numba.njit(**options)(function)
+def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
+    global _seconds
     given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
     try:
-        return numba.njit(cache=True, **options)(function)
+        compiled: Any = part("arcp", cache=folder is not None)(function)
     finally:
         numba.config.CACHE_DIR = given
+    if folder is not None and any(folder.glob(f"**/*.{function.__name__}-*.nbi")):
+        compiled.compile(types)
+        return compiled
+    started, told = time.perf_counter(), [*_watchers]
+    for watcher in told:
+        watcher(function.__name__)
+    compiled.compile(types)
+    _seconds += time.perf_counter() - started
+    for watcher in told:
+        watcher(None)
+    return compiled
 
 
 @functools.cache
@@ -119,30 +121,14 @@ def cache_folder() -> Path | None:
 
 def _digest_of_sources() -> str:
     package = Path(__file__).parents[1]
-    sources = [*(path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py"))]
-    digest = hashlib.sha256()
-    for path in sorted([*sources, package / "motion" / "pieces.py"]):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    sources = [path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")]
+    contents = (path.read_bytes() for path in sorted([*sources, package / "motion" / "pieces.py"]))
+    return hashlib.sha256(b"".join(contents)).hexdigest()[:16]
 
 
 def seconds() -> float:
     """Seconds that this process has spent compiling."""
     return _seconds
-
-
-@contextlib.contextmanager
-def _noted(name: str) -> Iterator[None]:
-    global _seconds
-    started = time.perf_counter()
-    try:
-        for watcher in _watchers:
-            watcher(name)
-        yield
-    finally:
-        _seconds += time.perf_counter() - started
-        for watcher in _watchers:
-            watcher(None)
 
 
 @contextlib.contextmanager

@@ -9,29 +9,28 @@ import numba
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def _part(**options: Any) -> Callable[[_Function], _Function]:
-    """Decorator of functions that kernels are made of, with options of `numba.njit`."""
-    decorate: Callable[[_Function], _Function] = numba.njit(nogil=True, error_model="numpy", **options)
+def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
+    """`numba.njit` with the options that all have: none assumes away NaN and infinity, which are results here."""
+    own: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", *fastmath}}
+    decorate: Callable[[_Function], _Function] = numba.njit(**own, **options)
     return decorate
 
 
-#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once; nothing that assumes
-#: away NaN or infinity, which are results here.
-scalar = _part(fastmath={"contract", "arcp"})
+#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.
+scalar = part("arcp")
 
 #: The same for sums over quadrature nodes, whose order the compiler may then choose (SIMD).
-summed = _part(fastmath={"contract", "arcp", "reassoc", "nsz"})
+summed = part("arcp", "reassoc", "nsz")
 
 #: The same for what stands in loops over cells: LLVM vectorises a loop only if everything
 #: in it is inlined, which it does not do by itself with functions as long as these.
-inlined = _part(fastmath={"contract", "arcp"}, forceinline=True)
+inlined = part("arcp", forceinline=True)
 
 #: The same for a function with one caller and many callees, which numba would otherwise optimise once more.
-single = _part(fastmath={"contract", "arcp"}, inline="always")
+single = part("arcp", inline="always")
 
 #: The same for elementary functions, which have no division to share.
-elementary = _part(fastmath={"contract", "nsz"}, forceinline=True)
-
+elementary = part("nsz", forceinline=True)
 
 #: The same for functions that are passed as values, those of a friction law: numba keeps a kernel on disk only if such
 #: a function is none that was compiled before.

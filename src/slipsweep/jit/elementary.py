@@ -2,13 +2,12 @@
 
 numba as pip installs it has no vector mathematics library (SVML left in 0.62): a `math.exp` in a
 loop is a call of 4.3 ns an element and keeps the whole loop scalar.  `exp` below was seen
-at 0.65 ns an element (AVX-512, in cache), within 1 ulp of the true value.  Polynomials are two sums, four of many
-terms, that do not wait for each other: a cell takes 0.92 to 0.96 of the time of Horner's one.  Ranges, methods,
-errors: docs/numerics.md#elementary-functions.
+at 0.65 ns an element (AVX-512, in cache), within 1 ulp of the true value.  Polynomials, interpolated at Chebyshev
+nodes, are two sums, four of many terms, that do not wait for each other: a cell takes 0.92 to 0.96 of the time of
+Horner's one.  Ranges, methods, errors: docs/numerics.md#elementary-functions.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -27,128 +26,93 @@ _HALF_PI = 0.5 * math.pi
 #: Bit pattern of √½.
 _SQRT_HALF_BITS = 4604544271217802189
 
+# Coefficients, lowest power first (benchmarks.coefficients): of (e^r − 1 − r)/r²; by x² of (1 − cos x)/x²,
+# (x − sin x)/x³ and (x²/2 − 1 + cos x)/x⁴; by x² of arcsin(x)/x; by s² of (2 artanh s − 2s)/s³, a series
+_EXP = (
+    0.5, 0.16666666666666669, 0.04166666666662413, 0.008333333333330062, 0.0013888888917213717,
+    0.00019841269863053618, 2.4801521295954376e-05, 2.7557268459997064e-06, 2.7620088445409746e-07,
+    2.510038549551032e-08,
+)  # fmt: skip
+_VERSINE = (
+    0.5, -0.041666666666666664, 0.0013888888888888816, -2.4801587301556646e-05, 2.7557319217593045e-07,
+    -2.0876756238770223e-09, 1.147069401087498e-11, -4.777404889695354e-14, 1.5169166967261124e-16,
+)  # fmt: skip
+_ANGLE_MINUS_SINE = (
+    0.16666666666666666, -0.008333333333333333, 0.00019841269841269806, -2.7557319223971264e-06,
+    2.5052108382391406e-08, -1.605904347941901e-10, 7.647139121983424e-13, -2.8104687777073216e-15,
+    8.006069886350886e-18,
+)  # fmt: skip
+_HALF_SQUARE_MINUS_VERSINE = (
+    0.041666666666666664, -0.001388888888888889, 2.4801587301587285e-05, -2.755731922397923e-07,
+    2.0876756986479165e-09, -1.1470745434999399e-11, 4.779466128305698e-14, -1.5614707523569033e-16,
+    4.0126841356251555e-19,
+)  # fmt: skip
+_INVERSE_VERSINE = (
+    1.0, 0.16666666666666963, 0.07499999999921603, 0.044642857225197834, 0.030381939881673394,
+    0.022372313172485805, 0.017349310327158196, 0.01401917204006966, 0.01092934906491237, 0.015091795028583365,
+    -0.026316324552338826, 0.1809574620911065, -0.6641236302549411, 2.0016041109291547, -4.535791802822955,
+    7.768165374555008, -9.669659398550623, 8.32498352944691, -4.438816692066939, 1.1264192878807509,
+)  # fmt: skip
+_LOG = tuple(2.0 / power for power in range(3, 23, 2))
+
 
 @elementary
-def _float_of(bits: int) -> float:
-    """The float64 whose bit pattern is an int64."""
-    return np.int64(bits).view(np.float64)
-
-
-@elementary
-def _bits_of(value: float) -> int:
-    """The bit pattern of a float64 as an int64."""
-    bits: Any = np.float64(value).view(np.int64)
-    return bits
+def _polynomial(x: float, c: tuple[float, ...], seventh: float) -> float:
+    """Σ c[k] x^k up to x⁸, with another coefficient of x⁷; the lowest, most of the value, is added last."""
+    x2 = x * x
+    odd = ((seventh * x2 + c[5]) * x2 + c[3]) * x2 + c[1]
+    even = ((c[8] * x2 + c[6]) * x2 + c[4]) * x2 + c[2]
+    return (even * x + odd) * x + c[0]
 
 
 @elementary
 def exp(x: float) -> float:
     """e^x for -708 ≤ x ≤ 709, held at the ends beyond them.
 
-    Range reduction to |r| ≤ ln 2 / 2; (e^r − 1 − r)/r² interpolated at 10 Chebyshev nodes
-    (e^r within 2e-17); exponent by shifting the rounded quotient's low bits into place.
+    Range reduction to |r| ≤ ln 2 / 2 (e^r within 2e-17); exponent by shifting the rounded quotient's low bits to it.
     """
     x = min(max(x, _EXP_MIN), _EXP_MAX)
     rounded = x * _LOG2_E + _ROUND
     k = rounded - _ROUND
     r = x - k * _LN2_HIGH - k * _LN2_LOW
-    r2 = r * r
-    p0 = 2.510038549551032e-08
-    p0 = p0 * r2 + 2.7557268459997064e-06
-    p0 = p0 * r2 + 0.00019841269863053618
-    p0 = p0 * r2 + 0.008333333333330062
-    p0 = p0 * r2 + 0.16666666666666669
-    p1 = 2.7620088445409746e-07
-    p1 = p1 * r2 + 2.4801521295954376e-05
-    p1 = p1 * r2 + 0.0013888888917213717
-    p1 = p1 * r2 + 0.04166666666662413
-    p = (p1 * r + p0) * r + 0.5
+    p = _polynomial(r, _EXP, _EXP[9] * (r * r) + _EXP[7])
     p = p * r + 1.0
     p = p * r + 1.0
-    return p * _float_of((_bits_of(rounded) + 1023) << 52)
+    return p * np.int64((np.float64(rounded).view(np.int64) + 1023) << 52).view(np.float64)
 
 
 @elementary
 def versine(angle: float) -> float:
-    """1 − cos for |angle| ≤ π/2, without cancellation at 0 (over angle² at 9 Chebyshev nodes, 1e-17)."""
+    """1 − cos for |angle| ≤ π/2, without cancellation at 0 (1e-17)."""
     z = angle * angle
-    z2 = z * z
-    p0 = -4.777404889695354e-14
-    p0 = p0 * z2 - 2.0876756238770223e-09
-    p0 = p0 * z2 - 2.4801587301556646e-05
-    p0 = p0 * z2 - 0.041666666666666664
-    p1 = 1.5169166967261124e-16
-    p1 = p1 * z2 + 1.147069401087498e-11
-    p1 = p1 * z2 + 2.7557319217593045e-07
-    p1 = p1 * z2 + 0.0013888888888888816
-    p = (p1 * z + p0) * z + 0.5
-    return p * z
+    return _polynomial(z, _VERSINE, _VERSINE[7]) * z
 
 
 @elementary
 def angle_minus_sine(angle: float) -> float:
-    """angle − sin for |angle| ≤ π/2, without cancellation at 0 (over angle³ at 9 Chebyshev nodes, 6e-17)."""
+    """angle − sin for |angle| ≤ π/2, without cancellation at 0 (6e-17)."""
     z = angle * angle
-    z2 = z * z
-    p0 = -2.8104687777073216e-15
-    p0 = p0 * z2 - 1.605904347941901e-10
-    p0 = p0 * z2 - 2.7557319223971264e-06
-    p0 = p0 * z2 - 0.008333333333333333
-    p1 = 8.006069886350886e-18
-    p1 = p1 * z2 + 7.647139121983424e-13
-    p1 = p1 * z2 + 2.5052108382391406e-08
-    p1 = p1 * z2 + 0.00019841269841269806
-    p = (p1 * z + p0) * z + 0.16666666666666666
-    return p * z * angle
+    return _polynomial(z, _ANGLE_MINUS_SINE, _ANGLE_MINUS_SINE[7]) * z * angle
 
 
 @elementary
 def half_square_minus_versine(angle: float) -> float:
-    """angle²/2 − (1 − cos) for |angle| ≤ π/2, without cancellation at 0 (over angle⁴, 6e-17)."""
+    """angle²/2 − (1 − cos) for |angle| ≤ π/2, without cancellation at 0 (6e-17)."""
     z = angle * angle
-    z2 = z * z
-    p0 = -1.5614707523569033e-16
-    p0 = p0 * z2 - 1.1470745434999399e-11
-    p0 = p0 * z2 - 2.755731922397923e-07
-    p0 = p0 * z2 - 0.001388888888888889
-    p1 = 4.0126841356251555e-19
-    p1 = p1 * z2 + 4.779466128305698e-14
-    p1 = p1 * z2 + 2.0876756986479165e-09
-    p1 = p1 * z2 + 2.4801587301587285e-05
-    p = (p1 * z + p0) * z + 0.041666666666666664
-    return p * z * z
+    return _polynomial(z, _HALF_SQUARE_MINUS_VERSINE, _HALF_SQUARE_MINUS_VERSINE[7]) * z * z
 
 
 @elementary
 def inverse_versine(q: float) -> float:
-    """The angle in [0, π/2] with 1 − cos(angle) = q, without cancellation at 0.
-
-    2 arcsin √z with z = q/2 ≤ 1/2; arcsin √z / √z interpolated at 20 Chebyshev nodes on
-    [0, 1/2] (within 3e-18).
-    """
+    """The angle in [0, π/2] with 1 − cos(angle) = q, 2 arcsin √(q/2), without cancellation at 0 (3e-18)."""
     z = min(max(0.5 * q, 0.0), 0.5)
-    z2 = z * z
+    z2, c = z * z, _INVERSE_VERSINE
     z4 = z2 * z2
-    p0 = 8.32498352944691
-    p0 = p0 * z4 + 2.0016041109291547
-    p0 = p0 * z4 + 0.015091795028583365
-    p0 = p0 * z4 + 0.022372313172485805
-    p0 = p0 * z4 + 0.16666666666666963
-    p1 = -4.438816692066939
-    p1 = p1 * z4 - 4.535791802822955
-    p1 = p1 * z4 - 0.026316324552338826
-    p1 = p1 * z4 + 0.017349310327158196
-    p1 = p1 * z4 + 0.07499999999921603
-    p2 = 1.1264192878807509
-    p2 = p2 * z4 + 7.768165374555008
-    p2 = p2 * z4 + 0.1809574620911065
-    p2 = p2 * z4 + 0.01401917204006966
-    p2 = p2 * z4 + 0.044642857225197834
-    p3 = -9.669659398550623
-    p3 = p3 * z4 - 0.6641236302549411
-    p3 = p3 * z4 + 0.01092934906491237
-    p3 = p3 * z4 + 0.030381939881673394
-    p = ((p3 * z + p2) * z2 + (p1 * z + p0)) * z + 1.0
+    p0 = (((c[17] * z4 + c[13]) * z4 + c[9]) * z4 + c[5]) * z4 + c[1]
+    p1 = (((c[18] * z4 + c[14]) * z4 + c[10]) * z4 + c[6]) * z4 + c[2]
+    p2 = (((c[19] * z4 + c[15]) * z4 + c[11]) * z4 + c[7]) * z4 + c[3]
+    p3 = ((c[16] * z4 + c[12]) * z4 + c[8]) * z4 + c[4]
+    p = ((p3 * z + p2) * z2 + (p1 * z + p0)) * z + c[0]
     return min(2.0 * p * math.sqrt(z), _HALF_PI)
 
 
@@ -167,22 +131,12 @@ def log(x: float) -> float:
 
     x = 2^k m with m in [√½, √2]; ln m = 2 artanh((m - 1) / (m + 1)), series to the 21st power.
     """
-    bits = _bits_of(x)
-    k = ((bits - _SQRT_HALF_BITS) >> 52) * 1.0
-    m = _float_of(bits - (((bits - _SQRT_HALF_BITS) >> 52) << 52))
+    bits = np.float64(x).view(np.int64)
+    exponent = (bits - _SQRT_HALF_BITS) >> 52
+    k, m = exponent * 1.0, np.int64(bits - (exponent << 52)).view(np.float64)
     s = (m - 1.0) / (m + 1.0)
     z = s * s
-    z2 = z * z
-    p0 = 2.0 / 21.0
-    p0 = p0 * z2 + 2.0 / 17.0
-    p0 = p0 * z2 + 2.0 / 13.0
-    p0 = p0 * z2 + 2.0 / 9.0
-    p0 = p0 * z2 + 2.0 / 5.0
-    p1 = 2.0 / 19.0
-    p1 = p1 * z2 + 2.0 / 15.0
-    p1 = p1 * z2 + 2.0 / 11.0
-    p1 = p1 * z2 + 2.0 / 7.0
-    p = (p1 * z + p0) * z + 2.0 / 3.0
-    y = k * _LN2_HIGH + (2.0 * s + (p * z * s + k * _LN2_LOW))
+    p = _polynomial(z, _LOG, _LOG[9] * (z * z) + _LOG[7])
+    y: float = k * _LN2_HIGH + (2.0 * s + (p * z * s + k * _LN2_LOW))
     y = y if x > 0.0 else (-math.inf if x == 0.0 else math.nan)
     return y if x < math.inf else x
