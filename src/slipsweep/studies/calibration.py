@@ -184,10 +184,10 @@ def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
     """Each cycle by itself: estimates, standard errors and Kd."""
     motion, times, continuous = one.motion, one.test.times, "continuous" in found.readings
     least = max(found.parameters[0], _A_CYCLE * one.peak)
-    tops = [(motion.times[part.start], motion.acceleration[part].max()) for part in runs_of(motion.acceleration > 0.0)]
-    pulses = [(begin, top) for begin, top in tops if top > least]
+    pulses = [part for part in runs_of(motion.acceleration > 0.0) if motion.acceleration[part].max() > least]
     data = {name: np.full(len(pulses), np.nan) for name in variables.CALIBRATION if name.startswith("cycle_")}
-    data["cycle_start"], data["cycle_peak_acceleration"] = starts, _ = np.array(pulses).reshape(-1, 2).T
+    data["cycle_start"][:] = starts = [motion.times[part.start] for part in pulses]
+    data["cycle_peak_acceleration"][:] = [motion.acceleration[part].max() for part in pulses]
     speed = max(float(np.abs(one.forward(found.parameters, times)["relative_velocity"]).max()), 1e-6)
     for row, (begin, end) in enumerate(zip(starts, [*starts[1:], motion.times[-1]], strict=True)):
         inside = (times >= begin) & (times < end)

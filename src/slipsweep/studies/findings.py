@@ -42,8 +42,9 @@ def report(
     The tables for a sweep file are commented out where the calibration has failed or determines too little.
     """
     constant = next((one for one in statics if one.attrs["constant_friction"]), None)
+    sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    said = [] if constant is not None else _misfit(found, drifting)
+    said = [] if sentence else _misfit(found, drifting)
     failed = bool(said)
     for one in found.observations:
         first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
@@ -66,9 +67,7 @@ def report(
     said += contradictions
     if (results["validity"] & Validity.NOT_RECOUPLED).any():
         said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
-    sentence = ""
     if constant is not None:
-        sentence = constant.attrs["constant_friction"]
         said.insert(0, sentence)
         tables = _newmark_tables(found.observations[0], constant)
     elif found.determined.all() and slides and not failed and not contradictions:

@@ -30,8 +30,8 @@ from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
+from slipsweep.studies import table_motion
 from slipsweep.studies.friction import check_contact
-from slipsweep.studies.table_motion import converter_noise, noise_of, runs_of, table_motion
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -137,10 +137,10 @@ class Observation:
         self._beside_jumps = np.zeros_like(self._use)
         self._weights = np.array([_weights_of(values) for values in measured])
         self.largest = np.nanmax(np.abs(measured), axis=1)
-        converters = [max(converter_noise(values), 1e-15) for values in measured]
+        converters = [max(table_motion.converter_noise(values), 1e-15) for values in measured]
         self._least_noise = np.maximum(_LEAST_NOISE * self.largest, converters)
         self._given_noise = np.array([noise.get(name, np.nan) for name in self.channels])
-        scatter = np.maximum([noise_of(values) for values in measured], self._least_noise)
+        scatter = np.maximum([table_motion.noise_of(values) for values in measured], self._least_noise)
         self.sensor_noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
         self._noise = self.sensor_noise.copy()
         self.lines: list[Line] = []
@@ -151,7 +151,7 @@ class Observation:
                 self.lines.append(Line("offset", name, size, np.full(since.size, size)))
             if name in drifts:
                 self.lines.append(Line("drift", name, size, size * since))
-        self.motion = table_motion(test.times, test.channels[TABLE])
+        self.motion = table_motion.table_motion(test.times, test.channels[TABLE])
         of_table = [np.interp(self.motion.times, test.times, one.values) for one in self.lines if one.channel == TABLE]
         self._shapes = np.column_stack([self.motion.shapes, *(-line for line in of_table)])
         self.wrong = np.zeros(self._shapes.shape[1])
@@ -271,15 +271,15 @@ class Observation:
             velocity = np.gradient(channels["relative_displacement"], times)
         else:
             return
-        noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+        noise = max(table_motion.noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
         upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
         several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
         slips = ndimage.binary_dilation(several, iterations=3)
         self._use = self._use & ~slips
-        self.upslope = [float(times[slip.start]) for slip in runs_of(slips)]
+        self.upslope = [float(times[slip.start]) for slip in table_motion.runs_of(slips)]
         if "relative_displacement" in channels:
             size = 3.0 * float(np.nanmax(np.abs(channels["relative_displacement"])))
-            for slip in runs_of(slips):
+            for slip in table_motion.runs_of(slips):
                 name, step = f"upslope slip at {times[slip.start]:.4g} s", size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))
 
@@ -289,9 +289,8 @@ def _weights_of(values: Floats) -> Floats:
 
     A converter's error is the same in all of them, also where the block holds one acceleration in each cycle.
     """
-    begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    lengths = np.diff(np.append(begins, values.size))
-    runs = np.repeat(lengths, lengths) > 1
+    repeated = np.diff(values) == 0.0
+    runs = np.append(repeated, False) | np.append(False, repeated)
     weights = np.ones(values.size)
     _, level, counts = np.unique(values[runs], return_inverse=True, return_counts=True)
     weights[runs] = 1.0 / np.sqrt(counts[level])
