@@ -13,16 +13,16 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.optimize import brentq, least_squares
 
 from slipsweep.studies.datasets import sweep
 from slipsweep.studies.likelihood import SOUGHT, Linear, Observation
+from slipsweep.studies.table_motion import runs_of
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ _UNDETERMINED = (0.5, 0.5, 0.3)
 
 
 class Scale:
-    """Scaled parameters of the search, and Üy, λ, Δμ."""
+    """Scaled parameters of the search, a point, and Üy, λ, Δμ."""
 
     def __init__(self, observations: Sequence[Observation]) -> None:
         self.peaks = [one.peak for one in observations]
@@ -101,43 +101,39 @@ class Scale:
         return math.log(max(self.mu_s - self.tan_theta - behind / normal, 1e-3) / self.mu_s) + decay * table
 
 
-class Search:
-    """All points tried, with their sums of squares and readings.
+class Tried(NamedTuple):
+    """A point that was tried, what decides the block's acceleration there, and the sum of squares."""
 
-    Parameters
-    ----------
-    residuals : callable
-        Independent residuals of scaled parameters (`LEAST`, `MOST`).
-    readings : callable
-        The reading of each test for scaled parameters (`Scale.readings`).
-    """
+    point: Floats
+    readings: Readings
+    square: float
+
+    @property
+    def branch(self) -> Readings:
+        """Whether Üy or a crossing decides a constant acceleration, the least is the same."""
+        return tuple("held" if one == "crossed" else one for one in self.readings)
+
+
+class Search:
+    """Independent residuals and readings (`Scale.readings`) of points, and all points that were tried."""
 
     def __init__(self, residuals: Callable[[Floats], Floats], readings: Callable[[Floats], Readings]) -> None:
         self._residuals, self._readings = residuals, readings
-        self.points: list[Floats] = []
-        self.squares: list[float] = []
-        self.readings: list[Readings] = []
+        self.tried: list[Tried] = []
         self._least: dict[Readings, float] = {}
-
-    @staticmethod
-    def _branch(readings: Readings) -> Readings:
-        """Readings of one branch: whether Üy or a crossing decides a constant acceleration, the least is the same."""
-        return tuple("held" if one == "crossed" else one for one in readings)
 
     def residuals(self, point: Floats) -> Floats:
         """Residuals; the point is kept."""
-        rest, readings = self._residuals(point), self._readings(point)
-        self.points.append(np.array(point))
-        self.squares.append(float(rest @ rest))
-        self.readings.append(readings)
-        branch = self._branch(readings)
-        self._least[branch] = min(self.squares[-1], self._least.get(branch, math.inf))
+        rest = self._residuals(point)
+        self.tried.append(Tried(np.array(point), self._readings(point), float(rest @ rest)))
+        branch = self.tried[-1].branch
+        self._least[branch] = min(self.tried[-1].square, self._least.get(branch, math.inf))
         return rest
 
     def square(self, point: Floats) -> float:
         """Sum of squares; the point is kept."""
         self.residuals(point)
-        return self.squares[-1]
+        return self.tried[-1].square
 
     @property
     def least(self) -> float:
@@ -147,23 +143,23 @@ class Search:
     @property
     def best(self) -> Floats:
         """The best of all points."""
-        return self.points[int(np.argmin(self.squares))]
+        return min(self.tried, key=lambda one: one.square).point
 
-    def above(self, number: int) -> float:
+    def above(self, one: Tried) -> float:
         """Sum of squares of a point above the least of its branch; infinite if the branch is refuted."""
-        least = self._least[self._branch(self.readings[number])]
-        return self.squares[number] - least if least - self.least <= REFUTED else math.inf
+        least = self._least[one.branch]
+        return one.square - least if least - self.least <= REFUTED else math.inf
 
-    def allowed(self) -> list[int]:
+    def allowed(self) -> list[Tried]:
         """The points that the data allow."""
-        return [number for number in range(len(self.points)) if self.above(number) <= SQUARE]
+        return [one for one in self.tried if self.above(one) <= SQUARE]
 
     def leaders(self) -> list[Floats]:
         """The best point of each reading, the best of all first."""
-        found: dict[tuple[str, ...], int] = {}
-        for number in np.argsort(self.squares):
-            found.setdefault(self.readings[number], int(number))
-        return [self.points[number] for number in found.values()]
+        found: dict[Readings, Floats] = {}
+        for number in np.argsort([one.square for one in self.tried]):
+            found.setdefault(self.tried[number].readings, self.tried[number].point)
+        return list(found.values())
 
     def polish(self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear") -> Floats:
         """Least squares over some parameters, from a start; the point found."""
@@ -202,7 +198,7 @@ class Search:
                 break
             self.polish(self.best)
         # what the profile of one parameter passed through may lie beyond the end of another's
-        passed = np.array([self.points[number] for number in self.allowed()])
+        passed = np.array([one.point for one in self.allowed()])
         return np.column_stack(
             [np.minimum(found[:, 0], passed.min(axis=0)), np.maximum(found[:, 1], passed.max(axis=0))]
         )
@@ -213,11 +209,10 @@ class Search:
         The profile of each reading is followed from the outermost point known.  `width` is a first guess of the end's
         distance from the best value.
         """
-        outermost: dict[tuple[str, ...], Floats] = {}
-        for number in self.allowed():
-            known = outermost.setdefault(self.readings[number], self.points[number])
-            if side * self.points[number][at] > side * known[at]:
-                outermost[self.readings[number]] = self.points[number]
+        outermost: dict[Readings, Floats] = {}
+        for one in self.allowed():
+            if side * one.point[at] > side * outermost.setdefault(one.readings, one.point)[at]:
+                outermost[one.readings] = one.point
         return max((self._followed(at, side, width, point) for point in outermost.values()), key=lambda end: side * end)
 
     def _followed(self, at: int, side: int, width: float, start: Floats) -> float:
@@ -254,40 +249,27 @@ class Search:
         # and with the same friction at these accelerations of the table
         kept = [[0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0] for table in _KEPT if at > 0]
         starts = [near, near + change * along, *(near + change * np.array(one) for one in kept)]
-        first = len(self.points)
+        first = len(self.tried)
         for start in starts:
             start = np.clip(start, LEAST, MOST)
             start[at] = value
-            self.square(start)
-        tried = sorted(range(first, len(self.points)), key=lambda number: self.squares[number])
-        if min(map(self.above, tried)) > SQUARE:
+            self.residuals(start)
+        held = sorted(self.tried[first:], key=lambda one: one.square)
+        if min(map(self.above, held)) > SQUARE:
             others = [one for one in range(near.size) if one != at]
-            for number in tried[:2]:
-                self.square(self.polish(self.points[number], others, most=6))
-        held = [number for number in range(first, len(self.points)) if self.points[number][at] == value]
-        best = min(held, key=self.above)
-        return self.points[best], self.above(best)
+            for one in held[:2]:
+                self.residuals(self.polish(one.point, others, most=6))
+        best = min(self.tried[first:], key=self.above)
+        return best.point, self.above(best)
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """What one or several tests say of Üy, λ and Δμ.
 
-    Attributes
-    ----------
-    parameters : ndarray
-        The best.
-    covariance : ndarray
-        Of the linear fit; NaN of what no sample depends on.
-    intervals : ndarray
-        95 %, (3, 2); 0 and inf where the data set no bound.
-    allowed : ndarray
-        Parameters tried that the data allow, one set a row.
-    readings : set of str
-        What decides the block's acceleration for parameters that the data allow (`Scale.reading`), in any test.
-    linears : list of Linear
-        The likelihood of each test.
-    observations : sequence of Observation
+    `covariance` is that of the linear fit, NaN of what no sample depends on; `intervals`, (3, 2), are at 95 %, 0 and
+    inf where the data set no bound.  `allowed` are the parameters tried that the data allow, one set a row, and
+    `readings` what decides the block's acceleration for these, in any test (`Scale.readings`).
     """
 
     parameters: Floats
@@ -295,7 +277,6 @@ class Estimate:
     intervals: Floats
     allowed: Floats
     readings: set[str]
-    linears: Sequence[Linear]
     observations: Sequence[Observation]
 
     @property
@@ -320,7 +301,7 @@ class Estimate:
     def summary(self, one: Observation, **more: Any) -> xr.Dataset:
         """The results of a sweep for the parameters found, and the table's motion of a test; `more` replaces them."""
         given = {**dict(zip(SOUGHT, map(float, self.parameters), strict=True)), **more}
-        return sweep(one.theta, one.mu_s, excitation=one.record(one.wrong), model=one.model, **given)
+        return sweep(one.theta, one.mu_s, excitation=one.record(), model=one.model, **given)
 
 
 def estimate(observations: Sequence[Observation]) -> Estimate:
@@ -328,8 +309,7 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     scale = Scale(observations)
     starts = _rough(observations, scale)
     for turn in range(_ROUNDS):
-        linears = [one.linear(scale.parameters(starts[0])) for one in observations]
-        search = _search(scale, linears)
+        search = _search(scale, observations, starts[0])
         for start in starts:
             search.polish(start)
         if turn == 0:
@@ -337,27 +317,30 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
         elif search.square(starts[0]) - search.least < 0.1:
             break
         starts, best = search.leaders(), scale.parameters(search.best)
-        for one, linear in zip(observations, linears, strict=True):
-            one.take_noise(linear, best)
-            one.move(linear, best)
+        for one in observations:
+            one.settle(best)
     width = 1.96 * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
     intervals[0] = _beyond_mode_limit(intervals[0], observations, scale)
     allowed, slopes = search.allowed(), scale.slopes(search.best)
-    low, high = (np.diag([scale.parameters(end * row) for row in np.eye(3)]) for end in intervals.T)
+    low, high = map(scale.parameters, intervals.T)
     return Estimate(
         scale.parameters(search.best),
         _covariance(search.slopes(search.best)) * np.outer(slopes, slopes),
         np.column_stack([np.where(intervals[:, 0] == LEAST, 0, low), np.where(intervals[:, 1] == MOST, np.inf, high)]),
-        np.array([scale.parameters(search.points[number]) for number in allowed]),
-        {name for number in allowed for name in search.readings[number]},
-        linears,
+        np.array([scale.parameters(one.point) for one in allowed]),
+        {reading for one in allowed for reading in one.readings},
         observations,
     )
 
 
-def _search(scale: Scale, linears: Sequence[Linear]) -> Search:
-    return Search(lambda point: np.concatenate([one(scale.parameters(point)) for one in linears]), scale.readings)
+def _search(scale: Scale, observations: Sequence[Observation], near: Floats, rough: bool = False) -> Search:
+    """A search by the likelihoods near a point."""
+    for one in observations:
+        one.linearize(scale.parameters(near), rough)
+    return Search(
+        lambda point: np.concatenate([one.linear(scale.parameters(point)) for one in observations]), scale.readings
+    )
 
 
 def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
@@ -368,7 +351,7 @@ def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
             excess = scale.excess(onset, onset, decay)
             starts += [np.array([part * onset, decay, excess]) for part in (0.1, 0.6)]
         starts.append(np.array([onset, MOST[1], 0.0]))  # the yield value governs
-    search = _search(scale, [one.linear(scale.parameters(starts[0]), rough=True) for one in observations])
+    search = _search(scale, observations, starts[0], rough=True)
 
     def far(point: Floats) -> float:
         return float(np.sum(np.log1p(search.residuals(np.clip(point, LEAST, MOST)) ** 2)))
@@ -393,8 +376,8 @@ def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale:
     """Ends of Üy's interval; where one lies at the mode limit (Eq. 7) of a pulse, the error of its peak moves it."""
     found, slope = ends.copy(), 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
     for one in observations:
-        motion, spread = one.record(one.wrong).acceleration, np.sqrt(np.sum(one.motion.shapes**2, axis=1))
-        for (part,) in ndimage.find_objects(ndimage.label(motion > 0.0)[0]):
+        motion, spread = one.record().acceleration, np.sqrt(np.sum(one.motion.shapes**2, axis=1))
+        for part in runs_of(motion > 0.0):
             top = part.start + int(np.argmax(motion[part]))
             limit = (slope * motion[top] - scale.g * scale.mu_s) / scale.peak
             error = 1.96 * slope * spread[top] / scale.peak

@@ -7,16 +7,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from slipsweep.model.variables import PARAMETERS, Validity
+from slipsweep.model.variables import Validity
 from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies.estimate import Estimate
 from slipsweep.studies.friction import coefficients_of, onset_acceleration, slides_of, threshold_of
 from slipsweep.studies.likelihood import SOUGHT, Observation
-from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
 
-SYMBOL = ("Üy", "λ", "Δμ")
+#: Symbols and units of what is sought.
+_SYMBOL, _UNIT = ("Üy", "λ", "Δμ"), (" m/s2", "", "")
 
 #: Largest correlation that is written.
 _MOST_CORRELATION = 0.9998
@@ -34,62 +34,49 @@ _ANOTHER = "Test at another amplitude and give calibrate all tests together"
 
 
 def report(
-    found: Estimate,
-    slips: Sequence[Sequence[tuple[float, float]]],
-    coefficients: Sequence[xr.Dataset],
-    drifting: Sequence[str],
+    found: Estimate, results: xr.Dataset, statics: Sequence[xr.Dataset], drifting: Sequence[str]
 ) -> dict[str, str]:
-    """All that must be said of a calibration, as attributes of its Dataset.
+    """All that must be said of a calibration, as attributes of its results.
 
-    Parameters
-    ----------
-    found : Estimate
-    slips : sequence of (float, float), of each test
-        Times of slips upslope.
-    coefficients : sequence of Dataset, of each test
-        As `friction.coefficients_of`.
-    drifting : sequence of str
-        Channels with whose drift the misfit is explained.
-
-    Returns
-    -------
-    dict of str to str
-        `constant_friction`: the sentence on a block of constant friction, "" of others.  `findings`: sentences, a line
-        each.  `model_table` and `uncertainty_table`: tables of a sweep file, commented out where the calibration has
-        failed or determines too little.
+    `statics` are the coefficients of each test, `drifting` the channels with whose drift the misfit is explained.
+    The tables for a sweep file are commented out where the calibration has failed or determines too little.
     """
-    constant = next((one for one in coefficients if one.attrs["constant_friction"]), None)
-    results = [found.summary(one) for one in found.observations]
-    slides = any(float(one["permanent_displacement"]) != 0.0 for one in results)
-    failures = [] if constant is not None else [*_misfit(found), *(_drift(name) for name in drifting)]
-    contradictions = [text for one in found.observations for text in _contradiction(found, one)]
-    said = [*failures, *(text for one in found.observations for text in _begins_in_motion(one))]
-    said += [_upslope(times) for times in slips if times]
+    constant = next((one for one in statics if one.attrs["constant_friction"]), None)
+    sentence = "" if constant is None else constant.attrs["constant_friction"]
+    slides = bool((results["permanent_displacement"] != 0.0).any())
+    said = [] if sentence else _misfit(found, drifting)
+    failed = bool(said)
+    for one in found.observations:
+        first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
+        if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise):
+            said.append(
+                f"The table moves as the record begins, at {first:.3g} m/s2. The block is taken to be at rest there. "
+                "If it slides, the results are wrong: let the record begin where both are at rest."
+            )
+    for times in (one.upslope for one in found.observations if one.upslope):
+        said.append(
+            f"The block slipped upslope {len(times)} time{'s' if len(times) > 1 else ''} (first at {times[0]:.3g} s). "
+            "In stick-slip the model has no upslope slip: these samples are left out, and the displacement may step "
+            "there."
+        )
     if not slides:
         said.append("The computed block does not slide: no parameter is determined. Test with a larger amplitude.")
     elif not found.determined.all():
         said += _undetermined(found)
+    contradictions = [text for one in found.observations for text in _contradiction(found, one)]
     said += contradictions
-    if any(int(one["validity"]) & Validity.NOT_RECOUPLED for one in results):
+    if (results["validity"] & Validity.NOT_RECOUPLED).any():
         said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
-    sentence = "" if constant is None else constant.attrs["constant_friction"]
     if constant is not None:
         said.insert(0, sentence)
         tables = _newmark_tables(found.observations[0], constant)
-    elif found.determined.all() and slides and not failures and not contradictions:
+    elif found.determined.all() and slides and not failed and not contradictions:
         tables = _model_table(found), _uncertainty_table(found)
     else:
         comments = ["WARNING: not ready for use.", *said, "", *_model_table(found).splitlines()]
         tables = "".join(f"# {line}".rstrip() + "\n" for line in comments), ""
-    return {
-        "constant_friction": sentence,
-        "findings": "\n".join(said),
-        "model_table": tables[0],
-        "uncertainty_table": tables[1],
-    }
-
-
-# ---------------------------------------------------------------------------------- reliability
+    texts = (sentence, "\n".join(said), *tables)
+    return dict(zip(("constant_friction", "findings", "model_table", "uncertainty_table"), texts, strict=True))
 
 
 def block_acceleration(test: ShakingTest) -> Floats | None:
@@ -101,7 +88,7 @@ def block_acceleration(test: ShakingTest) -> Floats | None:
     return None
 
 
-def coefficients(one: Observation) -> xr.Dataset:
+def statics(one: Observation) -> xr.Dataset:
     """Friction by statics; nothing where neither the block's acceleration nor its velocity is measured."""
     block = block_acceleration(one.test)
     if block is None:
@@ -114,66 +101,47 @@ def coefficients(one: Observation) -> xr.Dataset:
 def misfits(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is larger than their noise, as neighbouring samples scatter, and how many times."""
     worse: dict[str, float] = {}
-    for one, linear in zip(found.observations, found.linears, strict=True):
-        for name, rest in linear.unexplained(found.parameters).items():
-            misfit, measured = float(np.sqrt(np.mean(rest**2))), one.test.channels[name]
-            noise = one.given_noise.get(name, max(noise_of(measured), one.least_noise[name]))
-            if misfit > _WORSE * noise and misfit > _MISSES * float(np.nanmax(np.abs(measured))):
+    for one in found.observations:
+        of_channels = zip(one.channels, one.misfits(found.parameters), one.sensor_noise, one.largest, strict=True)
+        for name, misfit, noise, largest in of_channels:
+            if misfit > max(_WORSE * noise, _MISSES * largest):
                 worse[name] = max(misfit / noise, worse.get(name, 0.0))
     return worse
 
 
-def _misfit(found: Estimate) -> list[str]:
+def _misfit(found: Estimate, drifting: Sequence[str]) -> list[str]:
+    """Which channels are not explained, and which of them a drift would explain."""
     listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits(found).items())
     text = (
         f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, or a "
         "sensor drifts: do not use the parameters before you know why (see the figure)."
     )
-    return [text] if listed else []
-
-
-def _drift(name: str) -> str:
-    return (
+    drifts = [
         f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
         f"drift = {name!r}."
-    )
-
-
-def _begins_in_motion(one: Observation) -> list[str]:
-    first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
-    text = (
-        f"The table moves as the record begins, at {first:.3g} m/s2. The block is taken to be at rest there. If it "
-        "slides, the results are wrong: let the record begin where both are at rest."
-    )
-    return [text] if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise) else []
+        for name in drifting
+    ]
+    return [text, *drifts] if listed else []
 
 
 def _contradiction(found: Estimate, one: Observation) -> list[str]:
     """A lower bound of Üy that is larger than the accelerations at which the block was seen to begin to slide."""
-    if "block_acceleration" not in one.test.channels or "continuous" in found.readings:
+    if "block_acceleration" not in one.channels or "continuous" in found.readings:
         return []
     times, block = one.test.times, one.test.channels["block_acceleration"]
     table = np.interp(times, one.motion.times, one.motion.acceleration)
     threshold = threshold_of(one.test.channels[TABLE], block)[0]
     slides = slides_of(times, table, block, threshold)
-    onsets = np.array([onset_acceleration(times, table, block, slide, threshold) for slide in slides])
+    onsets = np.array([onset_acceleration(table, block, slide, threshold) for slide in slides])
     onsets = onsets[onsets > 0.0]  # downslope
     if not onsets.size:
         return []
-    step = float(np.abs(np.diff(table)).max())
-    least, seen = float(found.intervals[0][0]), float(np.median(onsets))
+    step, least, seen = np.abs(np.diff(table)).max(), found.intervals[0][0], np.median(onsets)
     text = (
         f"Üy is at least {least:.3g} m/s2 by the fit, but the block was seen to begin to slide at {seen:.3g} m/s2: the "
         "fit contradicts the test."
     )
-    return [text] if least > seen + step + threshold + 3.0 * float(np.std(onsets)) / len(onsets) ** 0.5 else []
-
-
-def _upslope(times: Sequence[tuple[float, float]]) -> str:
-    return (
-        f"The block slipped upslope {len(times)} time{'s' if len(times) > 1 else ''} (first at {times[0][0]:.3g} s). "
-        "In stick-slip the model has no upslope slip: these samples are left out, and the displacement may step there."
-    )
+    return [text] if least > seen + step + threshold + 3.0 * np.std(onsets) / len(onsets) ** 0.5 else []
 
 
 # ------------------------------------------------------------------------------- determination
@@ -183,9 +151,9 @@ def _undetermined(found: Estimate) -> list[str]:
     """Which parameters the tests do not determine, why, and which measurement would."""
     tests = "these tests" if len(found.observations) > 1 else "this test"
     missing = [at for at in range(3) if not found.determined[at]]
-    names = [SYMBOL[at] for at in missing]
+    names = [_SYMBOL[at] for at in missing]
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    ranges = "; ".join(f"{SYMBOL[at]} {_range(found.intervals[at], at)}" for at in missing)
+    ranges = "; ".join(f"{_SYMBOL[at]} {_range(found.intervals[at], at)}" for at in missing)
     said = [f"{listed} {'is' if len(names) == 1 else 'are'} not determined by {tests}: {ranges}."]
     yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
     crosses = bool({"crossed", "crossing"} & found.readings)
@@ -211,11 +179,7 @@ def _range(interval: Floats, at: int) -> str:
     text = "any value" if low <= 0.0 else f"{low:.3g} or more"
     if math.isfinite(high):
         text = f"up to {high:.3g}" if low <= 0.0 else f"{low:.3g} to {high:.3g}"
-    return text + _unit(at)
-
-
-def _unit(at: int) -> str:
-    return " m/s2" if PARAMETERS[SOUGHT[at]]["units"] == "m s-2" else ""
+    return text + _UNIT[at]
 
 
 def _remedy(found: Estimate) -> str:
@@ -248,7 +212,7 @@ def _model_table(found: Estimate) -> str:
     lines = ["[model]", 'friction = "mendez"', f'rise = "{model.rise}"', f'recoupling = "{model.recoupling}"']
     for at, name in enumerate(SOUGHT):
         low, high = found.intervals[at]
-        about = f"95 %: {low:.4g} to {high:.4g}{_unit(at)}" if found.determined[at] else "not determined"
+        about = f"95 %: {low:.4g} to {high:.4g}{_UNIT[at]}" if found.determined[at] else "not determined"
         lines.append(f"{name} = {_number(found.parameters[at])}  # {about}")
     return "\n".join([*lines, f"g = {model.g:g}"]) + "\n"
 

@@ -10,7 +10,6 @@ that acts on a block of horizontal acceleration Ü is, by statics, tan(θ + arct
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -54,20 +53,6 @@ SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "probability below an end of an interval"})
 
 
-@dataclass(frozen=True)
-class Slide:
-    """A slide: samples at which it begins and stops, None where the record ends first, and that of the table's peak."""
-
-    onset: int
-    peak: int
-    stop: int | None
-
-    @property
-    def part(self) -> slice:
-        """Its samples."""
-        return slice(self.onset, None if self.stop is None else self.stop + 1)
-
-
 def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
     """The relative acceleration beyond which the block slides, m/s², and why that much."""
     noise = noise_of(table - block)
@@ -78,13 +63,13 @@ def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
     return NOISE_IN_THRESHOLD * noise, why
 
 
-def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> list[Slide]:
-    """The slides in recorded accelerations of the table and of the block."""
+def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> list[slice]:
+    """The samples of each slide in recorded accelerations; without an end where the record ends first."""
     relative = np.nan_to_num(table - block)
     beyond = np.abs(relative) > threshold
     begins = np.flatnonzero(_in_turn(beyond, _BEGINS))
     quiet, long_quiet = _in_turn(~beyond, _ENDS), _in_turn(~beyond, _ENDS_ANYWAY)
-    slides: list[Slide] = []
+    slides: list[slice] = []
     at = 0
     while at < times.size and (after := begins[begins >= at]).size:
         onset = int(after[0])
@@ -97,27 +82,25 @@ def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> 
         slow = np.abs(signed) <= 0.1 * np.maximum.accumulate(np.abs(signed)) + noise
         turned = signed * np.sign(signed[min(_BEGINS, signed.size - 1)]) < 0.0  # as a slide the other way begins
         stops = np.flatnonzero(((quiet[onset:] & slow) | long_quiet[onset:] | turned)[1:])
-        stop = onset + 1 + int(stops[0]) if stops.size else None
-        at = times.size if stop is None else stop + 1
-        slides.append(Slide(onset, onset + int(np.argmax(table[onset:at])), stop))
+        slides.append(slice(onset, onset + 2 + int(stops[0]) if stops.size else None))
+        at = slides[-1].stop or times.size
     return slides
 
 
 def _in_turn(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
     """Where something holds at a sample and at those after it, `count` in all."""
-    padded = np.concatenate([holds, np.zeros(count - 1, bool)])
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, count).all(axis=1))
+    return np.asarray(np.convolve(holds, np.ones(count))[count - 1 :] == count)
 
 
-def onset_acceleration(times: Floats, table: Floats, block: Floats, slide: Slide, threshold: float) -> float:
+def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: float) -> float:
     """The table's acceleration where r left zero: a straight line through the first samples of the slide, back to 0."""
-    relative = (table - block)[slide.onset : slide.peak + 1]
-    rising = np.flatnonzero(np.nan_to_num(np.abs(relative)) > threshold)[:_FIRST] + slide.onset
+    relative, to_peak = table - block, slice(slide.start, slide.start + np.argmax(table[slide]) + 1)
+    rising = slide.start + np.flatnonzero(np.abs(relative[to_peak]) > threshold)[:_FIRST]
     if rising.size < 3:
-        return float(table[slide.onset])
-    start = np.polynomial.Polynomial.fit((table - block)[rising], table[rising], 1)(0.0)
+        return float(table[slide.start])
+    start = np.polynomial.Polynomial.fit(relative[rising], table[rising], 1)(0.0)
     # r need not grow in a straight line: no further back than the samples before
-    return float(np.clip(start, *sorted((table[max(slide.onset - 2, 0)], table[rising[0]]))))
+    return float(np.clip(start, *sorted((table[max(slide.start - 2, 0)], table[rising[0]]))))
 
 
 def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
@@ -135,7 +118,7 @@ def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: flo
 
 
 def coefficients_of(
-    table: Floats, block: Floats, slides: Sequence[Slide], mu_s: float, theta: float, g: float
+    table: Floats, block: Floats, slides: Sequence[slice], mu_s: float, theta: float, g: float
 ) -> xr.Dataset:
     """Static and kinetic friction by statics, with 95 % intervals, from the slides that begin downslope.
 
@@ -144,17 +127,17 @@ def coefficients_of(
     threshold, relative = threshold_of(table, block)[0], table - block
     eq1, free = eq1_friction(table, block, theta, mu_s, g), free_body_friction(block, theta, g)
     inside, starts, between = [], [], []
-    for one in slides:
-        part = slice(one.onset + _AT_ENDS, (table.size if one.stop is None else one.stop + 1) - _AT_ENDS)
-        downslope = np.nanmean(relative[one.onset : one.onset + _AT_ENDS]) > 0.0
+    for slide in slides:
+        part = slice(slide.start + _AT_ENDS, (slide.stop or table.size) - _AT_ENDS)
+        downslope = np.nanmean(relative[slide.start : slide.start + _AT_ENDS]) > 0.0
         if np.isfinite(free[part]).sum() < 3 or not downslope:
             continue
         inside.append(np.column_stack([free[part], eq1[part]]))
-        first = one.onset + int(np.argmax(np.nan_to_num(relative)[one.part] > threshold))
-        begin, before = float(np.nanmean(block[first : first + _FIRST])), float(table[max(first - 1, 0)])
+        first = slide.start + int(np.argmax(relative[slide] > threshold))
+        begin, before, after = np.nanmean(block[first : first + _FIRST]), table[max(first - 1, 0)], table[first]
         jumps = before - begin > threshold  # else it would have been seen to slide at the sample before
-        starts.append(0.5 * (before + float(table[first])) if jumps else begin)
-        between.append(0.5 * (float(table[first]) - before) if jumps else 0.0)
+        starts.append(0.5 * (before + after) if jumps else begin)
+        between.append(0.5 * (after - before) if jumps else 0.0)
     static = kinetic = np.full(3, np.nan)
     constant = False
     if inside:
@@ -168,10 +151,10 @@ def coefficients_of(
         constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
     found = {}
     for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
-        about = {"units": "1", "long_name": f"{kind} friction coefficient by statics"}
-        interval = {"units": "1", "long_name": f"95 % interval of the {about['long_name']}"}
+        name = f"{kind} friction coefficient by statics"
+        about, of_interval = ({"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}"))
         found[f"{kind}_friction"] = xr.Variable((), value, about)
-        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), [low, high], interval)
+        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), [low, high], of_interval)
     sentence = (
         f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, though Eq. 1 falls. "
         "Newmark's model is the right one for it."
@@ -274,14 +257,14 @@ def measured_friction(
     slides = slides_of(times, table, block, limit)
     coefficients = coefficients_of(table, block, slides, mu_s, theta, g)
     found = {
-        "slide_onset": [times[one.onset] for one in slides],
-        "slide_peak": [times[one.peak] for one in slides],
-        "slide_stop": [np.nan if one.stop is None else times[one.stop] for one in slides],
-        "onset_acceleration": [onset_acceleration(times, table, block, one, limit) for one in slides],
-        "peak_acceleration": [table[one.peak] for one in slides],
-        "peak_block_acceleration": [np.nanmax(block[one.part]) for one in slides],
-        "least_friction": [np.nanmin(eq1[one.part]) for one in slides],
-        "slide_free_body_friction": [np.nanmedian(free[one.part]) for one in slides],
+        "slide_onset": [times[one.start] for one in slides],
+        "slide_peak": [times[one][np.argmax(table[one])] for one in slides],
+        "slide_stop": [times[one.stop - 1] if one.stop else np.nan for one in slides],
+        "onset_acceleration": [onset_acceleration(table, block, one, limit) for one in slides],
+        "peak_acceleration": [np.max(table[one]) for one in slides],
+        "peak_block_acceleration": [np.nanmax(block[one]) for one in slides],
+        "least_friction": [np.nanmin(eq1[one]) for one in slides],
+        "slide_free_body_friction": [np.nanmedian(free[one]) for one in slides],
     }
     series = {
         TABLE: table,
@@ -328,9 +311,8 @@ def test_of(given: Any) -> ShakingTest:
         raise InputError("test: time: missing: must be a coordinate, s")
     channels = {}
     for name in ("time", *known):
-        factor, units = 1.0, data[name].attrs.get("units")
-        if units is not None:
-            factor = unit_factor(f"test: {name}: units", name, str(units))
+        units = data[name].attrs.get("units")
+        factor = 1.0 if units is None else unit_factor(f"test: {name}: units", name, str(units))
         channels[name] = factor * check_numbers(f"test: {name}", data[name])
     return ShakingTest(channels.pop("time"), channels)
 

@@ -5,20 +5,21 @@ Beside Üy, λ and Δμ stand nuisance parameters with known standard deviations
 need no search: scaled residuals have the covariance 1 + E Eᵀ, E being the effects of one standard deviation of each,
 and are made independent by it.
 
-Two kinds of samples count less.  The block's acceleration jumps where the block stops, and a sample beside a jump
+Three kinds of samples count less.  The block's acceleration jumps where the block stops, and a sample beside a jump
 tells only on which side of it the jump lies: it is left out.  Readings of a converter that repeat are one
-reading: n of them have the weight of one.
+reading: n of them have the weight of one.  Slips upslope, which stick-slip does not have, are left out.
 """
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
+from slipsweep.errors import InputError
 from slipsweep.grid.inputs import Problem
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
@@ -28,11 +29,15 @@ from slipsweep.model.options import Cycle, Mendez
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.motion.shaking import TABLE, ShakingTest
-from slipsweep.studies.table_motion import TableMotion, converter_noise, noise_of, table_motion
+from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
+from slipsweep.studies import table_motion
+from slipsweep.studies.friction import check_contact
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+#: The series of `HISTORY` at some times, for Üy, λ and Δμ.
+Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
 
 #: What is sought, in the order of all vectors.
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
@@ -52,241 +57,204 @@ _ROUGH_NOISE = 0.1
 #: Steps of the derivatives by errors of the table's motion and by its offset, in standard deviations.
 _SHAPE_STEP, _LINE_STEP = 0.3, 1e-3
 
-
-#: Columns of a history.
-COLUMN = {name: at for at, name in enumerate(HISTORY)}
-
-
-class Forward:
-    """A block of known inclination and static friction on one motion, for parameters that are tried."""
-
-    def __init__(self, theta: float, mu_s: float, model: Mendez, record: Record) -> None:
-        self.theta, self.mu_s, self.model = theta, mu_s, model
-        self._options = options_of(Problem(model, record, Cycle()), wants_peak=True)
-        self._wave = wave_of_record.__wrapped__(record, 1.0)  # tried once: not kept in its cache
-        self._workspace = workspace_of(self._wave, keeps_log=True)
-
-    def __call__(self, parameters: Floats, times: Floats) -> Floats:
-        """Columns of `HISTORY` at the times, for Üy, λ and Δμ."""
-        onset, decay, drop = (float(one) for one in parameters)
-        cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan)
-        table = np.empty((len(COLUMN), times.size))
-        record_history(cell, self._options, self._wave, self._workspace, times, History(*table))
-        return table.T
+#: Consecutive samples, and standard deviations of the noise, by which a block slips upslope.
+_UPSLOPE_SAMPLES, _UPSLOPE_NOISE = 4, 5.0
 
 
-@dataclass(frozen=True)
-class Line:
-    """An offset, a drift or a step of a sensor: what one standard deviation of it adds to channels."""
+class Line(NamedTuple):
+    """An offset, a drift or a step of a channel's sensor: its standard deviation, and what that adds at the samples."""
 
     name: str
-    parts: Mapping[str, Floats]
+    channel: str
     deviation: float
+    values: Floats
 
 
-@dataclass(frozen=True, eq=False)
 class Linear:
-    """A test near one solution: independent residuals for any parameters, and the nuisance parameters.
+    """Residuals of parameters and of nuisance parameters, on which what is computed depends linearly.
 
-    Attributes
-    ----------
-    forward : Forward
-    times : ndarray
-    weights : dict of str to (ndarray, ndarray)
-        Of each channel the samples that count, and what they are multiplied by to have unit variance.
-    measured : ndarray
-        The samples of all channels, so multiplied.
-    left, sizes, right : ndarray
-        Singular values of the effects of one standard deviation of each nuisance parameter on them.
+    `computed` gives samples for parameters, in standard deviations, to be compared with those `measured`; `effects` are
+    those of one standard deviation of each nuisance parameter on them.
     """
 
-    forward: Forward
-    times: Floats
-    weights: dict[str, tuple[Mask, Floats]]
-    measured: Floats
-    left: Floats
-    sizes: Floats
-    right: Floats
+    def __init__(self, computed: Callable[[Floats], Floats], measured: Floats, effects: Floats) -> None:
+        self.computed, self.measured = computed, measured
+        self.left, self.sizes, self.right = np.linalg.svd(effects, full_matrices=False)
+        self.known = self.sizes**2 / (1.0 + self.sizes**2)
+        self._shrunk = self.left * (1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2))
 
     def __call__(self, parameters: Floats) -> Floats:
         """Independent residuals of unit variance, if the model and the noise are right."""
-        rest = self.raw(parameters)
+        rest = self._raw(parameters)
         return np.asarray(rest - self._shrunk @ (self.left.T @ rest))
 
-    @functools.cached_property
-    def _shrunk(self) -> Floats:
-        return self.left * (1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2))
-
-    def raw(self, parameters: Floats) -> Floats:
-        """Measured less computed, in standard deviations, if the table's motion had no error."""
-        history = self.forward(parameters, self.times)
-        computed = np.concatenate([history[use, COLUMN[name]] * weight for name, (use, weight) in self.weights.items()])
+    def _raw(self, parameters: Floats) -> Floats:
+        computed = self.computed(parameters)
         return np.where(np.isfinite(computed), self.measured - computed, 1e3)
 
     def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Most likely values of the nuisance parameters and their standard deviations, in those of their priors."""
-        along = self.left.T @ self.raw(parameters)
+        along = self.left.T @ self._raw(parameters)
         values = self.right.T @ (self.sizes / (1.0 + self.sizes**2) * along)
-        spread = 1.0 - np.sum(self.right**2 * (self.sizes**2 / (1.0 + self.sizes**2))[:, None], axis=0)
+        spread = 1.0 - np.sum(self.right**2 * self.known[:, None], axis=0)
         return np.asarray(values), np.sqrt(np.maximum(spread, 0.0))
 
-    def by_channel(self, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
-        """What belongs to each channel."""
-        ends = np.cumsum([weight.size for _, weight in self.weights.values()])[:-1]
-        return dict(zip(self.weights, np.split(values, ends), strict=True))
-
-    def unexplained(self, parameters: Floats) -> dict[str, Floats]:
-        """What the most likely nuisance parameters leave of each channel, in its own unit."""
-        rest = self.raw(parameters) - (self.left * self.sizes) @ (self.right @ self.nuisances(parameters)[0])
-        return {name: part / self.weights[name][1] for name, part in self.by_channel(rest).items()}
-
-    def between(self, begin: float, end: float, speed: float) -> "Linear":
-        """The samples between two times; the motion at the beginning is unknown, velocities of the order of `speed`."""
-        inside = (self.times >= begin) & (self.times < end)
-        rows = np.concatenate([inside[use] for use, _ in self.weights.values()])
-        weights = {name: (use & inside, weight[inside[use]]) for name, (use, weight) in self.weights.items()}
-        starts = []
-        for name, (use, weight) in weights.items():
-            moved = np.column_stack([np.ones(weight.size), self.times[use] - begin])
-            still = np.column_stack([np.zeros(weight.size), np.ones(weight.size)])
-            shape = {"relative_displacement": moved, "relative_velocity": still}.get(name, 0.0 * still)
-            starts.append(speed * shape * weight[:, np.newaxis])
-        effects = np.column_stack([((self.left * self.sizes) @ self.right)[rows], np.concatenate(starts)])
-        return Linear(
-            self.forward, self.times, weights, self.measured[rows], *np.linalg.svd(effects, full_matrices=False)
-        )
+    def unexplained(self, parameters: Floats) -> Floats:
+        """What the most likely nuisance parameters leave."""
+        explained = (self.left * self.sizes) @ (self.right @ self.nuisances(parameters)[0])
+        return np.asarray(self._raw(parameters) - explained)
 
 
-@dataclass(eq=False)
 class Observation:
-    """A test and what is known of its sensors.
+    """A test and what is known of its sensors, checked, and the likelihood that it gives.
 
-    Attributes
-    ----------
-    test : ShakingTest
-    theta, mu_s : float
-    model : Mendez
-    offsets, drifts : sequence of str
-        Channels whose sensor has an offset, or an offset and a drift.
-    given_noise : mapping of str to float
-        Standard deviation of channels; what is not given is estimated from the residuals (`take_noise`).
-    use, noise : dict of str to ndarray and to float
-        Samples that count and the standard deviation, of each channel of the block.
-    lines, table_lines : list of Line
-        Offsets, drifts and steps of the block's sensors and of the table's.
+    `channels` of the block have the noise `sensor_noise` as neighbouring samples scatter, or as given.  `lines` are
+    offsets, drifts and steps, those of the table first; `wrong` the most likely errors of the table's motion and its
+    lines, in standard deviations; `upslope` the times at which slips begin that are left out.  `forward` and `linear`
+    are the model and the likelihood near the last solution (`linearize`).
     """
 
-    test: ShakingTest
-    theta: float
-    mu_s: float
-    model: Mendez
-    offsets: Sequence[str] = ()
-    drifts: Sequence[str] = ()
-    given_noise: Mapping[str, float] = field(default_factory=dict)
+    forward: Forward
+    linear: Linear
 
-    def __post_init__(self) -> None:
-        test = self.test
+    def __init__(
+        self, test: ShakingTest, theta: float, mu_s: float, model: Mendez, offset: Any, drift: Any,
+        noise: Mapping[str, float],
+    ) -> None:  # fmt: skip
+        if not test.responses:
+            raise InputError(
+                f"{test.name}: nothing of the block was measured: must have one at least of {', '.join(RESPONSES)}"
+            )
+        check_channels("noise", list(noise), test.responses)
+        check_contact(test, theta, model.g)
+        if not float(test.channels[TABLE].max()) > 0.0:
+            raise InputError(f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope")
+        offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
+        self.test, self.theta, self.mu_s, self.model, self.channels = test, theta, mu_s, model, test.responses
+        measured = np.array([test.channels[name] for name in self.channels])
         # the last sample is that at which a record ends
-        inside = np.arange(test.times.size) < test.times.size - 1
-        self.use: dict[str, Mask] = {name: inside & np.isfinite(test.channels[name]) for name in test.responses}
-        self.weights = {name: weights_of(test.channels[name]) for name in test.responses}
-        self.least_noise = {
-            name: max(_LEAST_NOISE * float(np.nanmax(np.abs(values))), converter_noise(values), 1e-15)
-            for name, values in test.channels.items()
-            if name != TABLE
-        }
-        self.noise = {
-            name: self.given_noise.get(name, max(noise_of(test.channels[name]), least))
-            for name, least in self.least_noise.items()
-        }
-        self.motion: TableMotion = table_motion(test.times, test.channels[TABLE])
-        self.lines = self._lines(test.responses)
-        self.table_lines = self._lines((TABLE,))
-        on_motion = [np.interp(self.motion.times, test.times, one.parts[TABLE]) for one in self.table_lines]
-        self.shapes = np.column_stack([self.motion.shapes, *(-line for line in on_motion)])
-        self.wrong = np.zeros(self.shapes.shape[1])
-        self.jumps_left_out = np.zeros(test.times.size, dtype=bool)
-
-    def _lines(self, names: Sequence[str]) -> list[Line]:
-        since = (self.test.times - self.test.times[0]) / (self.test.times[-1] - self.test.times[0])
-        lines = []
-        for name in names:
-            size = _LARGE * float(np.nanmax(np.abs(self.test.channels[name])))
-            if name in self.offsets or name in self.drifts:
-                lines.append(Line(f"offset of {name}", {name: np.full(since.size, size)}, size))
-            if name in self.drifts:
-                lines.append(Line(f"drift of {name}", {name: size * since}, size))
-        return lines
+        self._use = np.isfinite(measured) & (np.arange(test.times.size) < test.times.size - 1)
+        self._beside_jumps = np.zeros_like(self._use)
+        self._weights = np.array([_weights_of(values) for values in measured])
+        self.largest = np.nanmax(np.abs(measured), axis=1)
+        converters = [max(table_motion.converter_noise(values), 1e-15) for values in measured]
+        self._least_noise = np.maximum(_LEAST_NOISE * self.largest, converters)
+        self._given_noise = np.array([noise.get(name, np.nan) for name in self.channels])
+        scatter = np.maximum([table_motion.noise_of(values) for values in measured], self._least_noise)
+        self.sensor_noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
+        self._noise = self.sensor_noise.copy()
+        self.lines: list[Line] = []
+        since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
+        for name, values in test.channels.items():
+            size = _LARGE * float(np.nanmax(np.abs(values)))
+            if name in offsets or name in drifts:
+                self.lines.append(Line("offset", name, size, np.full(since.size, size)))
+            if name in drifts:
+                self.lines.append(Line("drift", name, size, size * since))
+        self.motion = table_motion.table_motion(test.times, test.channels[TABLE])
+        of_table = [np.interp(self.motion.times, test.times, one.values) for one in self.lines if one.channel == TABLE]
+        self._shapes = np.column_stack([self.motion.shapes, *(-line for line in of_table)])
+        self.wrong = np.zeros(self._shapes.shape[1])
+        self.upslope: list[float] = []
 
     @property
     def peak(self) -> float:
         """Largest acceleration of the table, m/s²."""
         return float(self.motion.acceleration.max())
 
-    def record(self, wrong: Floats) -> Record:
-        """The table's motion with so many standard deviations of each of its errors."""
-        return Record(self.motion.times, self.motion.acceleration + self.shapes @ wrong)
+    def record(self, wrong: Floats | None = None) -> Record:
+        """The table's motion as last estimated, or with so many standard deviations of each of its errors."""
+        errors = self._shapes @ (self.wrong if wrong is None else wrong)
+        return Record(self.motion.times, self.motion.acceleration + errors)
 
-    def forward(self, wrong: Floats | None = None) -> Forward:
-        """The block on the table's motion as last estimated, or with other errors of it."""
-        return Forward(self.theta, self.mu_s, self.model, self.record(self.wrong if wrong is None else wrong))
+    def _forward(self, wrong: Floats | None = None) -> Forward:
+        """The model's block on that motion of the table."""
+        record = self.record(wrong)
+        options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
+        wave = wave_of_record.__wrapped__(record, 1.0)  # tried once: not kept in its cache
+        workspace = workspace_of(wave, keeps_log=True)
 
-    def linear(self, parameters: Floats, rough: bool = False) -> Linear:
-        """The likelihood near a solution; `rough` as if the table's record had no noise, and the channels had much."""
-        test, forward = self.test, self.forward()
-        weights = {}
-        for name, use in self.use.items():
-            counted = use & ~self.jumps_left_out if name == "block_acceleration" else use
-            noise = max(self.noise[name], _ROUGH_NOISE * float(np.nanmax(np.abs(test.channels[name]))) * rough)
-            weights[name] = counted, self.weights[name][counted] / noise
+        def histories(parameters: Floats, times: Floats) -> dict[str, Floats]:
+            onset, decay, drop = map(float, parameters)
+            cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan)
+            table = np.empty((len(HISTORY), times.size))
+            record_history(cell, options, wave, workspace, times, History(*table))
+            return dict(zip(HISTORY, table, strict=True))
 
-        def weighted(parts: Mapping[str, Floats]) -> Floats:
-            none = np.zeros(test.times.size)
-            return np.concatenate([parts.get(name, none)[use] * weight for name, (use, weight) in weights.items()])
+        return histories
 
-        def computed(by: Forward) -> Floats:
-            history = by(parameters, test.times)
-            return weighted({name: history[:, COLUMN[name]] for name in weights})
+    def _weighted(self, series: Mapping[str, Floats]) -> Floats:
+        """The samples that count, channel by channel, in standard deviations; 0 of a channel that is not there."""
+        none = np.zeros(self.test.times.size)
+        return np.array([series.get(name, none) for name in self.channels])[self._counted] * self._scale
 
-        measured = weighted(test.channels)
-        effects = np.zeros((measured.size, self.wrong.size + len(self.lines)))
-        kinds = self.wrong.size - len(self.table_lines)
-        base = computed(forward)
-        for at in range(kinds if rough else 0, self.wrong.size):
+    def _by_channel(self, values: Floats) -> list[Floats]:
+        return np.split(values, np.cumsum(self._counted.sum(axis=1))[:-1])
+
+    def linearize(self, parameters: Floats, rough: bool = False) -> None:
+        """Set `linear` near a solution; `rough` as if the table's record had no noise, and the channels had much."""
+
+        def computed(by: Forward, parameters: Floats) -> Floats:
+            return self._weighted(by(parameters, self.test.times))
+
+        self.forward = self._forward()
+        self._counted = self._use & ~self._beside_jumps
+        noise = np.maximum(self._noise, _ROUGH_NOISE * self.largest * rough)
+        self._scale = (self._weights / noise[:, None])[self._counted]
+        base = computed(self.forward, parameters)
+        shapes, moving = self.motion.shapes.shape[1], self.wrong.size
+        effects = np.zeros((base.size, shapes + len(self.lines)))
+        for at in range(shapes if rough else 0, moving):
             moved = self.wrong.copy()
-            moved[at] += _SHAPE_STEP if at < kinds else _LINE_STEP
-            change = computed(self.forward(moved)) - base
+            moved[at] += _SHAPE_STEP if at < shapes else _LINE_STEP
+            change = computed(self._forward(moved), parameters) - base
             effects[:, at] = np.nan_to_num(change) / (moved[at] - self.wrong[at])
-        for at, line in enumerate(self.lines, self.wrong.size):
-            effects[:, at] = weighted(line.parts)
-        measured = measured + effects[:, : self.wrong.size] @ self.wrong
-        return Linear(forward, test.times, weights, measured, *np.linalg.svd(effects, full_matrices=False))
+        for at, line in enumerate(self.lines[moving - shapes :], moving):
+            effects[:, at] = self._weighted({line.channel: line.values})
+        measured = self._weighted(self.test.channels) + effects[:, :moving] @ self.wrong
+        self.linear = Linear(functools.partial(computed, self.forward), measured, effects)
 
-    def take_noise(self, linear: Linear, parameters: Floats) -> None:
-        """Estimate the noise of each channel from the residuals, where it is not given."""
-        leverage = linear.by_channel(linear.left**2 @ (linear.sizes**2 / (1.0 + linear.sizes**2)))
-        for name, rest in linear.unexplained(parameters).items():
-            weight = linear.weights[name][1] * self.noise[name]
-            freedom = float(np.sum(weight**2)) - float(np.sum(leverage[name])) - 1.0
-            if name not in self.given_noise and freedom > 0.0:
-                noise = float(np.sqrt(np.sum((rest * weight) ** 2) / freedom))
-                self.noise[name] = max(noise, self.least_noise[name])
+    def unexplained(self, parameters: Floats) -> list[Floats]:
+        """What nothing explains of the samples of each channel, in its own unit."""
+        return self._by_channel(self.linear.unexplained(parameters) / self._scale)
 
-    def move(self, linear: Linear, parameters: Floats) -> None:
-        """Take the table's motion as it most likely was, and leave out the samples beside jumps."""
-        self.wrong = linear.nuisances(parameters)[0][: self.wrong.size]
-        if "block_acceleration" in self.use:
-            self.jumps_left_out = self._beside_jumps(parameters)
+    def misfits(self, parameters: Floats) -> list[float]:
+        """Root mean square of what nothing explains of each channel."""
+        return [float(np.sqrt(np.mean(rest**2))) for rest in self.unexplained(parameters)]
 
-    def _beside_jumps(self, parameters: Floats) -> Mask:
+    def cycle(self, begin: float, end: float, speed: float) -> Linear:
+        """The samples between two times; the motion at the beginning is unknown, velocities of the order of `speed`."""
+        whole, times = self.linear, self.test.times
+        rows = (self._counted & (times >= begin) & (times < end))[self._counted]
+        still, moved = np.full(times.size, speed), speed * (times - begin)
+        place = self._weighted({"relative_displacement": still})
+        velocity = self._weighted({"relative_displacement": moved, "relative_velocity": still})
+        effects = np.column_stack([(whole.left * whole.sizes) @ whole.right, place, velocity])
+        return Linear(lambda parameters: whole.computed(parameters)[rows], whole.measured[rows], effects[rows])
+
+    def settle(self, parameters: Floats) -> None:
+        """Estimate the noise that is not given, take the table's motion as most likely, leave out samples at jumps."""
+        leverage = self._by_channel(self.linear.left**2 @ self.linear.known)
+        weights, rests = self._by_channel(self._scale), self.unexplained(parameters)
+        for at, (rest, part) in enumerate(zip(rests, leverage, strict=True)):
+            weight = weights[at] * self._noise[at]
+            freedom = float(np.sum(weight**2)) - float(np.sum(part)) - 1.0
+            if np.isnan(self._given_noise[at]) and freedom > 0.0:
+                self._noise[at] = max(np.sqrt(np.sum((rest * weight) ** 2) / freedom), self._least_noise[at])
+        self.wrong = self.linear.nuisances(parameters)[0][: self.wrong.size]
+        if "block_acceleration" in self.channels:
+            row = self.channels.index("block_acceleration")
+            self._beside_jumps[row] = self._next_to_jumps(parameters, self._noise[row])
+
+    def _next_to_jumps(self, parameters: Floats, noise: float) -> Mask:
         """Samples next to a time at which the block's computed acceleration jumps by more than the noise."""
         times = self.test.times
         fine = np.interp(np.arange(0, times.size - 1, 0.125), np.arange(times.size), times)
-        history = self.forward()(parameters, fine)
-        block, table = history[:, COLUMN["block_acceleration"]], history[:, COLUMN[TABLE]]
+        history = self._forward()(parameters, fine)
+        block, table = history["block_acceleration"], history[TABLE]
         # either is smooth where the block holds its acceleration or sticks to the table
         change = np.minimum(np.abs(np.diff(block)), np.abs(np.diff(block - table)))
-        least = max(self.noise["block_acceleration"], 0.02 * float(np.abs(table).max()))
+        least = max(noise, 0.02 * float(np.abs(table).max()))
         before = np.diff(times, prepend=2 * times[0] - times[1])
         after = np.append(before[1:], before[-1])
         found = np.zeros(times.size, dtype=bool)
@@ -294,15 +262,35 @@ class Observation:
             found |= (times > jump - _BESIDE_A_JUMP * after) & (times < jump + _BESIDE_A_JUMP * before)
         return found
 
+    def leave_out_upslope_slips(self) -> None:
+        """Leave out the samples of slips upslope, after each of which the displacement may have stepped."""
+        times, channels = self.test.times, self.test.channels
+        if "relative_velocity" in channels:
+            velocity = channels["relative_velocity"]
+        elif "relative_displacement" in channels:
+            velocity = np.gradient(channels["relative_displacement"], times)
+        else:
+            return
+        noise = max(table_motion.noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+        upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
+        several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
+        slips = ndimage.binary_dilation(several, iterations=3)
+        self._use = self._use & ~slips
+        self.upslope = [float(times[slip.start]) for slip in table_motion.runs_of(slips)]
+        if "relative_displacement" in channels:
+            size = 3.0 * float(np.nanmax(np.abs(channels["relative_displacement"])))
+            for slip in table_motion.runs_of(slips):
+                name, step = f"upslope slip at {times[slip.start]:.4g} s", size * (times > times[slip.stop - 1])
+                self.lines.append(Line(name, "relative_displacement", size, step))
 
-def weights_of(values: Floats) -> Floats:
+
+def _weights_of(values: Floats) -> Floats:
     """Square roots of the samples' weights: readings at one level, several in turn, have the weight of one.
 
     A converter's error is the same in all of them, also where the block holds one acceleration in each cycle.
     """
-    begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    lengths = np.diff(np.append(begins, values.size))
-    runs = np.repeat(lengths, lengths) > 1
+    repeated = np.diff(values) == 0.0
+    runs = np.append(repeated, False) | np.append(False, repeated)
     weights = np.ones(values.size)
     _, level, counts = np.unique(values[runs], return_inverse=True, return_counts=True)
     weights[runs] = 1.0 / np.sqrt(counts[level])

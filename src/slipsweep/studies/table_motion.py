@@ -6,10 +6,11 @@ coefficients: few under a smooth motion, many under a sharp one or without noise
 begins and ends if the criterion asks for it.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.linalg import cholesky, solve_triangular
 
@@ -40,23 +41,24 @@ _CONVERTER = 1.6
 _VARIANCE = 20.0
 
 
-@dataclass(frozen=True, eq=False)
-class TableMotion:
-    """A table's motion with its uncertainty.
+class TableMotion(NamedTuple):
+    """A table's motion (s and m/s², linear between its points) with its uncertainty.
 
-    Attributes
-    ----------
-    times, acceleration : ndarray
-        The motion, s and m/s², linear between these points.
-    shapes : ndarray
-        Independent errors that it may have, each of one standard deviation; one a column.
-    noise : float
-        Standard deviation of the noise of the record, m/s².
+    `shapes` are independent errors that it may have, one a column, each of one standard deviation; `noise` is the
+    standard deviation of the noise of the record, m/s².
     """
 
     times: Floats
     acceleration: Floats
     shapes: Floats
+    noise: float
+
+
+class _Fitted(NamedTuple):
+    """A spline, Akaike's criterion for it, and the noise that it leaves."""
+
+    spline: BSpline
+    score: float
     noise: float
 
 
@@ -72,13 +74,39 @@ def converter_noise(values: Floats) -> float:
     return _CONVERTER * float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
 
 
-@dataclass(frozen=True)
-class _Fitted:
-    """A spline, and Akaike's criterion for it."""
+def runs_of(holds: NDArray[np.bool_]) -> list[slice]:
+    """The runs of samples at which something holds."""
+    return [part for (part,) in ndimage.find_objects(ndimage.label(holds)[0])]
 
-    spline: BSpline
-    score: float
-    noise: float
+
+def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
+    """The motion behind a record of a table's acceleration."""
+    fits = [one for spacing in _SPACINGS if (one := _fitted(times, acceleration, _knots(times, spacing))) is not None]
+    chosen = min(range(len(fits)), key=lambda at: fits[at].score)
+    best, kinked = _with_kinks(times, acceleration, fits[min(chosen + _FINER, len(fits) - 1)])
+    knots = best.spline.t
+    bounds = np.unique(knots)
+    curvature = np.abs(best.spline(times, nu=2)).max() * np.diff(bounds).max() ** 2 / 8.0
+    parts = np.sqrt(curvature / max(_INTERPOLATION * best.noise, 1e-9 * float(np.abs(acceleration).max())))
+    parts = int(np.clip(np.ceil(parts), _FEWEST_POINTS, _MOST_POINTS))
+    fine = np.interp(np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds)
+    # of many coefficients only what is wrong over long times matters, which fewer can say
+    coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
+    design = BSpline.design_matrix(times, coarse, _DEGREE)
+    root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
+    shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
+    noise = max(best.noise, converter_noise(acceleration))
+    smooth, errors = np.asarray(best.spline(fine)), [noise * shapes]
+    for fits in kinked:
+        # of a converter's noise only a part is seen as scatter
+        off, error = _averaged(fits, fine, (best.noise / noise) ** 2)
+        smooth = smooth + off
+        errors.append(error)
+    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right; beside a kink
+    # the curve bends only over the shorter of two intervals, which may be much the shorter
+    width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
+    smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
+    return TableMotion(fine, smooth, np.column_stack(errors), noise)
 
 
 def _fitted(times: Floats, values: Floats, knots: Floats) -> _Fitted | None:
@@ -95,32 +123,6 @@ def _fitted(times: Floats, values: Floats, knots: Floats) -> _Fitted | None:
     return _Fitted(spline, score, float(np.sqrt(square / (size - number))))
 
 
-def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
-    """The motion behind a record of a table's acceleration."""
-    fits = [one for spacing in _SPACINGS if (one := _fitted(times, acceleration, _knots(times, spacing))) is not None]
-    chosen = min(range(len(fits)), key=lambda at: fits[at].score)
-    best = fits[min(chosen + _FINER, len(fits) - 1)]
-    best, alternatives = _with_kinks(times, acceleration, best)
-    knots = best.spline.t
-    bounds = np.unique(knots)
-    curvature = np.abs(best.spline(times, nu=2)).max() * np.diff(bounds).max() ** 2 / 8.0
-    parts = np.sqrt(curvature / max(_INTERPOLATION * best.noise, 1e-9 * float(np.abs(acceleration).max())))
-    parts = int(np.clip(np.ceil(parts), _FEWEST_POINTS, _MOST_POINTS))
-    fine = np.interp(np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds)
-    # of many coefficients only what is wrong over long times matters, which fewer can say
-    coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
-    design = BSpline.design_matrix(times, coarse, _DEGREE)
-    root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
-    shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
-    noise = max(best.noise, converter_noise(acceleration))
-    smooth, places = _averaged(alternatives, np.asarray(best.spline(fine)), fine, (best.noise / noise) ** 2)
-    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right; beside a kink
-    # the curve bends only over the shorter of two intervals, which may be much the shorter
-    width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
-    smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
-    return TableMotion(fine, smooth, np.column_stack([noise * shapes, places]), noise)
-
-
 def _knots(times: Floats, spacing: int) -> Floats:
     """Knots that have about so many samples between each other, however these are spaced."""
     count = max(times.size // spacing, 1)
@@ -131,40 +133,33 @@ def _knots(times: Floats, spacing: int) -> Floats:
 def _with_kinks(times: Floats, values: Floats, best: _Fitted) -> tuple[_Fitted, list[list[_Fitted]]]:
     """The spline with a kink where the shaking begins, and one where it ends, if these improve it, as for a sine.
 
-    Beside it, for each kink, the splines with the kink at other places.
+    Beside it, for each kink, the splines with the kink at this and other places that are likely.
     """
     moving = np.flatnonzero(np.abs(values) > _MOVES * max(noise_of(values), 1e-6 * float(np.abs(values).max())))
-    tried: list[list[_Fitted]] = []
+    kinked: list[list[_Fitted]] = []
     for end, side in ((0, -1.0), (-1, 1.0)) if moving.size else ():
         places = moving[end] + side * 0.25 * np.arange(4 * _KINK_SAMPLES)
         places = places[(places > 2) & (places < times.size - 3)]
-        knots, found = best.spline.t, []
+        knots, tried = best.spline.t, []
         for at in np.interp(places, np.arange(times.size), times):
             outside = (knots < at) & (knots > times[0]) if end == 0 else (knots > at) & (knots < times[-1])
             for kept in (knots, knots[~outside]):  # at rest outside, one polynomial is enough
                 near = np.abs(kept - at) < 1e-9 * (times[-1] - times[0])
-                found.append(_fitted(times, values, np.sort(np.concatenate([kept[~near], np.repeat(at, _DEGREE)]))))
-        kinked = [one for one in found if one is not None]
-        top = min(kinked, key=lambda one: one.score, default=best)
+                tried.append(_fitted(times, values, np.sort(np.concatenate([kept[~near], np.repeat(at, _DEGREE)]))))
+        found = [one for one in tried if one is not None]
+        top = min(found, key=lambda one: one.score, default=best)
         if top.score < best.score:
             best = top
-            tried.append([one for one in kinked if one.score < top.score + 12.0])
-    return best, tried
+            kinked.append([one for one in found if one.score < top.score + 12.0])
+    return best, kinked
 
 
-def _averaged(alternatives: list[list[_Fitted]], smooth: Floats, fine: Floats, part: float) -> tuple[Floats, Floats]:
-    """The motion averaged over the places where a kink may lie, by their likelihood, and its errors from these.
-
-    Of a converter's noise only a `part` is seen as scatter.
-    """
-    ways = [np.zeros((fine.size, 0))]
-    for fits in alternatives:
-        likely = np.exp([0.5 * part * (min(one.score for one in fits) - one.score) for one in fits])
-        likely /= likely.sum()
-        top = min(fits, key=lambda one: one.score).spline(fine)
-        apart = np.column_stack([one.spline(fine) - top for one in fits])
-        middle = apart @ likely
-        smooth = smooth + middle
-        left, sizes, _ = np.linalg.svd((apart - middle[:, None]) * np.sqrt(likely), full_matrices=False)
-        ways.append((left * sizes)[:, :3])
-    return smooth, np.column_stack(ways)
+def _averaged(fits: list[_Fitted], fine: Floats, part: float) -> tuple[Floats, Floats]:
+    """By what splines with a kink at several places, averaged by likelihood, differ from the best; errors of this."""
+    best = min(fits, key=lambda one: one.score)
+    likely = np.exp([0.5 * part * (best.score - one.score) for one in fits])
+    likely /= likely.sum()
+    apart = np.column_stack([one.spline(fine) - best.spline(fine) for one in fits])
+    middle = apart @ likely
+    left, sizes, _ = np.linalg.svd((apart - middle[:, None]) * np.sqrt(likely), full_matrices=False)
+    return middle, (left * sizes)[:, :3]
