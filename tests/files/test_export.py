@@ -231,6 +231,17 @@ def test_the_rows_of_a_pivoted_table_are_all_other_axes_unless_chosen(folder: Pa
     assert header == 'frequency (Hz) \\ case: sliding_mode,"mild ± slope, wet",steep'
 
 
+def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(folder: Path, tmp_path: Path) -> None:
+    text = GRID.replace("displacement_amplitude", "amplitude")
+    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    assert export.export(tmp_path / "a.nc", tmp_path / "t.xlsx", columns="theta") == 3 * 24 + 12
+    sheet = pd.read_excel(tmp_path / "t.xlsx", sheet_name="limiting_acceleration")
+    names = [header.partition(" ")[0] for header in map(str, sheet)]
+    assert names == ["mu_s", "amplitude", "decay_rate", "0", "5", "20"]
+    with pytest.raises(InputError, match="--columns frequency: not an axis of limiting_acceleration; choose others"):
+        export.export(tmp_path / "a.nc", tmp_path / "u.xlsx", columns="frequency")
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

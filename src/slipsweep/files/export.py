@@ -86,8 +86,14 @@ def export(
         else:
             along = _pivot_rows(part, source, dims, rows, columns)
             flat = {dim: 0 for dim in dims if dim not in (*along, columns)}
-            parts = {name: part[[name]].isel(flat, missing_dims="ignore") for name in chosen}
-            tables = [Table(one, name, words, along, columns) for name, one in parts.items()]
+            tables = []
+            for name in chosen:
+                one = part[[name]].isel(flat, missing_dims="ignore")
+                if columns not in one.sizes:
+                    raise InputError(
+                        f"{source}: --columns {columns}: not an axis of {name}; choose others with --variable"
+                    )
+                tables.append(Table(one, name, words, [dim for dim in along if dim in one.sizes], columns))
         if path.suffix == ".xlsx":
             for table in tables:
                 table.check_size(source)

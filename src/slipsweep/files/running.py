@@ -171,9 +171,6 @@ def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int
     return int(min(within, cells) if plan.cost > 1.0 or processes else within)
 
 
-# ---------------------------------------------------------------------------------- workers
-
-
 @contextmanager
 def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]":
     """Start so many processes on this machine, of one thread each, or connect to a scheduler (RunError)."""
@@ -219,9 +216,8 @@ def _check_versions(client: "Client", scheduler: str) -> None:
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
-        raise RunError(
-            f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
-        ) from None
+        message = f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
+        raise RunError(message) from None
     # the lambda is sent as code: workers need not have this module
     versions = client.run(lambda: importlib.import_module("slipsweep._version").__version__, on_error="return")
     for worker, found in versions.items():
