@@ -223,6 +223,8 @@ def test_a_store_at_an_address(folder: Path) -> None:
     xr.testing.assert_identical(without_time(read_result(address)), without_time(read_result(folder / "a.nc")))
     assert stored(job_of(folder, "sweep"), address, resume=True).found
     assert not list(Path().glob(".address*"))
+    with pytest.raises(InputError, match=r"nowhere://a/b\.zarr: Protocol not known: nowhere"):
+        stored(job_of(folder, "sweep"), "nowhere://a/b.zarr")
 
 
 def test_clusters_that_are_none(folder: Path) -> None:

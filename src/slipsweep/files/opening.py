@@ -87,8 +87,7 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
         if one.dtype.kind in "UST":
             table[name] = table[name].astype(object)
         kind = np.dtype(known.RESULT_DTYPES.get(str(name), "f8"))
-        if kind.kind == "i" and one.dtype != kind:
-            # another program has made other numbers of codes
+        if kind.kind == "i" and one.dtype != kind:  # another program has made other numbers of codes
             missing = 0 if name == "validity" else -1
             table[name] = table[name].fillna(missing).astype(kind)
     return table

@@ -57,7 +57,10 @@ class Chunks:
 
     def __post_init__(self) -> None:
         self.place = f"{os.fspath(self.path).rstrip('/')}.part"  # what an interrupted run leaves: a folder
-        self._files, self._folder = url_to_fs(self.place)
+        try:
+            self._files, self._folder = url_to_fs(self.place)
+        except (ImportError, ValueError) as error:  # the package that a protocol needs, or no protocol
+            raise InputError(f"{self.path}: {error}") from None
 
     @property
     def count(self) -> int:
