@@ -9,6 +9,7 @@ read whenever a run ends, and what is marked is there.  A compressed file is mad
 A store at an address (``s3://…``) is written where it is, and has the attribute `unfinished` meanwhile.
 """
 
+import itertools
 import json
 import math
 import os
@@ -30,7 +31,7 @@ from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
 from slipsweep.files.outputs import EXISTS, appear, writing
-from slipsweep.grid.chunks import AnyPlan, Chunk, cut, places
+from slipsweep.grid.chunks import AnyPlan, Chunk, places
 from slipsweep.grid.resources import size_text
 
 #: A file or folder, or the address of a store.
@@ -69,7 +70,10 @@ class Chunks:
 
     def __iter__(self) -> Iterator[tuple[int, Chunk]]:
         """Number and place of every chunk, one after the other: there may be more than memory holds."""
-        return enumerate(cut(self.job.plan.sizes, self.lengths))
+        starts = [range(0, size, self.lengths[dim]) for dim, size in self.job.plan.sizes.items()]
+        for number, corner in enumerate(itertools.product(*starts)):
+            ends = (min(at + own.step, own.stop) for at, own in zip(corner, starts, strict=True))
+            yield number, dict(zip(self.job.plan.sizes, map(slice, corner, ends), strict=True))
 
     @contextmanager
     def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
