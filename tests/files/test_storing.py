@@ -122,28 +122,26 @@ def test_a_file_in_chunks_is_compressed(folder: Path, monkeypatch: pytest.Monkey
         assert (one.validity.encoding["zlib"], one.validity.encoding["complevel"]) == (True, 4)
 
 
-@pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
+@pytest.mark.parametrize("output", ["a[1].nc", "a[1].zarr"])
 def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "CHUNK_CELLS", 6)
-    kind, path = (storing.ZarrChunks if output.endswith("zarr") else storing.NetcdfChunks), folder / output
-    write, seen = kind.write, []
+    path, mark, seen = folder / output, storing._mark, []
 
-    def failing(self: Any, number: int, arrays: Any) -> None:
+    def failing(place: str, number: int) -> None:
         if number == 3:
             raise OSError(28, "No space left on device")
-        seen.append(number)
-        write(self, number, arrays)
+        noting(place, number)
 
-    def noting(self: Any, number: int, arrays: Any) -> None:
+    def noting(place: str, number: int) -> None:
         seen.append(number)
-        write(self, number, arrays)
+        mark(place, number)
 
-    monkeypatch.setattr(kind, "write", failing)
+    monkeypatch.setattr(storing, "_mark", failing)
     with pytest.raises(RunError, match="No space") as failure:
         stored(job_of(folder, "sweep"), path)
     assert failure.value.__notes__ == [f"3 of 24 chunks are kept in {path}.part: --resume goes on"]
     assert not path.exists()
-    monkeypatch.setattr(kind, "write", noting)
+    monkeypatch.setattr(storing, "_mark", noting)
 
     with pytest.raises(
         InputError, match=r"part: has chunks of an interrupted run; give --resume to go on with them, or --ov"
@@ -155,7 +153,7 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
     with pytest.raises(InputError, match="another version of slipsweep"):
         stored(job_of(folder, "sweep"), path, resume=True)
     monkeypatch.undo()
-    monkeypatch.setattr(kind, "write", noting)
+    monkeypatch.setattr(storing, "_mark", noting)
 
     report = stored(job_of(folder, "sweep"), path, resume=True)  # with the chunks it was begun with
     assert sorted(seen) == list(range(24))
@@ -225,6 +223,8 @@ def test_a_store_at_an_address(folder: Path) -> None:
     xr.testing.assert_identical(without_time(read_result(address)), without_time(read_result(folder / "a.nc")))
     assert stored(job_of(folder, "sweep"), address, resume=True).found
     assert not list(Path().glob(".address*"))
+    with pytest.raises(InputError, match=r"nowhere://a/b\.zarr: Protocol not known: nowhere"):
+        stored(job_of(folder, "sweep"), "nowhere://a/b.zarr")
 
 
 def test_clusters_that_are_none(folder: Path) -> None:

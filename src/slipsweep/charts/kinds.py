@@ -15,7 +15,7 @@ from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
-from slipsweep.files.contents import values_text
+from slipsweep.files.opening import values_text
 from slipsweep.model.variables import PARAMETERS, REFERENCE
 
 Draw = Callable[[Result, Options], Figure]

@@ -15,21 +15,21 @@ TABLE = options.Panel("Table")
 @command("Read results", "slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
 def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = None, at: options.At = None) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
-    from slipsweep.files import contents, jobs, motions, opening, selection, storing
+    from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.resources import size_text
     from slipsweep.motion.records import Record
 
     table = opening.read_result(file)
     echo(f"{Path(file)}  {size_text(storing.nbytes_of(opening.place_of(file)))}")
-    echo("coordinates:", *(f"  {name:<23} {text}" for name, text in contents.coordinate_texts(table).items()))
-    echo("variables:", *(f"  {name:<23} {text}" for name, text in contents.variable_texts(table).items()))
+    echo("coordinates:", *(f"  {name:<23} {text}" for name, text in opening.coordinate_texts(table).items()))
+    echo("variables:", *(f"  {name:<23} {text}" for name, text in opening.variable_texts(table).items()))
     recorded = motions.read_embedded(table, Path(file))
     if isinstance(recorded, Record):
         echo(f"record: {recorded.summary()}")
-    if rows := contents.motions_text(table):
+    if rows := opening.motions_text(table):
         echo("motions, as recorded:", *(f"  {row}" for row in rows))
     try:
-        common.echo_tally(contents.tally_in(table))
+        common.echo_tally(opening.tally_in(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:

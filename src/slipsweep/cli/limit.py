@@ -58,7 +58,7 @@ def limit(
         place = opening.place_of(results[0])
         table = opening.read_result(common.run_job(job, place, large, overwrite=overwrite, quiet=quiet).path)
     else:
-        with checked.named(), common.progress_bar(job.plan.cells, quiet) as progress:
+        with spec.named(checked.source), common.progress_bar(job.plan.cells, quiet) as progress:
             table = job.plan.solve(progress)
     labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
     common.write_outputs(figures, overwrite, labelled)

@@ -56,7 +56,7 @@ def run(
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = opening.place_of(name or f"{sweep.stem}.nc")
     common.check_ending(Path(path), (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
-    job, sampling, passed = jobs.sweep_job(checked), checked.sampling, common.stopwatch()
+    passed, sampling, job = common.stopwatch(), checked.sampling, jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
     report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)
     if quiet:

@@ -4,7 +4,7 @@ import importlib
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,9 +15,8 @@ import xarray as xr
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, did_you_mean
-from slipsweep.files.contents import result_names, tally_in, values_text
 from slipsweep.files.netcdf import WITH_MISSING
-from slipsweep.files.opening import read_result
+from slipsweep.files.opening import read_result, result_names, tally_in, values_text
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
@@ -41,9 +40,6 @@ _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 #: Given how many rows there are, yields what to call with a number of rows just written.
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None] | None]]
 
-#: Writes a piece of a table; the first has the header.
-_Write = Callable[["Table", "pd.DataFrame", bool], None]
-
 
 def export(
     source: str | Path,
@@ -56,7 +52,6 @@ def export(
     rows: Sequence[str] = (),
     columns: str | None = None,
     overwrite: bool = False,
-    chunk_cells: int = CHUNK_CELLS,
     progress: Progress | None = None,
 ) -> int:
     """Write a result of slipsweep as a table, complete or not at all; return the number of rows, of all sheets.
@@ -64,7 +59,7 @@ def export(
     The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions that none of them
     has are left out.  Sliding modes and flags are codes or `words`, accelerations in m/s² or `in_g`, that of the model.
     `at` says which values to keep of an axis, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along
-    the columns of a pivoted table, `rows` are those along its rows.  So many cells are in memory at a time.
+    the columns of a pivoted table, `rows` are those along its rows.
 
     Raises
     ------
@@ -76,7 +71,29 @@ def export(
     check_outputs([path], overwrite, reads=[Path(source)])
     with read_result(source) as opened:
         whole = _in_g(opened) if in_g else opened
-        tables = _tables(whole, source, variables, words, at or {}, rows, columns)
+        known = [str(name) for name in whole.data_vars]
+        chosen = list(dict.fromkeys(result_names(whole) if variables is None else variables))
+        for name in chosen:
+            if name not in known:
+                raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, known)}')
+        widest = max((whole[name].dims for name in chosen), key=len)
+        dims = list(dict.fromkeys(str(dim) for name in chosen for dim in (*widest, *whole[name].dims)))
+        part = whole[chosen].isel(places_at(whole, source, at or {}, dims))
+        if columns is None:
+            if rows:
+                raise InputError(f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns")
+            tables = [Table(part, Path(str(source)).stem, words, dims)]
+        else:
+            along = _pivot_rows(part, source, dims, rows, columns)
+            flat = {dim: 0 for dim in dims if dim not in (*along, columns)}
+            tables = []
+            for name in chosen:
+                one = part[[name]].isel(flat, missing_dims="ignore")
+                if columns not in one.sizes:
+                    raise InputError(
+                        f"{source}: --columns {columns}: not an axis of {name}; choose others with --variable"
+                    )
+                tables.append(Table(one, name, words, [dim for dim in along if dim in one.sizes], columns))
         if path.suffix == ".xlsx":
             for table in tables:
                 table.check_size(source)
@@ -86,17 +103,12 @@ def export(
                 f"({', '.join(table.name for table in tables)}), or write .xlsx, which has a sheet for each"
             )
         total = sum(table.count for table in tables)
-        formats = {".csv": _csv, ".parquet": _parquet, ".xlsx": _workbook}
         with (
-            progress(total) if progress else nullcontext() as done,
+            progress(total) if progress else nullcontext() as told,
             complete_or_absent(path, overwrite) as temporary,
-            formats[path.suffix](temporary, tables, source) as write,
         ):
-            for table in tables:
-                for number, frame in enumerate(table.frames(chunk_cells)):
-                    write(table, frame, number == 0)
-                    if done is not None:
-                        done(len(frame))
+            write = {".csv": _write_csv, ".parquet": _write_parquet, ".xlsx": _write_workbook}[path.suffix]
+            write(temporary, tables, source, told or (lambda rows: None))
     return total
 
 
@@ -226,28 +238,8 @@ def _spelled(about: Mapping[str, Any], codes: Any) -> dict[Any, str]:
     return {code: known.get(int(code), str(code)) for code in codes}
 
 
-def _tables(
-    table: xr.Dataset,
-    source: object,
-    wanted: Sequence[str] | None,
-    words: bool,
-    at: Mapping[str, str],
-    rows: Sequence[str],
-    columns: str | None,
-) -> list[Table]:
-    """The tables that are wanted: a long one, or pivoted ones of a result each."""
-    known = [str(name) for name in table.data_vars]
-    chosen = list(dict.fromkeys(result_names(table) if wanted is None else wanted))
-    for name in chosen:
-        if name not in known:
-            raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, known)}')
-    widest = max((table[name].dims for name in chosen), key=len)
-    dims = list(dict.fromkeys(str(dim) for name in chosen for dim in (*widest, *table[name].dims)))
-    part = table[chosen].isel(places_at(table, source, at, dims))
-    if columns is None:
-        if rows:
-            raise InputError(f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns")
-        return [Table(part, Path(str(source)).stem, words, dims)]
+def _pivot_rows(part: xr.Dataset, source: object, dims: Sequence[str], rows: Sequence[str], columns: str) -> list[str]:
+    """The dimensions along the rows of a pivoted table (InputError: the axes are not those of such a table)."""
     for option, name in (*(("--rows", name) for name in rows), ("--columns", columns)):
         if name not in dims:
             raise InputError(f"{source}: {option} {name}: no such axis here; {did_you_mean(name, dims)}")
@@ -259,30 +251,25 @@ def _tables(
     if rows and wide:
         texts = ", ".join(f"{dim} ({part.sizes[dim]} values)" for dim in wide)
         raise InputError(f"{source}: neither in --rows nor in --columns: {texts}; take one value of it with --at")
-    along = list(rows) or wide
-    fixed = {dim: 0 for dim in dims if dim not in (*along, columns)}
-    return [Table(part[[name]].isel(fixed, missing_dims="ignore"), name, words, along, columns) for name in chosen]
+    return list(rows) or wide
 
 
 # --------------------------------------------------------------------------------- formats
 
 
-@contextmanager
-def _csv(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
+def _write_csv(path: Path, tables: list[Table], source: object, done: Callable[[int], None]) -> None:
+    (table,) = tables
     with path.open("w", encoding="utf-8", newline="") as file:
-
-        def write(table: Table, frame: "pd.DataFrame", is_first: bool) -> None:
+        for number, frame in enumerate(table.frames(CHUNK_CELLS)):
             for name in frame.select_dtypes(["object", "string"]):
                 frame[name] = frame[name].map(
                     lambda text: f"'{text}" if isinstance(text, str) and text.startswith(_FORMULAS) else text
                 )
-            frame.to_csv(file, index=False, header=is_first, lineterminator="\n")
+            frame.to_csv(file, index=False, header=number == 0, lineterminator="\n")
+            done(len(frame))
 
-        yield write
 
-
-@contextmanager
-def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
+def _write_parquet(path: Path, tables: list[Table], source: object, done: Callable[[int], None]) -> None:
     import pyarrow
     from pyarrow import parquet
 
@@ -294,33 +281,27 @@ def _parquet(path: Path, tables: list[Table], source: object) -> Iterator[_Write
     ]
     schema = pyarrow.schema(fields, {name: str(value) for name, value in table.part.attrs.items()})
     with parquet.ParquetWriter(path, schema) as writer:
-
-        def write(table: Table, frame: "pd.DataFrame", is_first: bool) -> None:
+        for frame in table.frames(CHUNK_CELLS):
             writer.write_table(pyarrow.Table.from_pandas(frame.rename(columns=str), schema, preserve_index=False))
+            done(len(frame))
 
-        yield write
 
-
-@contextmanager
-def _workbook(path: Path, tables: list[Table], source: object) -> Iterator[_Write]:
+def _write_workbook(path: Path, tables: list[Table], source: object, done: Callable[[int], None]) -> None:
     import pandas as pd
 
     # to memory: where a disk is full, zipfile of Python 3.13 would print a traceback besides the error
     options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True, "in_memory": True}
-    below: dict[str, int] = {}
     whole = io.BytesIO()
     with pd.ExcelWriter(whole, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
-
-        def write(table: Table, frame: pd.DataFrame, is_first: bool) -> None:
-            for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
-                frame[name] = frame[name].astype(str).astype(float)
-            start = below.get(table.name, 0)
-            frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=is_first, index=False)
-            below[table.name] = start + len(frame) + is_first
-
-        yield write
-        about = pd.DataFrame(_about(tables, source))
-        about.to_excel(book, sheet_name="about", header=False, index=False)
+        for table in tables:
+            start = 0
+            for frame in table.frames(CHUNK_CELLS):
+                for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
+                    frame[name] = frame[name].astype(str).astype(float)
+                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=start == 0, index=False)
+                start += len(frame) + (start == 0)
+                done(len(frame))
+        pd.DataFrame(_about(tables, source)).to_excel(book, sheet_name="about", header=False, index=False)
         book.sheets["about"].set_column(0, 1, 40)
     path.write_bytes(whole.getvalue())
 

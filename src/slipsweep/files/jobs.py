@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
-from slipsweep.files.spec import SweepSpec
+from slipsweep.files.spec import SweepSpec, named
 from slipsweep.grid.chunks import AnyPlan
 from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
 
@@ -27,16 +27,11 @@ class Job:
     """A sweep file, the plan that a command makes of it, and what the command's output says of itself."""
 
     spec: SweepSpec
-    make: Callable[[], AnyPlan]  # when it is needed
+    plan: AnyPlan
     title: str
     options: Mapping[str, Any]  # what the results depend on further to the sweep file, by what users know it by
     floats: str = "float64"  # data type of floating-point results in the file
     attrs: Mapping[str, str] = field(default_factory=dict)  # further attributes of the file
-
-    @cached_property
-    def plan(self) -> AnyPlan:
-        """What is to be solved."""
-        return self.make()
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -85,29 +80,22 @@ class Job:
 def sweep_job(spec: SweepSpec) -> Job:
     """The job of `slipsweep run`: a sweep, or the statistics of samples."""
     options = {"solver": repr(spec.solver)}
-    return Job(spec, spec.plan, spec.output.title, options, spec.output.dtype, {"sweep": spec.text})
+    return Job(spec, spec.plan(), spec.output.title, options, spec.output.dtype, {"sweep": spec.text})
 
 
 def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None) -> Job:
     """The job of `slipsweep limit`: amplitudes (m/s²) that displacements (m, increasing) allow, over all other axes."""
-    return Job(
-        spec,
-        lambda: _limits(spec, displacement, maximum_amplitude),
-        "Amplitudes at which a tolerable displacement is reached",
-        {"--displacement": displacement, "--maximum-amplitude": maximum_amplitude},
-    )
-
-
-def _limits(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None) -> AnyPlan:
     from slipsweep.studies.limits import plan_limits  # imports numba
 
-    with spec.named():
+    with named(spec.source):
         if spec.sampling is not None:
             raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
-        return plan_limits(
+        plan = plan_limits(
             displacement,
             spec.inputs.but(dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
             excitation=spec.excitation,
             model=spec.model,
             maximum_amplitude=maximum_amplitude,
         )
+    options = {"--displacement": displacement, "--maximum-amplitude": maximum_amplitude}
+    return Job(spec, plan, "Amplitudes at which a tolerable displacement is reached", options)

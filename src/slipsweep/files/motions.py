@@ -94,10 +94,9 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
         raise InputError(f"{_COUNT}, {_LABEL}: are not those of the {times.size} samples of its records")
     labels = columns.pop("label")
     records = []
-    for at, (end, count) in enumerate(zip(ends, counts, strict=True)):
-        own = slice(end - count, end)
+    for at, own in enumerate(zip(np.split(times, ends[:-1]), np.split(acceleration, ends[:-1]), strict=True)):
         attrs = {key: texts[at] for key, texts in columns.items() if texts[at]}
-        records.append(Record(times[own], acceleration[own], attrs.get("record", labels[at]), attrs))
+        records.append(Record(*own, attrs.get("record", labels[at]), attrs))
     name = str(file.attrs.get("suite", "suite"))
     if _COMPONENT not in file:
         return Suite(tuple(records), tuple(labels), name)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import netCDF4
 import numpy as np
@@ -31,8 +31,7 @@ def described(
     """Results as a file holds them: with labels of cases, the samples of the recorded motion, and global attributes."""
     found = table.copy()
     if labels:
-        about = {"long_name": "name of the case"}
-        found = found.assign_coords(label=xr.Variable(("case",), np.array(labels, object), about))
+        found = found.assign_coords(label=("case", np.array(labels, object), {"long_name": "name of the case"}))
     for name, one in dict(found.variables).items():
         if one.dtype.kind == "U":  # of any length
             found[name] = found[name].astype(object)
@@ -50,14 +49,6 @@ def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
     if dtype.kind == "f" and name not in RECORD_SAMPLES:
         return float("nan")
     return int(SlidingMode.MISSING) if name in WITH_MISSING else None
-
-
-@contextmanager
-def opened(path: Path, mode: Literal["r", "r+"] = "r") -> Iterator[netCDF4.Dataset]:
-    """A netCDF file with its values as they are stored."""
-    with netCDF4.Dataset(path, mode) as file:
-        file.set_auto_maskandscale(False)
-        yield file
 
 
 @contextmanager

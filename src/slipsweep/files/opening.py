@@ -1,5 +1,6 @@
-"""Results opened as datasets, whatever program has had them in hand since."""
+"""Results opened as datasets, whatever program has had them in hand since; what they hold, in words and counts."""
 
+import importlib.util
 import os
 from pathlib import Path
 from typing import Any
@@ -8,29 +9,32 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.errors import InputError
-from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
-from slipsweep.model.variables import (
-    LIMIT_RESULTS,
-    MOTION_COORDINATES,
-    PARAMETERS,
-    RECORD_RESULTS,
-    RESULT_DTYPES,
-    RESULTS,
-    STATISTICS,
-)
+from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
+from slipsweep.files.selection import units_text
+from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths, grid_chunks
+from slipsweep.grid.tally import Indices, Tally
+from slipsweep.model import variables as known
 
-#: Attributes that say how values are stored, not what they mean.
-_ENCODINGS = ("_FillValue", "missing_value")
+#: All that a command of slipsweep writes, but for the samples of records.
+_RESULTS = {**known.RECORD_RESULTS, **known.LIMIT_RESULTS, **known.HISTORY, **known.STATISTICS, **known.RESULTS}
+
+#: Columns of the table of motions: what stands above, by its coordinate.
+_MOTION_COLUMNS = {
+    "motion_samples": "samples",
+    "motion_interval": "interval (s)",
+    "motion_pga": "PGA (m/s2)",
+    "motion_pgv": "PGV (m/s)",
+    "motion_pgd": "PGD (m)",
+    "motion_arias_intensity": "Arias (m/s)",
+    "motion_cav": "CAV (m/s)",
+    "motion_significant_duration": "D5-95 (s)",
+    "motion_mean_period": "Tm (s)",
+}
 
 
-def is_address(text: str | os.PathLike[str]) -> bool:
-    """Whether a place is an address for fsspec (``s3://…``), and not a path."""
-    return "://" in os.fspath(text)
-
-
-def place_of(text: str) -> Path | str:
-    """An output as typed: a path, or the address of a store."""
-    return text if is_address(text) else Path(text)
+def place_of(text: str | os.PathLike[str]) -> Path | str:
+    """A result as typed: a path, or the address of a store for fsspec (``s3://…``)."""
+    return os.fspath(text) if "://" in os.fspath(text) else Path(text)
 
 
 def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -78,13 +82,12 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
     if not str(table.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in table.attrs:
         raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
     for name, one in dict(table.variables).items():
-        for key in _ENCODINGS:
+        for key in ("_FillValue", "missing_value"):  # how values are stored, not what they mean
             table[name].attrs.pop(key, None)
         if one.dtype.kind in "UST":
             table[name] = table[name].astype(object)
-        kind = np.dtype(RESULT_DTYPES.get(str(name), "f8"))
-        if kind.kind == "i" and one.dtype != kind:
-            # another program has made other numbers of codes
+        kind = np.dtype(known.RESULT_DTYPES.get(str(name), "f8"))
+        if kind.kind == "i" and one.dtype != kind:  # another program has made other numbers of codes
             missing = 0 if name == "validity" else -1
             table[name] = table[name].fillna(missing).astype(kind)
     return table
@@ -93,9 +96,9 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
 def _open(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a netCDF file or a Zarr store, its values decoded but for codes."""
     # codes stay whole numbers: a fill value would make them floating-point ones
-    codes = {name: False for name, dtype in RESULT_DTYPES.items() if np.dtype(dtype).kind == "i"}
-    place = Path(path)
-    if is_address(path) or (place / "zarr.json").is_file():
+    codes = {name: False for name, dtype in known.RESULT_DTYPES.items() if np.dtype(dtype).kind == "i"}
+    place = place_of(path)
+    if isinstance(place, str) or (place / "zarr.json").is_file():
         check_zarr(path)
         try:
             how: dict[str, Any] = {"mask_and_scale": codes, "decode_times": False, "consolidated": False}
@@ -104,7 +107,9 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
             raise InputError(f"{path}: cannot be read as a Zarr store: {_first_line(error)}") from None
         if "unfinished" in table.attrs:
             raise InputError(f"{path}: is not finished; run its sweep again with --resume")
-        return _in_order(table)
+        # a store has no order: slipsweep's own
+        order = dict.fromkeys((*known.PARAMETERS, *known.MOTION_COORDINATES, *_RESULTS, *table.variables))
+        return table[[name for name in order if name in table.variables]]
     if not place.exists():
         raise InputError(f"{path}: no such file")
     if not place.is_file():
@@ -117,22 +122,86 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"{path}: not a netCDF file, or a damaged one ({_first_line(error)})") from None
 
 
-def _in_order(table: xr.Dataset) -> xr.Dataset:
-    """Variables and coordinates in the order of slipsweep's own: a store has none."""
-    order = dict.fromkeys((*PARAMETERS, *MOTION_COORDINATES, *RECORD_RESULTS, *LIMIT_RESULTS, *STATISTICS, *RESULTS))
-    names = [name for name in (*order, *table.variables) if name in table.variables]
-    found = xr.Dataset({name: table[name].variable for name in dict.fromkeys(names)}, attrs=table.attrs)
-    return found.set_coords([name for name in found.variables if name in table.coords])
-
-
 def check_zarr(path: object) -> None:
     """Refuse a Zarr store where the packages are missing that read and write it."""
-    try:
-        import fsspec  # noqa: F401
-        import zarr  # noqa: F401
-    except ImportError:
-        raise InputError(f"{path}: Zarr stores need zarr and fsspec: pip install 'slipsweep[zarr]'") from None
+    if None in map(importlib.util.find_spec, ("zarr", "fsspec")):
+        raise InputError(f"{path}: Zarr stores need zarr and fsspec: pip install 'slipsweep[zarr]'")
 
 
 def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+# --------------------------------------------------------------------------------- contents
+
+
+def result_names(table: xr.Dataset) -> list[str]:
+    """Names of the results of a file: slipsweep's own, and those that lie along the same dimensions.
+
+    The samples of a record do not, nor do bounds of cells that another program added.
+    """
+    names = [str(name) for name in table.data_vars]
+    dims = {dim for name in [one for one in names if one in _RESULTS] or names for dim in table[name].dims}
+    dims -= {RECORD_DIM, SUITE_DIM}
+    return [name for name in names if dims.issuperset(table[name].dims)]
+
+
+def tally_in(table: xr.Dataset) -> Tally:
+    """Count modes, flags and ratios of a result, read in chunks (InputError: not of the same cells)."""
+    names = [name for name in ("sliding_mode", "validity") if name in table.data_vars]
+    if len({table[name].size for name in names}) > 1:
+        raise InputError("sliding_mode and validity are not of the same cells")
+    tally = Tally(max((table[name].size for name in names), default=0))
+    moved = ("permanent_displacement", "newmark_displacement")
+    if all(one in table.data_vars for one in moved) and table[moved[0]].sizes == table[moved[1]].sizes:
+        names += moved
+    widest: Any = max((table[name].sizes for name in names), key=len, default={})
+    for chunk in grid_chunks(widest, CHUNK_CELLS) if names else ():
+        tally.merge(Tally.of({name: table[name].isel(chunk, missing_dims="ignore").values for name in names}))
+    if {"sensitivity_status", "first_order_index", "total_index"} <= {*table.data_vars} and "input" in table.coords:
+        order = [*table["sensitivity_status"].dims, "input"]
+        first, total = (table[name].transpose(*order).values for name in ("first_order_index", "total_index"))
+        inputs = [str(one) for one in table["input"].values]
+        tally.indices = Indices.counted(inputs, first, total, table["sensitivity_status"].values)
+    return tally
+
+
+def coordinate_texts(table: xr.Dataset) -> dict[str, str]:
+    """The coordinates in words, but for what the table of motions says."""
+    suite = bool(motions_text(table))
+    return {
+        str(name): f"{one.size} motions" if suite and name == "motion" else values_text(one)
+        for name, one in table.coords.items()
+        if not (suite and name in known.MOTION_COORDINATES and one.dims == ("motion",))
+    }
+
+
+def values_text(values: xr.DataArray) -> str:
+    """The values of a coordinate in words."""
+    if values.dtype.kind in "OUST":
+        return ", ".join(map(str, values.values.ravel()))
+    there = values.values[np.isfinite(values.values)]
+    if values.size == 1 == there.size:
+        return f"{there.min():.6g}{units_text(values)}"
+    ends = f", {there.min():.6g} to {there.max():.6g}{units_text(values)}" if there.size else ""
+    missing = f", {values.size - there.size} missing" if there.size < values.size else ""
+    return f"{values.size} values{ends}{missing}"
+
+
+def variable_texts(table: xr.Dataset) -> dict[str, str]:
+    """The variables in words."""
+    return {
+        str(name): f"{one.attrs.get('long_name', '')}{units_text(one, ', ')} "
+        f"({'text' if one.dtype.kind in 'OUST' else one.dtype})".lstrip(", ")
+        for name, one in table.data_vars.items()
+        if one.dims != (SUITE_DIM,)
+    }
+
+
+def motions_text(table: xr.Dataset) -> tuple[str, ...]:
+    """The motions of a suite as a table, a header and a line each; empty without them."""
+    if "motion" not in table.coords or table["motion"].dims != ("motion",) or table["motion"].dtype.kind not in "OUST":
+        return ()
+    names = [name for name in _MOTION_COLUMNS if name in table.coords and table[name].dims == ("motion",)]
+    rows = table[names].to_dataframe()[names].rename(columns=_MOTION_COLUMNS).rename_axis(columns="motion", index=None)
+    return tuple(rows.to_string(float_format="{:.4g}".format, na_rep="").splitlines())

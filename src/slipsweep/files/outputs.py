@@ -14,18 +14,15 @@ from pathlib import Path
 from slipsweep.errors import InputError, RunError
 from slipsweep.grid.resources import size_text
 
-#: What a command reads: a file, or 0, standard input.
-Read = Path | int
-
 #: How an output that is there is refused.
 EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
 
 
-def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Read]) -> None:
+def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Path | int]) -> None:
     """Refuse outputs of a command that cannot be written, may not be replaced, or are what it `reads` (InputError).
 
-    Every command that writes comes here before it computes anything.  Files are compared, not their names: a link is
-    what it points to.
+    Every command that writes comes here before it computes anything.  What it reads are files, or 0, standard input.
+    Files are compared, not their names: a link is what it points to.
     """
     for path in paths:
         try:

@@ -1,28 +1,52 @@
-"""A run: the chunks of a job solved, here or by workers, and written while others are computed."""
+"""A run: the chunks of a job computed and written, here or by the workers of dask.distributed.
 
+A worker that is lost costs its chunks once more: distributed computes them again on another.
+"""
+
+import importlib
+import importlib.util
+import itertools
+import logging
 import math
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+import signal
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from slipsweep.errors import InputError
-from slipsweep.files import cluster, netcdf
+from slipsweep._version import __version__
+from slipsweep.errors import InputError, RunError
+from slipsweep.files import netcdf
 from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
-from slipsweep.files.storing import Chunks, NetcdfChunks, Place, ZarrChunks
+from slipsweep.files.spec import named
+from slipsweep.files.storing import NetcdfChunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, AnyPlan, chunk_lengths, grid_chunks
 from slipsweep.grid.resources import size_text
 from slipsweep.grid.tally import Tally
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 #: Resident memory of a run, and of a worker of this machine, beside its chunks.
 _BASE_MEMORY, _WORKER_MEMORY = 430_000_000, 250_000_000
 
 #: Chunks for each worker, so that all end at about the same time, and the least work of one, in cells of a sine.
 _CHUNKS_A_WORKER, _LEAST_WORK = 16, 500_000
+
+#: Most processes that `--workers` starts on one machine.
+_MOST_WORKERS = 1024
+
+#: Chunks that are on the workers at a time, for each of their threads: one is solved while another comes back.
+_AHEAD = 2
+
+#: Seconds between two looks for workers, and for which there may be none.
+_LOOK, _PATIENCE = 5.0, 60.0
 
 
 @dataclass(frozen=True)
@@ -61,7 +85,12 @@ def run(
     RunError
         Writing failed, or another run is writing `path`.  A note tells how many chunks are kept.
     """
-    cluster.check_cluster(workers, scheduler)
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers, --scheduler: give one of them, not both")
+    if workers is not None and not 1 <= workers <= _MOST_WORKERS:
+        raise InputError(f"--workers = {workers}: must be from 1 to {_MOST_WORKERS}")
+    if (workers or scheduler) and importlib.util.find_spec("distributed") is None:
+        raise InputError("--workers, --scheduler: need the package distributed: pip install 'slipsweep[cluster]'")
     plan = job.plan
     if isinstance(path, Path):
         check_outputs([path], overwrite or resume, reads=job.spec.files)
@@ -71,24 +100,25 @@ def run(
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, memory, processes, workers or 0), plan.together)
     is_zarr = isinstance(path, str) or path.suffix == ".zarr"
     chunks = (ZarrChunks if is_zarr else NetcdfChunks)(job, path, lengths)
-    if math.prod(chunks.shape) == 1 and not is_zarr and not processes and not Path(chunks.place).exists():
-        with job.spec.named():
+    if chunks.count == 1 and not is_zarr and not processes and not Path(chunks.place).exists():
+        with named(job.spec.source):
             table = plan.solve(progress)
         with complete_or_absent(Path(path), overwrite) as temporary:
             netcdf.write_table(job.described(table, command), temporary, job.spec.output.compression)
         return Report(path, tally_of(table, plan))
-
-    def tell(number: int) -> None:
-        if progress is not None:
-            progress(plan.part(chunks.chunk(number)).cells)
-
-    with chunks.begun(command, resume, overwrite), job.spec.named():
-        for number in chunks.done:
-            tell(number)
+    with chunks.begun(command, resume, overwrite), named(job.spec.source), ExitStack() as stack:
+        kept = ((place, None) for place in chunks if place[0] in chunks.done)
+        tasks = ((place, chunks.task(*place)) for place in chunks if place[0] not in chunks.done)
         if processes:
-            _solve_elsewhere(chunks, workers, scheduler, tell)
+            computed = _computed(stack.enter_context(_connected(workers, scheduler)), tasks)
         else:
-            _solve_here(chunks, tell)
+            computed = ((place, task()) for place, task in tasks)
+        for (number, chunk), results in itertools.chain(kept, computed):
+            if results is not None:
+                chunks.write(number, chunk, results)
+            del results  # before the next is solved
+            if progress is not None:
+                progress(plan.part(chunk).cells)
         chunks.finish(overwrite)
         return Report(path, tally_of(read_result(path), plan))
 
@@ -133,7 +163,7 @@ def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int
         one.dtype.itemsize * math.prod(size for dim, size in one.sizes.items() if dim not in plan.sizes)
         for one in plan.template().data_vars.values()
     )
-    # in this process one chunk is solved and one is written; a worker has one, and others are on their way
+    # in this process a chunk and its copies while it is written; a worker has one, and others are on their way
     cell = (2 + 3 * workers) * results + plan.cell_memory + 8
     within = (memory - base) // cell
     if within < 1000:
@@ -141,29 +171,83 @@ def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int
     return int(min(within, cells) if plan.cost > 1.0 or processes else within)
 
 
-def _solve_here(chunks: Chunks, progress: Callable[[int], None]) -> None:
-    """Compute the chunks that are missing; one thread writes each while the next is computed."""
-    solved = chunks.solved
-    with ThreadPoolExecutor(1) as writer:
-        waiting: Future[None] | None = None
-        for number, index in chunks.missing():
-            found = solved.blocks[index].compute(scheduler="synchronous").item()
-            if waiting is not None:
-                waiting.result()
-            waiting = writer.submit(chunks.write, number, found)
-            progress(number)
-        if waiting is not None:
-            waiting.result()
+@contextmanager
+def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]":
+    """Start so many processes on this machine, of one thread each, or connect to a scheduler (RunError)."""
+    from distributed import Client, LocalCluster
+    from distributed.utils import silence_logging_cmgr
+
+    # what it logs about lost workers is no news here: the run goes on, or ends with one message
+    with silence_logging_cmgr(logging.CRITICAL):
+        if scheduler is None:
+            with (
+                LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",
+                    preload=[__name__],  # calls `dask_setup`
+                    memory_limit=0,  # chunks are sized to fit: no worker is to be paused or killed over them
+                    silence_logs=logging.CRITICAL,
+                ) as local,
+                Client(local) as client,
+            ):
+                yield client
+            return
+        try:
+            client = Client(scheduler, timeout=10.0)
+        except (OSError, ValueError) as error:
+            raise RunError(f'--scheduler = "{scheduler}": no scheduler answers there: {error}') from None
+        try:
+            _check_versions(client, scheduler)
+            yield client
+        finally:
+            with suppress(OSError, TimeoutError):  # the scheduler may be gone
+                client.close(timeout=10.0)
 
 
-def _solve_elsewhere(
-    chunks: Chunks, workers: int | None, scheduler: str | None, progress: Callable[[int], None]
-) -> None:
-    """Have the chunks that are missing computed by workers, and written by them or here as they come back."""
-    written = chunks.written
-    with cluster.connected(workers, scheduler) as client:
-        blocks = ((number, written.blocks[index]) for number, index in chunks.missing())
-        for number, found in cluster.computed(client, blocks):
-            if found.dtype == object:  # results, which a worker has not written
-                chunks.write(number, found.item())
-            progress(number)
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C, which a terminal sends to all processes, to the one that closes the cluster; dask calls this."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _check_versions(client: "Client", scheduler: str) -> None:
+    """Refuse workers that would compute something else."""
+    try:
+        client.wait_for_workers(1, timeout=_PATIENCE)
+    except TimeoutError:
+        message = f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
+        raise RunError(message) from None
+    # the lambda is sent as code: workers need not have this module
+    versions = client.run(lambda: importlib.import_module("slipsweep._version").__version__, on_error="return")
+    for worker, found in versions.items():
+        if found != __version__:
+            raise RunError(f"slipsweep at the worker {worker}: {found}, in this process: {__version__}")
+
+
+def _computed(client: "Client", tasks: Iterable[tuple[Any, Callable[[], Any]]]) -> Iterator[tuple[Any, Any]]:
+    """Carry out tasks, each given with its name, and yield what they return as it comes back (RunError: none does)."""
+    from distributed import CancelledError, KilledWorker, wait
+
+    names: dict[Any, Any] = {}
+    left, seen = iter(tasks), time.monotonic()
+    while True:
+        try:
+            threads = sum(client.ncores().values())
+            for name, task in itertools.islice(left, max(_AHEAD * max(threads, 1) - len(names), 0)):
+                names[client.submit(task, pure=False)] = name
+            if not names:
+                return
+            for future in wait(list(names), timeout=_LOOK, return_when="FIRST_COMPLETED").done:
+                yield names.pop(future), future.result()
+            seen = time.monotonic()
+        except TimeoutError:
+            if threads:
+                seen = time.monotonic()
+            if time.monotonic() - seen > _PATIENCE:
+                raise RunError(f"there has been no worker for {_PATIENCE:.0f} s") from None
+        except KilledWorker as error:
+            message = f"a chunk was lost with several workers in turn ({error}): do they run out of memory?"
+            raise RunError(message) from None
+        except (CancelledError, OSError) as error:
+            raise RunError(f"the scheduler was lost: {error}") from None

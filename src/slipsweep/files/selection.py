@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,12 @@ def axis_values(data: xr.Dataset, dim: str) -> list[Any]:
     return labels or (data[dim].values.tolist() if dim in data.coords else list(range(1, data.sizes[dim] + 1)))
 
 
+def units_text(one: xr.DataArray, before: str = " ") -> str:
+    """What stands behind a number: its unit, if that is not 1."""
+    units = one.attrs.get("units", "1")
+    return "" if units == "1" else f"{before}{units}"
+
+
 def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[str, list[Place]]:
     """Find values on the axes of a result, called `where` in errors.
 
@@ -84,9 +91,8 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
         if name in data.sizes:
             found[name] = places
         elif any(place.index is None for place in places):
-            raise InputError(
-                f"{where}: {name} = {cut}: is {data[name].item():.6g}{_unit(data, name)} in the whole result"
-            )
+            whole = f"{data[name].item():.6g}{units_text(data[name])}"
+            raise InputError(f"{where}: {name} = {cut}: is {whole} in the whole result")
     return found
 
 
@@ -133,7 +139,7 @@ def between(data: xr.Dataset, name: str, value: float) -> str:
     above = int(np.clip(np.searchsorted(values, value), 1, values.size - 1))
     return (
         f"{name} = {value:.6g}: not among the values of the result; "
-        f"its neighbours are {values[above - 1]:.6g} and {values[above]:.6g}{_unit(data, name)}"
+        f"its neighbours are {values[above - 1]:.6g} and {values[above]:.6g}{units_text(data[name])}"
     )
 
 
@@ -146,16 +152,14 @@ def _place(data: xr.Dataset, key: str, name: str, given: float | str, labels: li
     if labels and not text.isdecimal():
         raise InputError(f"{key} = {text}: must be a number or one of {', '.join(labels)}")
     values = axis_numbers(data, name) if name in data.sizes else np.atleast_1d(data[name].values)
-    units = str(data[name].attrs.get("units", "1")) if name in data.variables else "1"
+    units = str(data[name].attrs.get("units", "1"))
     g = float(data.attrs.get("g", math.nan))
     number = quantity(key, text, units, g) if isinstance(given, str) else float(given)
     slack = _SAME * float(np.abs(values).max())
     if isinstance(given, str):
-        mantissa, exponent, unit = re.findall(r"^\s*[-+]?([\d.]+)(?:[eE]([-+]?\d+))?\s*(.*?)\s*$", text)[0]
-        digits = max(_DIGITS, len(mantissa.replace(".", "").lstrip("0")))
-        typed = abs(float(f"{mantissa}e{exponent or 0}"))
-        if typed:
-            last = 10.0 ** (math.floor(math.log10(typed)) + 1 - digits)
+        written, unit = re.findall(r"^\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*$", text)[0]
+        if typed := Decimal(written):
+            last = 10.0 ** (typed.adjusted() + 1 - max(_DIGITS, len(typed.as_tuple().digits)))
             slack = max(slack, 0.5 * last * conversion(key, units, unit or None, g))
     nearest = int(np.argmin(np.abs(values - number)))
     if abs(values[nearest] - number) <= slack:
@@ -163,10 +167,5 @@ def _place(data: xr.Dataset, key: str, name: str, given: float | str, labels: li
     low, high = values.min(), values.max()
     if not low <= number <= high:
         there = f"{low:.6g} to {high:.6g}" if values.size > 1 else f"{low:.6g}"
-        raise InputError(f"{key} = {text}: outside the range of the result, {there}{_unit(data, name)}")
+        raise InputError(f"{key} = {text}: outside the range of the result, {there}{units_text(data[name])}")
     return Place(number, None)
-
-
-def _unit(data: xr.Dataset, name: str) -> str:
-    units = str(data[name].attrs.get("units", "1")) if name in data.variables else "1"
-    return "" if units == "1" else f" {units}"

@@ -5,9 +5,9 @@ that take the values know what they may be.  A refusal is an `InputError`, ``FIL
 """
 
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,18 @@ _MODEL_PARAMETERS = (
 #: Keys of [excitation] that go with recorded motions.
 _RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in choices.declared(reading.Reading)), "polarity")
 
+
+@dataclass(frozen=True)
+class Output:
+    """Where the result goes and what it holds: the table [output]; `variables` None: those of the kind of sweep."""
+
+    path: str | None = None
+    title: str = "Permanent displacement of a rigid block on a shaken inclined plane"
+    variables: list[str] | None = None
+    dtype: str = "float64"
+    compression: int = 0
+
+
 #: The keys of each table, and their defaults where these are not declared elsewhere; None: there is none.
 KEYS: dict[str, dict[str, Any]] = {
     "axes": dict.fromkeys(_INPUTS),
@@ -49,13 +61,7 @@ KEYS: dict[str, dict[str, Any]] = {
     | dict.fromkeys((*WAVEFORMS.options, *_RECORD_KEYS))
     | {"polarity": 1},
     "solver": {options.SOLVERS.key: options.SOLVERS.default} | dict.fromkeys(options.SOLVERS.options),
-    "output": {
-        "path": None,
-        "title": "Permanent displacement of a rigid block on a shaken inclined plane",
-        "variables": list(variables.DEFAULT_RESULTS),
-        "dtype": "float64",
-        "compression": 0,
-    },
+    "output": asdict(Output()) | {"variables": list(variables.DEFAULT_RESULTS)},
     "uncertainty": {
         "samples": 4096,
         "method": "sobol",
@@ -82,17 +88,6 @@ _Table = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Output:
-    """Where the result goes and what it holds: the table [output]; `variables` None: those of the kind of sweep."""
-
-    path: str | None
-    title: str
-    variables: list[str] | None
-    dtype: str
-    compression: int
-
-
-@dataclass(frozen=True)
 class SweepSpec:
     """A checked sweep: its grid, its options and the text it came from."""
 
@@ -112,15 +107,11 @@ class SweepSpec:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
-    def named(self) -> AbstractContextManager[None]:
-        """Name the file in front of what is not allowed."""
-        return _named(self.source)
-
     def plan(self) -> "AnyPlan":
         """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
         chosen: dict[str, Any] = {"excitation": self.excitation, "model": self.model, "solver": self.solver}
         # these import numba, and scipy: not for sweeps that are only looked at
-        with self.named():
+        with named(self.source):
             if self.sampling is None:
                 from slipsweep.grid.plans import plan_sweep
 
@@ -161,13 +152,12 @@ def is_stream(path: Path) -> bool:
 
 def _load_result(path: Path) -> SweepSpec:
     with opening.read_result(path) as file:
-        attributes = file.attrs
-        recorded = motions.read_embedded(file, path)
+        attributes, recorded = file.attrs, motions.read_embedded(file, path)
     if "sweep" not in attributes:
         raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
     spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
-    with spec.named():
+    with named(str(path)):
         return replace(spec, solver=options.SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
 
 
@@ -181,11 +171,10 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Recorded
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also of integers too long to convert, and of deep nesting
         raise InputError(f"{source}: not valid TOML: {error}") from None
-    with _named(source):
-        tables = {
-            name: dict(_known(name, content.get(name, {}))) for name in KEYS if name not in ("axes.NAME", "cases")
-        }
-        _refuse_unknown("", content, (*tables, "cases"))
+    with named(source):
+        names = [name for name in KEYS if name not in ("axes.NAME", "cases")]
+        tables = {name: dict(_known(name, content.get(name, {}), KEYS[name])) for name in names}
+        _known("", content, (*names, "cases"))
         numbers = {name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]}
         if numbers.get("yield_acceleration") == "coulomb":
             del numbers["yield_acceleration"]
@@ -218,7 +207,8 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Recorded
 
 
 @contextmanager
-def _named(source: str) -> Iterator[None]:
+def named(source: str) -> Iterator[None]:
+    """Name the sweep file in front of what is not allowed."""
     try:
         yield
     except InputError as error:
@@ -226,18 +216,14 @@ def _named(source: str) -> Iterator[None]:
         raise
 
 
-def _known(key: str, table: Any, keys: str | None = None) -> _Table:
-    """A table that has known keys only."""
+def _known(key: str, table: Any, keys: Collection[str]) -> _Table:
+    """A table that has these keys only."""
     if not isinstance(table, dict):
         raise InputError(f"{key} = {units.show(table)}: must be a table")
-    _refuse_unknown(f"{key}.", table, tuple(KEYS[keys or key]))
-    return table
-
-
-def _refuse_unknown(before: str, table: _Table, known: tuple[str, ...]) -> None:
     for name in table:
-        if name not in known:
-            raise InputError(f"{before}{name}: unknown key; {did_you_mean(name, known)}")
+        if name not in keys:
+            raise InputError(f"{key}{'.' if key else ''}{name}: unknown key; {did_you_mean(name, tuple(keys))}")
+    return table
 
 
 def _chosen(family: choices.Family[Any], table: _Table) -> Any:
@@ -246,13 +232,11 @@ def _chosen(family: choices.Family[Any], table: _Table) -> Any:
     return family.made(table.get(family.key, family.default), given, lambda text: f"{family.keyword}.{text}")
 
 
-def _sampling(table: _Table, g: float) -> "Sampling":
+def _sampling(table: dict[str, Any], g: float) -> "Sampling":
     from slipsweep.studies.sampling import Sampling  # imports scipy: only for sweeps that need it
 
-    settings = {
-        name: table.get(name, default) for name, default in KEYS["uncertainty"].items() if name not in variables.DRAWN
-    }
     drawn = {name: value for name, value in table.items() if name in variables.DRAWN}
+    settings = {name: value for name, value in (KEYS["uncertainty"] | table).items() if name not in variables.DRAWN}
     return Sampling(drawn, **settings, g=g, keys="uncertainty.")
 
 
@@ -291,8 +275,8 @@ def _recorded_motion(key: str, tables: Mapping[str, _Table], folder: Path, recor
         return suites.suite_in(folder, table["records"], table.get("pairs"), how)
     except InputError as error:
         message = str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
-        named = message.startswith((key, *_RECORD_KEYS))
-        error.args = (f"excitation.{message}" if named else f"excitation.{key}: {message}",)
+        names_key = message.startswith((key, *_RECORD_KEYS))
+        error.args = (f"excitation.{message}" if names_key else f"excitation.{key}: {message}",)
         raise
 
 
@@ -300,23 +284,22 @@ def _cases(rows: Any) -> list[dict[str, Any]]:
     """The rows of [[cases]], which all give the same parameters."""
     if not isinstance(rows, list) or not rows:
         raise InputError(f"cases = {units.show(rows)}: must be one table [[cases]] at least")
-    columns = [name for name in _known("cases[row 1]", rows[0], "cases") if name != "label"]
+    columns = [name for name in _known("cases[row 1]", rows[0], KEYS["cases"]) if name != "label"]
     if not columns:
         raise InputError("cases[row 1]: must give at least one parameter")
     found = []
     for number, row in enumerate(rows, 1):
         key = f"cases[row {number}]"
-        for name in {*columns} ^ {*_known(key, row, "cases")} - {"label"}:
+        for name in {*columns} ^ {*_known(key, row, KEYS["cases"])} - {"label"}:
             raise InputError(f"{key}.{name}: every row must give what row 1 gives: {', '.join(columns)}")
-        values = {name: parameters.check_single(name, row[name], f"{key}.{name}") for name in columns}
-        found.append(values | {name: row[name] for name in row if name == "label"})
+        found.append(row | {name: parameters.check_single(name, row[name], f"{key}.{name}") for name in columns})
     return found
 
 
 def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
     """An axis as an array in the parameter's own units."""
     key = f"axes.{name}"
-    table = _known(key, given, "axes.NAME")
+    table = _known(key, given, KEYS["axes.NAME"])
     if "values" in table:
         for other in table:
             if other not in ("values", "units"):
@@ -360,7 +343,7 @@ def _output(table: _Table, has_statistics: bool) -> Output:
     for name in ("path", "title"):
         if not isinstance(table.get(name, ""), str):
             raise InputError(f"output.{name} = {units.show(table[name])}: must be a text")
-    found = {**KEYS["output"], "variables": None, **table}
-    parameters.check_choice("output.dtype", found["dtype"], ("float64", "float32"))
-    parameters.check_whole("output.compression", found["compression"], 0, 9)
-    return Output(**found)
+    found = Output(**table)
+    parameters.check_choice("output.dtype", found.dtype, ("float64", "float32"))
+    parameters.check_whole("output.compression", found.compression, 0, 9)
+    return found

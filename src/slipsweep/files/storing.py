@@ -1,23 +1,23 @@
 """Where a chunk is written, and how a run goes on after an interruption.
 
-The chunks of a run, elements of the dask array that `grid.chunks.solved_chunks` makes of its plan, are written while
-others are computed, each once: to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
-there (in a netCDF file: on the disk itself), an empty file ``000012.chunk`` beside them says so; `identity.json` says
-what they are chunks of.
+Each chunk of a run is written once, to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
+there (in a netCDF file: on the disk itself), an empty file ``000012.chunk`` beside it says so; `identity.json` says
+what the chunks are of.
 
 The netCDF file is made with all but the values of its results.  Chunks change nothing else in it, so that it can be
 read whenever a run ends, and what is marked is there.  A compressed file is made of it at the end.
 A store at an address (``s3://…``) is written where it is, and has the attribute `unfinished` meanwhile.
 """
 
+import itertools
 import json
 import math
 import os
 import shutil
-from collections.abc import Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,21 +25,17 @@ import netCDF4
 import numpy as np
 import xarray as xr
 from fsspec.core import url_to_fs
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
 from slipsweep.files.outputs import EXISTS, appear, writing
-from slipsweep.grid.chunks import Chunk, chunk_at, places, solved_chunks
+from slipsweep.grid.chunks import AnyPlan, Chunk, places
 from slipsweep.grid.resources import size_text
 
 #: A file or folder, or the address of a store.
 Place = Path | str
-
-#: The results of a chunk, by name.
-Arrays = Mapping[str, NDArray[Any]]
 
 #: Most cells of a chunk of a Zarr store within one of the run's, which is a shard of the store.
 _ZARR_CELLS = 500_000
@@ -59,36 +55,25 @@ class Chunks:
     path: Place
     lengths: dict[str, int]  # of a chunk, along each dimension of the grid
     done: set[int] = field(default_factory=set)  # what an interrupted run has left
-    marks: list[Future[None]] = field(default_factory=list)  # of chunks that are on their way to the disk
+
+    def __post_init__(self) -> None:
+        self.place = f"{os.fspath(self.path).rstrip('/')}.part"  # what an interrupted run leaves: a folder
+        try:
+            self._files, self._folder = url_to_fs(self.place)
+        except (ImportError, ValueError) as error:  # the package that a protocol needs, or no protocol
+            raise InputError(f"{self.path}: {error}") from None
 
     @property
-    def place(self) -> str:
-        """The folder, or its address, that an interrupted run leaves."""
-        return f"{os.fspath(self.path).rstrip('/')}.part"
+    def count(self) -> int:
+        """How many chunks there are."""
+        return math.prod(math.ceil(size / self.lengths[dim]) for dim, size in self.job.plan.sizes.items())
 
-    @property
-    def cut(self) -> dict[str, tuple[int, ...]]:
-        """Lengths of all chunks along each dimension."""
-        edges = {dim: [*range(0, size, self.lengths[dim]), size] for dim, size in self.job.plan.sizes.items()}
-        return {dim: tuple(np.diff(own).tolist()) for dim, own in edges.items()}
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """How many chunks there are along each dimension."""
-        return tuple(len(own) for own in self.cut.values())
-
-    @property
-    def solved(self) -> Any:
-        """The dask array of the results of all chunks."""
-        return solved_chunks(self.job.plan, self.cut)
-
-    def missing(self) -> Iterator[tuple[int, tuple[int, ...]]]:
-        """Number and index of every chunk to compute; one after the other: there may be more than memory holds."""
-        return ((number, index) for number, index in enumerate(np.ndindex(*self.shape)) if number not in self.done)
-
-    def chunk(self, number: int) -> Chunk:
-        """Where a chunk lies in the grid."""
-        return chunk_at(self.cut, tuple(map(int, np.unravel_index(number, self.shape))))
+    def __iter__(self) -> Iterator[tuple[int, Chunk]]:
+        """Number and place of every chunk, one after the other: there may be more than memory holds."""
+        starts = [range(0, size, self.lengths[dim]) for dim, size in self.job.plan.sizes.items()]
+        for number, corner in enumerate(itertools.product(*starts)):
+            ends = (min(at + own.step, own.stop) for at, own in zip(corner, starts, strict=True))
+            yield number, dict(zip(self.job.plan.sizes, map(slice, corner, ends), strict=True))
 
     @contextmanager
     def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
@@ -103,12 +88,11 @@ class Chunks:
                 with writing(self.path):
                     yield
             except BaseException as error:
-                if kept := len(self._finished()):
-                    note = f"{kept} of {math.prod(self.shape)} chunks are kept in {self.place}: --resume goes on"
-                else:
-                    note = "nothing written"
+                kept = len(self._finished())
+                if not kept:
                     self._clear()
-                error.add_note(note)
+                note = f"{kept} of {self.count} chunks are kept in {self.place}: --resume goes on"
+                error.add_note(note if kept else "nothing written")
                 raise
 
     @contextmanager
@@ -135,20 +119,24 @@ class Chunks:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def _begin(self, command: str, resume: bool, overwrite: bool) -> None:
-        files, folder = url_to_fs(self.place)
         state = None
         with suppress(OSError, ValueError):
-            state = json.loads(files.cat_file(f"{folder}/identity.json"))
+            state = json.loads(self._files.cat_file(f"{self._folder}/identity.json"))
         if state is None or overwrite:
             self._clear()
-            self._check_space()
-            if isinstance(self.path, str) and not overwrite and files.exists(f"{self.path.rstrip('/')}/zarr.json"):
+            if isinstance(self.path, Path):
+                needed, free = self.job.outline("").nbytes, shutil.disk_usage(self.path.parent).free
+                # a store is compressed, nobody knows how much
+                if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
+                    sizes = f"takes {size_text(needed)}, but {size_text(free)} are free on the disk"
+                    raise InputError(f"{self.path}: {sizes}")
+            if not overwrite and self._files.exists(f"{self.place.removesuffix('.part')}/zarr.json"):
                 raise InputError(EXISTS.format(path=self.path))
             with writing(self.path):
-                files.makedirs(folder, exist_ok=True)
+                self._files.makedirs(self._folder, exist_ok=True)
                 self.make(command)
                 state = {"identity": self.job.identity, "lengths": self.lengths}
-                files.pipe_file(f"{folder}/identity.json", json.dumps(state).encode())
+                self._files.pipe_file(f"{self._folder}/identity.json", json.dumps(state).encode())
             return
         others = [name for name, value in self.job.identity.items() if state["identity"].get(name) != value]
         fault = ""
@@ -165,45 +153,46 @@ class Chunks:
 
     def _finished(self) -> set[int]:
         """Numbers of the chunks that are there."""
-        wait(self.marks)
-        files, folder = url_to_fs(self.place)
-        return {int(Path(one).stem) for one in files.glob(f"{folder}/*.chunk")}
+        return {int(Path(one).stem) for one in self._left() if one.endswith(".chunk")}
 
     def _clear(self) -> None:
         """Remove what an earlier run has left; the lock stays."""
-        files, folder = url_to_fs(self.place)
-        for one in files.ls(folder, detail=False) if files.exists(folder) else ():
+        for one in self._left():
             if not one.endswith("/lock"):
-                files.rm(one, recursive=True)
+                self._files.rm(one, recursive=True)
 
-    def _check_space(self) -> None:
-        """Refuse what the disk has no room for."""
-        if isinstance(self.path, Path):
-            needed, free = self.job.outline("").nbytes, shutil.disk_usage(self.path.parent).free
-            # a store is compressed, nobody knows how much
-            if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
-                raise InputError(f"{self.path}: takes {size_text(needed)}, but {size_text(free)} are free on the disk")
+    def _left(self) -> list[str]:
+        self._files.invalidate_cache()  # workers write there as well
+        return list(self._files.ls(self._folder, detail=False)) if self._files.exists(self._folder) else []
 
     def make(self, command: str) -> None:
         """Make the file or store that chunks are written to."""
 
-    @property
-    def written(self) -> Any:
-        """As `solved`, or with a dask array that writes chunks where they are computed."""
-        return self.solved
+    def task(self, number: int, chunk: Chunk) -> Callable[[], xr.Dataset | None]:
+        """What computes a chunk, here or in a worker: it returns the results, unless it has written them itself."""
+        return partial(_solved, self.job.plan, self.job.dtypes, chunk)
 
-    def write(self, number: int, arrays: Arrays) -> None:
-        """Write a chunk, then its mark."""
+    def write(self, number: int, chunk: Chunk, results: xr.Dataset) -> None:
+        """Write the results of a chunk, then its mark."""
 
     def finish(self, overwrite: bool) -> None:
         """Give the output its name."""
 
 
-@dataclass
-class NetcdfChunks(Chunks):
-    """Chunks as parts of a netCDF file."""
+def _solved(plan: AnyPlan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr.Dataset:
+    """The results of a chunk in the types of the file, without coordinates."""
+    table = plan.part(chunk).solve()
+    return xr.Dataset({name: table[name].variable.astype(dtype, copy=False) for name, dtype in dtypes.items()})
 
-    marker: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(1))
+
+def _mark(place: str, number: int) -> None:
+    """Say that a chunk is there."""
+    files, folder = url_to_fs(place)
+    files.pipe_file(f"{folder}/{number:06}.chunk", b"")
+
+
+class NetcdfChunks(Chunks):
+    """Chunks as parts of a netCDF file, which this process alone writes."""
 
     @property
     def result(self) -> Path:
@@ -215,42 +204,38 @@ class NetcdfChunks(Chunks):
             for name in self.job.dtypes:  # with its first value an array gets its place in the file
                 file[name][(0,) * file[name].ndim or ...] = 0
 
-    def write(self, number: int, arrays: Arrays) -> None:
-        with netcdf.opened(self.result, "r+") as file:
+    def write(self, number: int, chunk: Chunk, results: xr.Dataset) -> None:
+        with netCDF4.Dataset(self.result, "r+") as file:
+            file.set_auto_maskandscale(False)
             for name in self.job.dtypes:
-                file[name][self._region(number, file[name])] = arrays[name]
-        wait(self.marks[-1:])  # the disk may be slower than all else
-        self.marks.append(self.marker.submit(self._mark, number))
-
-    def _mark(self, number: int) -> None:
-        """Mark a chunk when a power cut can no longer take it, while another is written."""
-        with self.result.open("rb") as file:
-            os.fsync(file.fileno())
-        Path(self.place, f"{number:06}.chunk").touch()
-
-    def _region(self, number: int, result: netCDF4.Variable) -> Any:
-        sizes = dict(zip(result.dimensions, result.shape, strict=True))
-        return tuple(places(self.chunk(number), sizes).values()) or ...
+                file[name][_region(chunk, file[name])] = results[name].values
+        with self.result.open("rb") as written:
+            os.fsync(written.fileno())  # a power cut can no longer take it
+        _mark(self.place, number)
 
     def finish(self, overwrite: bool) -> None:
-        for mark in self.marks:
-            mark.result()
         complete = self.result
         if level := self.job.spec.output.compression:
             complete = Path(self.place, "compressed.nc")
-            with netcdf.opened(self.result) as source:
+            with netCDF4.Dataset(self.result) as source:
+                source.set_auto_maskandscale(False)
                 outline = self.job.outline("").assign_attrs(history=source.history)
                 with netcdf.new_file(outline, complete, self.lengths, level) as file:
-                    for number in range(math.prod(self.shape)):
+                    for _, chunk in self:
                         for name in self.job.dtypes:
-                            region = self._region(number, file[name])
+                            region = _region(chunk, file[name])
                             file[name][region] = source[name][region]
         appear(complete, Path(self.path), overwrite)
         shutil.rmtree(self.place)
 
 
+def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
+    sizes = dict(zip(result.dimensions, result.shape, strict=True))
+    return tuple(places(chunk, sizes).values()) or ...
+
+
 class ZarrChunks(Chunks):
-    """Chunks as regions of a Zarr store, each one shard of its arrays."""
+    """Chunks as regions of a Zarr store, each one shard of its arrays; workers write those that they solve."""
 
     @property
     def store(self) -> str:
@@ -279,50 +264,24 @@ class ZarrChunks(Chunks):
             found["compressors"] = [ZstdCodec(level=level)]
         return found
 
-    @property
-    def _about(self) -> dict[str, Any]:
-        """What those who write chunks need to know."""
-        template = self.job.plan.template()
-        results = {name: (template[name].dims, dtype) for name, dtype in self.job.dtypes.items()}
-        return {"store": self.store, "place": self.place, "cut": self.cut, "results": results}
-
-    @property
-    def written(self) -> Any:
-        import dask.array as da
-
-        meta = np.empty((0,) * len(self.shape), bool)
-        return da.map_blocks(_write_region, self.solved, **self._about, dtype=bool, meta=meta)
-
-    def write(self, number: int, arrays: Arrays) -> None:
-        _write_region(arrays, **self._about, block_id=tuple(map(int, np.unravel_index(number, self.shape))))
+    def task(self, number: int, chunk: Chunk) -> Callable[[], None]:
+        solve = partial(_solved, self.job.plan, self.job.dtypes, chunk)
+        return partial(_write_region, solve, chunk, self.store, self.place, number)
 
     def finish(self, overwrite: bool) -> None:
         import zarr
 
-        group = zarr.open_group(self.store, mode="r+")
-        group.attrs.put({name: value for name, value in group.attrs.items() if name != "unfinished"})
+        del zarr.open_group(self.store, mode="r+").attrs["unfinished"]
         if isinstance(self.path, Path):
             appear(Path(self.store), self.path, overwrite)
-        files, folder = url_to_fs(self.place)
-        files.rm(folder, recursive=True)
+        self._files.rm(self._folder, recursive=True)
 
 
-def _write_region(
-    solved: Any,
-    store: str,
-    place: str,
-    cut: Mapping[str, tuple[int, ...]],
-    results: Mapping[str, tuple[Any, np.dtype[Any]]],
-    block_id: tuple[int, ...],
-) -> NDArray[np.bool_]:
-    """Write a chunk to its region of a Zarr store, then its mark, in this process or a worker."""
-    arrays, chunk = solved.item() if isinstance(solved, np.ndarray) else solved, chunk_at(cut, block_id)
-    for name, (dims, dtype) in results.items():
-        one = xr.Dataset({name: (dims, arrays[name].astype(dtype, copy=False))})
-        region: Any = {dim: chunk[dim] for dim in dims if dim in chunk}
+def _write_region(solve: Callable[[], xr.Dataset], chunk: Chunk, store: str, place: str, number: int) -> None:
+    """Compute a chunk and write it to its region of a Zarr store, then its mark."""
+    results = solve()
+    for name, one in results.items():
+        region: Any = {dim: chunk[str(dim)] for dim in one.dims if dim in chunk}
         how: Any = {"region": region} if region else {"mode": "r+"}
-        one.to_zarr(store, zarr_format=3, consolidated=False, **how)
-    number = int(np.ravel_multi_index(block_id, [len(own) for own in cut.values()])) if block_id else 0
-    files, folder = url_to_fs(place)
-    files.pipe_file(f"{folder}/{number:06}.chunk", b"")
-    return np.ones((1,) * len(block_id), bool)
+        results[[name]].to_zarr(store, zarr_format=3, consolidated=False, **how)
+    _mark(place, number)
