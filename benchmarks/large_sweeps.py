@@ -1,11 +1,11 @@
 """Large sweeps to disk: ``python -m benchmarks.large_sweeps`` writes results/large_sweeps.md; minutes, 8 GB.
 
 `slipsweep run` of 10⁸ cells, beside what netCDF4 and xarray need to write the same arrays, and the memory that a run
-takes at its peak.
+takes at its peak.  ``--larger 10`` adds 10⁹ cells in netCDF, once: 20 GB of disk.
 """
 
 import os
-import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,6 +23,9 @@ NAMES = ("theta", "mu_s", "amplitude", "frequency")
 
 #: Times that all are measured, one after the other.
 TURNS = 3
+
+#: Cells of which xarray's arrays are made in memory, at most.
+IN_MEMORY = 2e8
 
 #: Types of the results that are stored by default.
 DTYPES = {"permanent_displacement": "f8", "peak_relative_velocity": "f8", "sliding_mode": "i1", "validity": "i2"}
@@ -76,44 +79,47 @@ def write_xarray(path: Path, lengths: Sequence[int]) -> float:
     return time.perf_counter() - started
 
 
-def main() -> None:
-    """Measure, and write the table."""
-    given = machine.arguments(__doc__)
-    lengths = (10, 5, 10, 20) if given.tiny else (100, 50, 100, 200)
+def measured(folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str, tuple[str, ...]]) -> str:
+    """The table of a sweep of these lengths, written by `slipsweep run` to each of `outputs`, and by the others."""
     seconds: dict[str, list[float]] = {}
     memory: dict[str, float] = {}
-    with tempfile.TemporaryDirectory(dir=Path.cwd()) as name:
-        folder = Path(name)
-        sweep = sweep_file(folder / "a.toml", lengths)
-        for _ in range(1 if given.tiny else TURNS):  # in turn: other processes and the disk are not always the same
-            for output, options in (("a.nc", ()), ("b.nc", ("--memory", "1GB")), ("a.zarr", ())):
-                what = f"`slipsweep run -o {' '.join((output, *options))}`"
-                command = (
-                    "-m",
-                    "slipsweep",
-                    "run",
-                    str(sweep),
-                    "-o",
-                    str(folder / output),
-                    "-q",
-                    "--overwrite",
-                    *options,
-                )
-                took, peak = seconds_and_memory(*command)
-                seconds.setdefault(what, []).append(took)
-                memory.setdefault(what, peak)  # later ones begin with that of this process
-            for what, write in (("netCDF4, the same arrays", write_netcdf4), ("xarray, the same arrays", write_xarray)):
-                seconds.setdefault(what, []).append(write(folder / "c.nc", lengths))
-                (folder / "c.nc").unlink()
+    sweep = sweep_file(folder / "a.toml", lengths)
+    others = {"netCDF4, the same arrays": write_netcdf4}
+    if np.prod(lengths) <= IN_MEMORY:
+        others["xarray, the same arrays"] = write_xarray
+    for _ in range(turns):  # in turn: other processes and the disk are not always the same
+        for output, options in outputs.items():
+            what, path = f"`slipsweep run -o {' '.join((output, *options))}`", folder / output
+            command = ("-m", "slipsweep", "run", str(sweep), "-o", str(path), "-q", "--overwrite", *options)
+            took, peak = seconds_and_memory(*command)
+            seconds.setdefault(what, []).append(took)
+            memory.setdefault(what, peak)  # later ones begin with that of this process
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        for what, write in others.items():
+            seconds.setdefault(what, []).append(write(folder / "c.nc", lengths))
+            (folder / "c.nc").unlink()
     rows = [
         [what, f"{np.median(took):.1f}", f"{min(took):.1f}", f"{memory[what]:.0f}" if what in memory else ""]
         for what, took in seconds.items()
     ]
-    cells = f"{np.prod(lengths):,} cells, {np.prod(lengths) * 19 / 1e9:.2g} GB of results."
-    text = f"{machine.measured_on(('numpy', 'numba', 'netCDF4', 'zarr'))} {cells}\n\n"
-    text += machine.table(["what", "s, with sync: median", "least", "peak memory, MB"], rows)
+    times = "once" if turns == 1 else f"{turns} times each"
+    cells = f"{np.prod(lengths):,} cells, {np.prod(lengths) * 19 / 1e9:.2g} GB of results; {times}.\n\n"
+    return cells + machine.table(["what", "s, with sync: median", "least", "peak memory, MB"], rows)
+
+
+def main() -> None:
+    """Measure, and write the table."""
+    given = machine.arguments(__doc__, counts={"larger": 0})
+    lengths = (10, 5, 10, 20) if given.tiny else (100, 50, 100, 200)
+    with tempfile.TemporaryDirectory(dir=Path.cwd()) as name:
+        outputs: dict[str, tuple[str, ...]] = {"a.nc": (), "b.nc": ("--memory", "1GB"), "a.zarr": ()}
+        tables = []
+        if given.larger:  # first: the peak of a process begins with that of this one
+            tables.append(measured(Path(name), (lengths[0] * given.larger, *lengths[1:]), 1, {"a.nc": ()}))
+        tables.insert(0, measured(Path(name), lengths, 1 if given.tiny else TURNS, outputs))
+    text = "\n\n".join([machine.measured_on(("numpy", "numba", "netCDF4", "zarr")), *tables])
     (given.folder / "large_sweeps.md").write_text(text + "\n")
-    print(text, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1000, "MB here")
+    print(text)
 
 
 if __name__ == "__main__":
