@@ -19,20 +19,20 @@ ORDER = (
 #: Lines that a folder may have, docstrings and blanks among them.  More is a reason to look for the simpler thing;
 #: whoever takes something away lowers the limit.
 LINES = {
-    "jit": 410,
-    "model": 1_493,
-    "motion": 2_260,
-    "kernels": 3_285,
-    "grid": 1_450,
-    "studies": 4_720,
-    "files": 2_201,
-    "charts": 2_790,
+    "jit": 336,
+    "model": 1_447,
+    "motion": 2_052,
+    "kernels": 3_242,
+    "grid": 1_170,
+    "studies": 4_256,
+    "files": 2_002,
+    "charts": 2_520,
     "explore": 735,
-    "cli": 1_559,
+    "cli": 1_460,
 }
 
 #: Modules in all, and lines of a function's body.
-MOST_MODULES, MOST_LINES = 123, 90
+MOST_MODULES, MOST_LINES = 113, 90
 
 #: Names of ours that a module imports at its head.
 MOST_NAMES = 20
