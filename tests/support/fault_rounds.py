@@ -226,8 +226,8 @@ def damaged(folder: Path, output: str, whole: bytes, chance: random.Random) -> N
 def worker_killed(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """A worker is killed: its chunks are computed once more."""
     process = start(folder, "run", "a.toml", "-o", output, "-q", "--workers", "2", cells=15_000)
-    _until(lambda: (folder / f"{output}.part").exists() or process.has_ended)
-    time.sleep(chance.uniform(1.0, 4.0))
+    _until(lambda: any((folder / f"{output}.part").glob("*.chunk")) or process.has_ended)
+    time.sleep(chance.uniform(0.0, 1.0))
     workers = _children(process.pid)
     for pid in workers[-1:]:
         os.kill(pid, signal.SIGKILL)

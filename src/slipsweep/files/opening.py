@@ -132,9 +132,6 @@ def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-# --------------------------------------------------------------------------------- contents
-
-
 def result_names(table: xr.Dataset) -> list[str]:
     """Names of the results of a file: slipsweep's own, and those that lie along the same dimensions.
 
