@@ -104,7 +104,7 @@ def measured(folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str
     ]
     times = "once" if turns == 1 else f"{turns} times each"
     cells = f"{np.prod(lengths):,} cells, {np.prod(lengths) * 19 / 1e9:.2g} GB of results; {times}.\n\n"
-    return cells + machine.table(["what", "s, with sync: median", "least", "peak memory, MB"], rows)
+    return cells + machine.table(["what", "s, with sync: median", "least", "peak memory, MB"], rows).strip()
 
 
 def main() -> None:

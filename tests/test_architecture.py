@@ -25,7 +25,7 @@ LINES = {
     "kernels": 3_242,
     "grid": 1_170,
     "studies": 4_256,
-    "files": 2_002,
+    "files": 2_000,
     "charts": 2_520,
     "explore": 735,
     "cli": 1_460,
