@@ -251,6 +251,9 @@ def test_newmarks_block_over_its_yield_coefficient(here: Path, capsys: pytest.Ca
     expected = result.permanent_displacement.sel(amplitude=3.0, frequency=1) * 1000
     np.testing.assert_allclose(ys, expected.where(expected > 0))
     assert "no sliding: Üy above A" in legend(figure)
+    over_amplitude = result.slipsweep.chart(at={"ky": ky[2], "frequency": 1})
+    expected = result.permanent_displacement.sel(yield_coefficient=ky[2], frequency=1) * 1000
+    np.testing.assert_allclose(points(labelled(over_amplitude, "Newmark's block")[0])[1], expected.where(expected > 0))
     (line,) = named(result.slipsweep.chart("modes", at={"frequency": 1}), "yield_line")
     along, amplitudes = np.concatenate(line.allsegs[0]).T
     np.testing.assert_allclose(amplitudes, along * 9.81, rtol=1e-12)

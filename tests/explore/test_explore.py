@@ -214,6 +214,14 @@ def test_friction_angles(tmp_path: Path) -> None:
     assert contents(tmp_path / "a.html")[0]["histories"] is not None
 
 
+def test_cases_with_friction_angles(tmp_path: Path) -> None:
+    text = "[axes]\namplitude.values = [2, 6]\nfrequency.values = [1, 2]\n"
+    text += "".join(f'[[cases]]\nlabel = "{phi}"\ntheta = 5\nphi = {phi}\n' for phi in (20, 25))
+    write_page(make(tmp_path, text), tmp_path / "a.html")
+    meta = contents(tmp_path / "a.html")[0]
+    assert "case" in [dim["name"] for dim in meta["dims"]]
+
+
 @pytest.mark.parametrize("drawn", [False, True])
 def test_records_and_uncertain_inputs(tmp_path: Path, drawn: bool) -> None:
     uncertain = "[uncertainty]\nsamples = 64\n[uncertainty.mu_s]\ndistribution = 'uniform'\nloc = 0.1\nscale = 0.2\n"

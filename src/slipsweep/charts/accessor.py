@@ -66,7 +66,8 @@ class SlipsweepAccessor:
             sweep with one axis left "curve".
         at : mapping of axis to value, optional
             Value of an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
-            by default its middle.  Several values choose the curves or panels of an axis, or the motions of a suite.
+            by default its middle.  "ky" is `yield_coefficient`, and "mu_s" beside an axis `phi` the angle to it.
+            Several values choose the curves or panels of an axis, or the motions of a suite.
         x, y : str, optional
             Axis to draw over, or an intensity measure; vertical axis of a map, or the curve parameter.
         panels : sequence of str
@@ -106,9 +107,10 @@ class SlipsweepAccessor:
         'permanent displacement, downslope (mm)'
         """
         from slipsweep.charts.kinds import figure_of
+        from slipsweep.files.selection import own_names
 
         figure = figure_of(
-            self._dataset, kind=kind, at=at or {}, x=x, y=y, panels=panels, variable=variable, levels=levels,
-            units=units, show_cautions=show_cautions, width=width, grey=grey, ax=ax,
+            self._dataset, kind=kind, at=own_names(self._dataset, at or {}), x=x, y=y, panels=panels,
+            variable=variable, levels=levels, units=units, show_cautions=show_cautions, width=width, grey=grey, ax=ax,
         )  # fmt: skip
         return figure if ax is None else ax
