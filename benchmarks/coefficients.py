@@ -50,23 +50,6 @@ def _after(power: int, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return lambda z: function(mpmath.sqrt(z)) / mpmath.sqrt(z) ** power
 
 
-def newmark_displacement(ratio: Any) -> Any:
-    """W/A of a cycle of Newmark's block with Üy/A = `ratio` under a sine."""
-    if ratio == 0:
-        return 2 * mpmath.pi
-    onset = mpmath.asin(ratio)
-
-    def velocity(phi: Any) -> Any:
-        return mpmath.cos(onset) - mpmath.cos(phi) - ratio * (phi - onset)
-
-    # from the second Üg = Üy on V falls; counted from the peak of Üg that comes at −1, and the stop at 2 to 3
-    half = mpmath.acos(ratio)
-    bracket = (mpmath.pi / 2 + half, mpmath.pi / 2 + 3 * half)
-    stop = mpmath.findroot(velocity, bracket, solver="anderson", maxsteps=200, verify=False)
-    slid = stop - onset
-    return mpmath.cos(onset) * slid - (mpmath.sin(stop) - ratio) - ratio * slid**2 / 2
-
-
 with mpmath.workdps(DIGITS):
     #: A rounded quotient may leave a little more than ln 2 / 2.
     _HALF_LN2 = mpmath.log(2) / 2 * mpmath.mpf("1.0001")
