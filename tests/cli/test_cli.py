@@ -138,6 +138,7 @@ def test_a_sweep_from_standard_input(tmp_path: Path) -> None:
         (("run", "small.toml", "-o", "none/a.nc"), "none/a.nc: the folder none does not exist"),
         (("run", "small.toml", "-o", "small.pdf"), "small.pdf: the name must end in one of .nc, .zarr"),
         (("run", "small.toml", "-o", "small.CSV"), "small.CSV: the name must end in one of .nc, .zarr"),
+        (("run", "small.toml", "-o", "s3://a/b.nc"), "s3://a/b.nc: the name must end in .zarr"),
         (("run", "named.toml"), "b.pdf: the name must end in one of .nc, .zarr"),
         (("explore", "small.nc", "-o", "a.pdf"), "a.pdf: the name must end in one of .html, .htm"),
         (("info", "none.nc"), "none.nc: no such file"),

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 FIGURES = (".png", ".svg", ".pdf")
 
 
-def check_ending(path: Path, endings: Sequence[str]) -> None:
+def check_ending(path: "Place", endings: Sequence[str]) -> None:
     """Refuse an output whose name ends in what the command cannot write."""
-    if path.suffix not in endings:
+    if Path(path).suffix not in endings:
         raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
 
 

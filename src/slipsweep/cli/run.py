@@ -55,7 +55,7 @@ def run(
     if name is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = opening.place_of(name or f"{sweep.stem}.nc")
-    common.check_ending(Path(path), (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
+    common.check_ending(path, (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
     passed, sampling, job = common.stopwatch(), checked.sampling, jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
     report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)
