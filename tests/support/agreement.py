@@ -336,8 +336,10 @@ def _histories(group: Group, exact: Exact) -> Iterator[Comparison]:
         found = {name: history[name].item() for name in ("sliding_mode", "validity")}
         found[MOTION[0]] = history.relative_displacement.to_numpy()[-1]
         highest, own = history.relative_velocity.to_numpy().max(), exact.of(j)[MOTION[1]]
-        rate = 2.0 * np.abs(history.ground_acceleration - history.block_acceleration).max().item()
-        # between two samples V may be larger than at either
+        # between two samples V may be larger than at either; of a slip that lies between them no sample knows
+        ground = history.ground_acceleration.to_numpy()
+        relative = np.abs(ground - history.block_acceleration.to_numpy())
+        rate = 2.0 * max(relative.max(), np.abs(np.diff(ground)).max())
         found[MOTION[1]] = own if highest <= own <= highest + rate * spacing else highest
         yield _judged("simulate", group, exact, j, found)
 
