@@ -49,7 +49,8 @@ HEADER = ["the cycle solver against", "cells", "agreed", "median difference", "l
 def main() -> None:
     """Draw, compare, write agreement.md."""
     given = arguments(__doc__, counts={"cells": CELLS, "seed": -1})
-    seed = given.seed if given.seed >= 0 else random.randrange(2**31)
+    # a test draws the same cells each time
+    seed = given.seed if given.seed >= 0 else 0 if given.tiny else random.randrange(2**31)
     cells = 2 * SIZE if given.tiny else given.cells
     print(f"seed {seed}", flush=True)
     kinds: dict[str, list[Comparison]] = {kind: [] for kind in (*FLOORS, BY_RECORD)}
