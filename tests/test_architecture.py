@@ -19,11 +19,11 @@ ORDER = (
 #: Lines that a folder may have, docstrings and blanks among them.  More is a reason to look for the simpler thing;
 #: whoever takes something away lowers the limit.
 LINES = {
-    "jit": 336,
+    "jit": 338,
     "model": 1_447,
     "motion": 2_052,
     "kernels": 3_242,
-    "grid": 1_170,
+    "grid": 1_171,
     "studies": 4_256,
     "files": 2_000,
     "charts": 2_520,

@@ -154,7 +154,7 @@ def tally_in(table: xr.Dataset) -> Tally:
         names += moved
     widest: Any = max((table[name].sizes for name in names), key=len, default={})
     for chunk in grid_chunks(widest, CHUNK_CELLS) if names else ():
-        tally.merge(Tally.of({name: table[name].isel(chunk, missing_dims="ignore").values for name in names}))
+        tally.merge(Tally.of(table[names].isel(chunk, missing_dims="ignore")))
     if {"sensitivity_status", "first_order_index", "total_index"} <= {*table.data_vars} and "input" in table.coords:
         order = [*table["sensitivity_status"].dims, "input"]
         first, total = (table[name].transpose(*order).values for name in ("first_order_index", "total_index"))

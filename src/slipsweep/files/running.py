@@ -127,8 +127,7 @@ def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
     """Count the results of a plan, read in chunks."""
     tally = Tally()
     for chunk in grid_chunks(plan.sizes, CHUNK_CELLS, plan.together):
-        part = table[list(plan.names)].isel(chunk, missing_dims="ignore")
-        tally.merge(plan.tally({name: part[name].values for name in plan.names}))
+        tally.merge(plan.tally(table[list(plan.names)].isel(chunk, missing_dims="ignore")))
     tally.cells = plan.cells
     return tally
 

@@ -46,7 +46,7 @@ class AnyPlan(Protocol):
     def part(self, chunk: Chunk) -> "AnyPlan":
         """The plan of a part of the grid, which gives the same bits as the whole does there."""
 
-    def tally(self, results: Mapping[str, NDArray[Any]]) -> Tally:
+    def tally(self, results: xr.Dataset) -> Tally:
         """Modes and flags in a chunk of results."""
 
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
@@ -88,7 +87,7 @@ class Plan:
         coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
         return replace(self, sizes=sizes, coords=coords, tasks=tuple(map(cut, self.tasks)))
 
-    def tally(self, results: Mapping[str, NDArray[Any]]) -> Tally:
+    def tally(self, results: xr.Dataset) -> Tally:
         """Modes and flags in a chunk of results."""
         return Tally.of(results)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
@@ -82,16 +83,17 @@ class Tally:
     counted: int = 0
 
     @classmethod
-    def of(cls, results: Mapping[str, NDArray[Any]]) -> "Tally":
-        """Count arrays of results, given by name."""
+    def of(cls, results: xr.Dataset) -> "Tally":
+        """Count results; what is not counted is not read."""
         tally = cls()
         if "sliding_mode" in results:
-            tally.modes = {mode: int(np.count_nonzero(results["sliding_mode"] == int(mode))) for mode in SlidingMode}
+            modes = results["sliding_mode"].values
+            tally.modes = {mode: int(np.count_nonzero(modes == int(mode))) for mode in SlidingMode}
         if "validity" in results:
-            validity = results["validity"].astype(np.int16, copy=False)
+            validity = results["validity"].values.astype(np.int16, copy=False)
             tally.flags = {flag: int(np.count_nonzero(validity & flag.value)) for flag in Validity}
         if {"permanent_displacement", "newmark_displacement"} <= results.keys():
-            tally.ratios = Ratios.of(results["permanent_displacement"], results["newmark_displacement"])
+            tally.ratios = Ratios.of(results["permanent_displacement"].values, results["newmark_displacement"].values)
         return tally
 
     def share(self, count: int) -> float:

@@ -91,10 +91,12 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     started, told = time.perf_counter(), [*_watchers]
     for watcher in told:
         watcher(function.__name__)
-    compiled.compile(types)
-    _seconds += time.perf_counter() - started
-    for watcher in told:
-        watcher(None)
+    try:
+        compiled.compile(types)
+    finally:
+        _seconds += time.perf_counter() - started
+        for watcher in told:
+            watcher(None)
     return compiled
 
 

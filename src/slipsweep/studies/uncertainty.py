@@ -441,11 +441,11 @@ class SamplePlan:
             arrays[name] = np.where(parameters.BOUNDS[name].holds(values), values, np.nan)
         return arrays, tuple(sizes.values())
 
-    def tally(self, results: Mapping[str, NDArray[Any]]) -> tally.Tally:
+    def tally(self, results: xr.Dataset) -> tally.Tally:
         """Samples by sliding mode and by flag, from their shares; grid points by what moves the displacement."""
 
         def counts(name: str, codes: Sequence[Any]) -> dict[Any, int]:
-            shares = results[name].reshape(-1, len(codes)).astype(np.float64)
+            shares = results[name].values.reshape(-1, len(codes)).astype(np.float64)
             return dict(zip(codes, np.rint(shares * self.samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
 
         found = tally.Tally(flags=counts("flag_share", tuple(variables.Validity)))
@@ -455,6 +455,6 @@ class SamplePlan:
         if self.sampling.sensitivity:
             found.indices = tally.Indices.counted(
                 ["+".join(one) for one in self.sampling.independent],
-                *(results[name] for name in ("first_order_index", "total_index", "sensitivity_status")),
+                *(results[name].values for name in ("first_order_index", "total_index", "sensitivity_status")),
             )
         return found
