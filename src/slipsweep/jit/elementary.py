@@ -2,9 +2,8 @@
 
 numba as pip installs it has no vector mathematics library (SVML left in 0.62): a `math.exp` in a
 loop is a call of 4.3 ns an element and keeps the whole loop scalar.  `exp` below was seen
-at 0.65 ns an element (AVX-512, in cache), within 1 ulp of the true value.  Polynomials, interpolated at Chebyshev
-nodes, are two sums, four of many terms, that do not wait for each other: a cell takes 0.92 to 0.96 of the time of
-Horner's one.  Ranges, methods, errors: docs/numerics.md#elementary-functions.
+at 0.65 ns an element (AVX-512, in cache), within 1 ulp of the true value.  Polynomials are interpolated at Chebyshev
+nodes.  Ranges, methods, errors: docs/numerics.md#elementary-functions.
 """
 
 import math
@@ -57,12 +56,12 @@ _LOG = tuple(2.0 / power for power in range(3, 23, 2))
 
 
 @elementary
-def _polynomial(x: float, c: tuple[float, ...], seventh: float) -> float:
-    """Σ c[k] x^k up to x⁸, with another coefficient of x⁷; the lowest, most of the value, is added last."""
-    x2 = x * x
-    odd = ((seventh * x2 + c[5]) * x2 + c[3]) * x2 + c[1]
-    even = ((c[8] * x2 + c[6]) * x2 + c[4]) * x2 + c[2]
-    return (even * x + odd) * x + c[0]
+def _polynomial(x: float, coefficients: tuple[float, ...]) -> float:
+    """Σ cₖ xᵏ."""
+    total = 0.0
+    for k in range(len(coefficients) - 1, -1, -1):
+        total = total * x + coefficients[k]
+    return total
 
 
 @elementary
@@ -75,7 +74,7 @@ def exp(x: float) -> float:
     rounded = x * _LOG2_E + _ROUND
     k = rounded - _ROUND
     r = x - k * _LN2_HIGH - k * _LN2_LOW
-    p = _polynomial(r, _EXP, _EXP[9] * (r * r) + _EXP[7])
+    p = _polynomial(r, _EXP)
     p = p * r + 1.0
     p = p * r + 1.0
     return p * np.int64((np.float64(rounded).view(np.int64) + 1023) << 52).view(np.float64)
@@ -85,35 +84,28 @@ def exp(x: float) -> float:
 def versine(angle: float) -> float:
     """1 − cos for |angle| ≤ π/2, without cancellation at 0 (1e-17)."""
     z = angle * angle
-    return _polynomial(z, _VERSINE, _VERSINE[7]) * z
+    return _polynomial(z, _VERSINE) * z
 
 
 @elementary
 def angle_minus_sine(angle: float) -> float:
     """angle − sin for |angle| ≤ π/2, without cancellation at 0 (6e-17)."""
     z = angle * angle
-    return _polynomial(z, _ANGLE_MINUS_SINE, _ANGLE_MINUS_SINE[7]) * z * angle
+    return _polynomial(z, _ANGLE_MINUS_SINE) * z * angle
 
 
 @elementary
 def half_square_minus_versine(angle: float) -> float:
     """angle²/2 − (1 − cos) for |angle| ≤ π/2, without cancellation at 0 (6e-17)."""
     z = angle * angle
-    return _polynomial(z, _HALF_SQUARE_MINUS_VERSINE, _HALF_SQUARE_MINUS_VERSINE[7]) * z * z
+    return _polynomial(z, _HALF_SQUARE_MINUS_VERSINE) * z * z
 
 
 @elementary
 def inverse_versine(q: float) -> float:
     """The angle in [0, π/2] with 1 − cos(angle) = q, 2 arcsin √(q/2), without cancellation at 0 (3e-18)."""
     z = min(max(0.5 * q, 0.0), 0.5)
-    z2, c = z * z, _INVERSE_VERSINE
-    z4 = z2 * z2
-    p0 = (((c[17] * z4 + c[13]) * z4 + c[9]) * z4 + c[5]) * z4 + c[1]
-    p1 = (((c[18] * z4 + c[14]) * z4 + c[10]) * z4 + c[6]) * z4 + c[2]
-    p2 = (((c[19] * z4 + c[15]) * z4 + c[11]) * z4 + c[7]) * z4 + c[3]
-    p3 = ((c[16] * z4 + c[12]) * z4 + c[8]) * z4 + c[4]
-    p = ((p3 * z + p2) * z2 + (p1 * z + p0)) * z + c[0]
-    return min(2.0 * p * math.sqrt(z), _HALF_PI)
+    return min(2.0 * _polynomial(z, _INVERSE_VERSINE) * math.sqrt(z), _HALF_PI)
 
 
 @elementary
@@ -136,7 +128,7 @@ def log(x: float) -> float:
     k, m = exponent * 1.0, np.int64(bits - (exponent << 52)).view(np.float64)
     s = (m - 1.0) / (m + 1.0)
     z = s * s
-    p = _polynomial(z, _LOG, _LOG[9] * (z * z) + _LOG[7])
+    p = _polynomial(z, _LOG)
     y: float = k * _LN2_HIGH + (2.0 * s + (p * z * s + k * _LN2_LOW))
     y = y if x > 0.0 else (-math.inf if x == 0.0 else math.nan)
     return y if x < math.inf else x

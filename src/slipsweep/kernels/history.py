@@ -17,7 +17,7 @@ from slipsweep.kernels import record as recorded
 from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.continuous import follow_eq4
 from slipsweep.kernels.eq4 import eq4_integrals
-from slipsweep.kernels.exact import Workspace, pulse
+from slipsweep.kernels.exact import Workspace
 from slipsweep.kernels.excitation import base_acceleration, held_integrals, phase_at
 from slipsweep.kernels.pulse import beginning, first_pulse
 from slipsweep.model import equations as eq
@@ -147,23 +147,26 @@ def sample_log(
 
 
 @scalar
-def stick_slip_history(
-    block: Block, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
-) -> None:
-    """Fill Ü, V and W of a stick-slip (or Newmark) block at increasing phases φ."""
+def fill_pulses(
+    cell: physics.Cell, block: Block, options: Options, wave: Wave, workspace: Workspace, is_record: bool,
+    phases: np.ndarray, found: History,
+) -> None:  # fmt: skip
+    """Fill Ü, V and W pulse by pulse; of a record each has the friction of its own peak."""
     at, velocity, displacement = 0, 0.0, 0.0
     k, repeat = first_pulse(block, wave, 0), 0
     intervals = wave.height.size
     while at < phases.size and k < intervals:
-        # the plain cycle of the table comes again and again
-        following = first_pulse(block, wave, k + 1)
-        offset = 2.0 * math.pi * repeat
-        now = pulse(block, options, wave, workspace, k, following, velocity)
+        following, peak, continuous = first_pulse(block, wave, k + 1), block.amplitude * wave.height[k], False
+        if is_record:
+            block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
+            continuous = recorded.slides_continuously(interface, options, peak)
+        now = recorded.recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
+        # the log of continuous sliding begins at rest
+        before = Moving(begins_at(block, wave, k), velocity if continuous else 0.0, displacement, now.displacement)
         log, until = workspace.log[: workspace.logged[0]], begins_at(block, wave, following)
-        before = Moving(begins_at(block, wave, k), 0.0, displacement, now.displacement)
-        at = sample_log(block, wave, log, until, offset, before, phases, at, found)
-        velocity = now.velocity
-        displacement += now.displacement
+        at = sample_log(block, wave, log, until, 2.0 * math.pi * repeat, before, phases, at, found)
+        velocity, displacement = now.velocity, displacement + now.displacement
+        # the plain cycle of the table comes again and again
         again = following < intervals and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
         if again and repeat < wave.repeats - 1:
             repeat += 1
@@ -174,10 +177,10 @@ def stick_slip_history(
 
 
 @scalar
-def continuous_history(
+def fill_cycles(
     block: Block, cycles: int, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
 ) -> None:
-    """Fill Ü, V and W of a continuously sliding block at increasing phases φ, cycle by cycle."""
+    """Fill Ü, V and W of a block that slides continuously under a waveform, cycle by cycle."""
     k = first_pulse(block, wave, 0)
     if k == wave.height.size:
         return
@@ -203,41 +206,17 @@ def continuous_history(
 
 
 @kernel
-def record_history(
-    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, times: np.ndarray, found: History
-) -> None:
-    """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
-    fill_base(cell.amplitude, 1, wave, times, found)
+def fill_history(
+    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, is_record: bool, phases: np.ndarray,
+    found: History,
+) -> None:  # fmt: skip
+    """Fill a history at increasing phases; of a record at times, at time scale 1, `cell.amplitude` the factor on it."""
+    peak = cell.amplitude * wave.highest if is_record else cell.amplitude
+    block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
+    fill_base(cell.amplitude, options.cycles, wave, phases, found)
     rest(found)
-    block, interface = recorded.block_in_pulse(exponential(), cell, options, cell.amplitude * wave.highest)
-    at, velocity, displacement = 0, 0.0, 0.0
-    k = first_pulse(block, wave, 0)
-    while at < times.size and k < wave.height.size:
-        following, peak = first_pulse(block, wave, k + 1), cell.amplitude * wave.height[k]
-        block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
-        continuous = recorded.slides_continuously(interface, options, peak)
-        now = recorded.recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
-        # the log of continuous sliding begins at rest
-        entered = velocity if continuous else 0.0
-        before = Moving(begins_at(block, wave, k), entered, displacement, now.displacement)
-        log, until = workspace.log[: workspace.logged[0]], begins_at(block, wave, following)
-        at = sample_log(block, wave, log, until, 0.0, before, times, at, found)
-        velocity, displacement = now.velocity, displacement + now.displacement
-        k = following
-    fill_friction(block, found)
-
-
-@kernel
-def wave_history(
-    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
-) -> None:
-    """Fill a history under a waveform at increasing phases."""
-    interface = physics.interface_of(cell, options.rise, options.g)
-    block = physics.block_of(exponential(), cell, interface, options.rise, options.g)
-    fill_base(block.amplitude, options.cycles, wave, phases, found)
-    rest(found)
-    if interface.sliding_mode == eq.CONTINUOUS:
-        continuous_history(block, options.cycles, wave, workspace, phases, found)
-    elif interface.sliding_mode == eq.STICK_SLIP:
-        stick_slip_history(block, options, wave, workspace, phases, found)
+    if is_record or interface.sliding_mode == eq.STICK_SLIP:
+        fill_pulses(cell, block, options, wave, workspace, is_record, phases, found)
+    elif interface.sliding_mode == eq.CONTINUOUS:
+        fill_cycles(block, options.cycles, wave, workspace, phases, found)
     fill_friction(block, found)

@@ -17,26 +17,16 @@ def held_integrals(rate: float, slope: float, duration: float) -> tuple[float, f
     )
 
 
-#: Squares of accelerations between this and its inverse keep their digits.
-_LEAST_SQUARE = 1e-200
-
-
 @scalar
 def held_stop(velocity: float, rate: float, slope: float) -> float:
     """When a velocity ≥ 0 whose rate is `rate` and changes by `slope` first falls to zero (infinity: never).
 
     The roots of v + rate t + slope t²/2, each taken from the form that does not cancel.
     """
-    size, square = 1.0, rate * rate - 2.0 * slope * velocity
-    if not _LEAST_SQUARE < rate * rate + abs(slope) * velocity < 1.0 / _LEAST_SQUARE:
-        # accelerations over their size: their squares are no doubles
-        size = max(abs(rate), math.sqrt(abs(slope)) * math.sqrt(velocity))
-        if size == 0.0:
-            return math.inf if slope >= 0.0 else 0.0
-        square = (rate / size) * (rate / size) - 2.0 * (slope / size) * (velocity / size)
+    square = rate * rate - 2.0 * slope * velocity
     if rate > 0.0:
-        return (rate + size * math.sqrt(square)) / -slope if slope < 0.0 else math.inf
+        return (rate + math.sqrt(square)) / -slope if slope < 0.0 else math.inf
     if square < 0.0:
         return math.inf
-    fall = size * math.sqrt(square) - rate
+    fall = math.sqrt(square) - rate
     return 2.0 * velocity / fall if fall > 0.0 else math.inf

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, registered
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model import equations as eq
 
@@ -51,14 +51,14 @@ class FrictionLaw(NamedTuple):
         return tuple(name for name, function in self._asdict().items() if function is None)
 
 
-@registered
+@scalar
 def exponential_derivatives(friction: float, decay_rate: float, g: float) -> tuple[float, float]:
     """Derivatives of Eq. 6 by |Üg|: −(λ/g) μ and (λ/g)² μ."""
     rate = decay_rate / g
     return -rate * friction, rate * rate * friction
 
 
-@registered
+@scalar
 def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> float:
     """Where d²Ü/dÜg² of Eqs. 4 and 6 turns positive: (2 tan θ / λ − 1) g / tan θ; not positive where λ ≥ 2 tan θ.
 
@@ -67,13 +67,13 @@ def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> flo
     return (2.0 * tan_theta / decay_rate - 1.0) * g / tan_theta
 
 
-@registered
+@scalar
 def exponential_static_acceleration(mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
     """|Üg| at which Eq. 6 gives μs: (g/λ) ln((μs + Δμ)/μs)."""
     return g / decay_rate * log((mu_s + delta_mu) / mu_s)
 
 
-@registered
+@scalar
 def exponential_decay_length(decay_rate: float, g: float) -> float:
     """g/λ, over which μ of Eq. 6 falls to a part 1/e."""
     return g / decay_rate
@@ -85,29 +85,27 @@ _SERIES_END, _DECAYED = 2.0, 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
 
 
-@inlined
+@scalar
 def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
 
     The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z = 2 that is
     summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
     """
-    # both without a branch, so that a loop over pieces becomes SIMD
-    small, large = min(z, _SERIES_END), max(z, _SERIES_END)
-    third = 0.0
-    for k in range(_SERIES.size - 1, -1, -1):
-        third = _SERIES[k] - small * third
-    early = 0.5 - small * third
-    whole = 1.0 - small * early
-    decayed = exp(-large) if large < _DECAYED else 0.0
-    all_over = (1.0 - decayed) / large
-    before, after = (1.0 - all_over) / large, (all_over - decayed) / large
     if z < _SERIES_END:
+        third = 0.0
+        for k in range(_SERIES.size - 1, -1, -1):
+            third = _SERIES[k] - z * third
+        early = 0.5 - z * third
+        whole = 1.0 - z * early
         return whole, early, whole - early, early - 2.0 * third
-    return all_over, before, after, (before - after) / large
+    decayed = exp(-z) if z < _DECAYED else 0.0
+    whole = (1.0 - decayed) / z
+    early, late = (1.0 - whole) / z, (whole - decayed) / z
+    return whole, early, late, (early - late) / z
 
 
-@registered
+@scalar
 def exponential_moments(
     start: float, change: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> tuple[float, float, float, float]:

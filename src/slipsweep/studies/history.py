@@ -164,10 +164,10 @@ class _History:
     def sampled(self, phases: Floats) -> Floats:
         """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
         is_recorded, table = isinstance(self.problem.excitation, Record), np.empty((len(HISTORY), phases.size))
-        kernel = kernels.record_history if is_recorded else kernels.wave_history
         workspace = exact.workspace_of(self.wave, keeps_log=True)
         chosen = solvers.options_of(self.problem, wants_peak=True)
-        _interruptible(kernel, self.cell, chosen, self.wave, workspace, phases, kernels.History(*table))
+        found = kernels.History(*table)
+        _interruptible(kernels.fill_history, self.cell, chosen, self.wave, workspace, is_recorded, phases, found)
         if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
         return table
