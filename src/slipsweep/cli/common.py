@@ -196,7 +196,7 @@ def _echo_indices(indices: "Indices") -> None:
         width = max(24, *map(len, indices.total))
         echo(f"  {'input (means)':<{width}}  first order   total   largest total at")
         for name in sorted(indices.total, key=lambda name: -indices.total[name]):
-            first, total = (indices.mean(sums, name) for sums in (indices.first, indices.total))
+            first, total = indices.first[name], indices.total[name]
             echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
     for status, count in indices.status.items():
         if count and status is not variables.SensitivityStatus.COMPUTED:

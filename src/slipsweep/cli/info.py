@@ -17,6 +17,7 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.resources import size_text
+    from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
 
     table = opening.read_result(file)
@@ -29,7 +30,7 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
     if rows := opening.motions_text(table):
         echo("motions, as recorded:", *(f"  {row}" for row in rows))
     try:
-        common.echo_tally(opening.tally_in(table))
+        common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:

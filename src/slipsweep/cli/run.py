@@ -63,7 +63,7 @@ def run(
         return
     template = job.plan.template()
     if not report.found:
-        cells, grid, (solving, once) = report.tally.cells, grid_text(job.plan.sizes) or "no axes", passed()
+        cells, grid, (solving, once) = job.plan.cells, grid_text(job.plan.sizes) or "no axes", passed()
         compiled = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
         took = f"in {solving + once:.2f} s{compiled}, {cells / solving:.3g} {unit}/s"
         if sampling is None:

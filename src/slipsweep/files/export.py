@@ -16,10 +16,11 @@ import xarray as xr
 from slipsweep._version import __version__
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.netcdf import WITH_MISSING
-from slipsweep.files.opening import read_result, result_names, tally_in, values_text
+from slipsweep.files.opening import read_result, result_names, values_text
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
+from slipsweep.grid.tally import tally_of
 from slipsweep.model.variables import LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS
 
 if TYPE_CHECKING:
@@ -315,7 +316,7 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
     rows += [(str(one.attrs.get("long_name", name)), values_text(one)) for name, one in part.coords.items()]
     for table in tables:
         if "validity" in table.part:
-            tally = tally_in(table.part[["validity"]])
+            tally = tally_of(table.part[["validity"]])
             for flag, count in (tally.flags or {}).items():
                 share = f"{tally.share(count):.2%} of {tally.cells} cells"
                 rows.append((f"{int(flag)} {(flag.name or '').lower()}", f"{flag.kind}: {share}; {flag.text}"))

@@ -15,7 +15,7 @@ from slipsweep.errors import InputError
 from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec, named
-from slipsweep.grid.chunks import AnyPlan
+from slipsweep.grid.plans import Plan
 from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
 
 #: Attribute by which a run knows whether a file is its own.
@@ -27,7 +27,7 @@ class Job:
     """A sweep file, the plan that a command makes of it, and what the command's output says of itself."""
 
     spec: SweepSpec
-    plan: AnyPlan
+    plan: Plan
     title: str
     options: Mapping[str, Any]  # what the results depend on further to the sweep file, by what users know it by
     floats: str = "float64"  # data type of floating-point results in the file

@@ -11,8 +11,7 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
 from slipsweep.files.selection import units_text
-from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths, grid_chunks
-from slipsweep.grid.tally import Indices, Tally
+from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.model import variables as known
 
 #: All that a command of slipsweep writes, but for the samples of records.
@@ -141,26 +140,6 @@ def result_names(table: xr.Dataset) -> list[str]:
     dims = {dim for name in [one for one in names if one in _RESULTS] or names for dim in table[name].dims}
     dims -= {RECORD_DIM, SUITE_DIM}
     return [name for name in names if dims.issuperset(table[name].dims)]
-
-
-def tally_in(table: xr.Dataset) -> Tally:
-    """Count modes, flags and ratios of a result, read in chunks (InputError: not of the same cells)."""
-    names = [name for name in ("sliding_mode", "validity") if name in table.data_vars]
-    if len({table[name].size for name in names}) > 1:
-        raise InputError("sliding_mode and validity are not of the same cells")
-    tally = Tally(max((table[name].size for name in names), default=0))
-    moved = ("permanent_displacement", "newmark_displacement")
-    if all(one in table.data_vars for one in moved) and table[moved[0]].sizes == table[moved[1]].sizes:
-        names += moved
-    widest: Any = max((table[name].sizes for name in names), key=len, default={})
-    for chunk in grid_chunks(widest, CHUNK_CELLS) if names else ():
-        tally.merge(Tally.of(table[names].isel(chunk, missing_dims="ignore")))
-    if {"sensitivity_status", "first_order_index", "total_index"} <= {*table.data_vars} and "input" in table.coords:
-        order = [*table["sensitivity_status"].dims, "input"]
-        first, total = (table[name].transpose(*order).values for name in ("first_order_index", "total_index"))
-        inputs = [str(one) for one in table["input"].values]
-        tally.indices = Indices.counted(inputs, first, total, table["sensitivity_status"].values)
-    return tally
 
 
 def coordinate_texts(table: xr.Dataset) -> dict[str, str]:

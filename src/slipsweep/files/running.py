@@ -26,9 +26,10 @@ from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.spec import named
 from slipsweep.files.storing import NetcdfChunks, Place, ZarrChunks
-from slipsweep.grid.chunks import CHUNK_CELLS, AnyPlan, chunk_lengths, grid_chunks
+from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
+from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
-from slipsweep.grid.tally import Tally
+from slipsweep.grid.tally import Tally, tally_of
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -95,7 +96,7 @@ def run(
     if isinstance(path, Path):
         check_outputs([path], overwrite or resume, reads=job.spec.files)
     if resume and (complete := _complete(job, path)) is not None:
-        return Report(path, tally_of(complete, plan), found=True)
+        return Report(path, tally_of(complete), found=True)
     processes = workers or (64 if scheduler else 0)
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, memory, processes, workers or 0), plan.together)
     is_zarr = isinstance(path, str) or path.suffix == ".zarr"
@@ -105,7 +106,7 @@ def run(
             table = plan.solve(progress)
         with complete_or_absent(Path(path), overwrite) as temporary:
             netcdf.write_table(job.described(table, command), temporary, job.spec.output.compression)
-        return Report(path, tally_of(table, plan))
+        return Report(path, tally_of(table))
     with chunks.begun(command, resume, overwrite), named(job.spec.source), ExitStack() as stack:
         kept = ((place, None) for place in chunks if place[0] in chunks.done)
         tasks = ((place, chunks.task(*place)) for place in chunks if place[0] not in chunks.done)
@@ -120,16 +121,7 @@ def run(
             if progress is not None:
                 progress(plan.part(chunk).cells)
         chunks.finish(overwrite)
-        return Report(path, tally_of(read_result(path), plan))
-
-
-def tally_of(table: xr.Dataset, plan: AnyPlan) -> Tally:
-    """Count the results of a plan, read in chunks."""
-    tally = Tally()
-    for chunk in grid_chunks(plan.sizes, CHUNK_CELLS, plan.together):
-        tally.merge(plan.tally(table[list(plan.names)].isel(chunk, missing_dims="ignore")))
-    tally.cells = plan.cells
-    return tally
+        return Report(path, tally_of(read_result(path)))
 
 
 def _complete(job: Job, path: Place) -> xr.Dataset | None:
@@ -149,7 +141,7 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
     return found
 
 
-def _chunk_cells(plan: AnyPlan, memory: int | None, processes: int, workers: int) -> int:
+def _chunk_cells(plan: Plan, memory: int | None, processes: int, workers: int) -> int:
     """How many cells a chunk may have: seconds of work, within the memory, and enough chunks for all processes."""
     cells = max(1, int(CHUNK_CELLS / plan.cost))
     if processes:

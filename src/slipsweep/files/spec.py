@@ -23,7 +23,7 @@ from slipsweep.motion import reading, records, suites
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 if TYPE_CHECKING:
-    from slipsweep.grid.chunks import AnyPlan
+    from slipsweep.grid.plans import Plan
     from slipsweep.studies.sampling import Sampling
 
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
@@ -107,7 +107,7 @@ class SweepSpec:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
-    def plan(self) -> "AnyPlan":
+    def plan(self) -> "Plan":
         """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
         chosen: dict[str, Any] = {"excitation": self.excitation, "model": self.model, "solver": self.solver}
         # these import numba, and scipy: not for sweeps that are only looked at

@@ -31,7 +31,8 @@ from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
 from slipsweep.files.outputs import EXISTS, appear, writing
-from slipsweep.grid.chunks import AnyPlan, Chunk, places
+from slipsweep.grid.chunks import Chunk, places
+from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
 
 #: A file or folder, or the address of a store.
@@ -179,7 +180,7 @@ class Chunks:
         """Give the output its name."""
 
 
-def _solved(plan: AnyPlan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr.Dataset:
+def _solved(plan: Plan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr.Dataset:
     """The results of a chunk in the types of the file, without coordinates."""
     table = plan.part(chunk).solve()
     return xr.Dataset({name: table[name].variable.astype(dtype, copy=False) for name, dtype in dtypes.items()})

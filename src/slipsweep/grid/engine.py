@@ -182,7 +182,7 @@ def _fill(results: Arrays, request: Request, solver: solvers.Solver, finite: boo
     scaled = _scaled_dimension(request)
     cell_shape = tuple(1 if axis == scaled else size for axis, size in enumerate(request.shape))
     share = math.prod(cell_shape) // (8 * threads.thread_count())
-    tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // solver.cost, 1)
+    tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // solvers.cost_of(request.problem), 1)
 
     def work(slab: tuple[slice, ...]) -> None:
         where = tuple(slice(None) if axis == scaled else own for axis, own in enumerate(slab))

@@ -18,7 +18,6 @@ from slipsweep.errors import InputError
 from slipsweep.grid import chunks, engine, resources
 from slipsweep.grid import inputs as grid_inputs
 from slipsweep.grid.solvers import ROWS, cost_of, memory_of
-from slipsweep.grid.tally import Tally
 from slipsweep.model import options
 from slipsweep.model import variables as known
 from slipsweep.model.parameters import check_choices, check_given, check_progress
@@ -55,17 +54,17 @@ class Task:
 
 @dataclass
 class Plan:
-    """A sweep that has been checked and only needs computing; further attributes as of `chunks.AnyPlan`."""
+    """What has been checked and only needs computing."""
 
-    sizes: dict[str, int]
+    sizes: dict[str, int]  # of the grid, its dimensions in the order of the results
     coords: dict[str, xr.Variable]
     tasks: tuple[Task, ...]
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the results, in the order of the table
     attrs: dict[str, Any]
-    cost: float = 1.0
-    together: tuple[str, ...] = ()
-    memory: int = 0
-    cell_memory: int = 0
+    cost: float = 1.0  # of a cell of the grid, in cells of the cycle solver
+    together: tuple[str, ...] = ()  # dimensions along which a part takes about as much as all: to be cut last
+    memory: int = 0  # bytes that solving takes beside the results, however small the grid
+    cell_memory: int = 0  # bytes for each cell of the grid that it takes beside them
     #: Attributes of the results.
     described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: known.RESULTS | known.RECORD_RESULTS)
 
@@ -74,11 +73,11 @@ class Plan:
 
     @property
     def cells(self) -> int:
-        """Number of cells of the grid."""
+        """What there is to solve, in what `progress` counts."""
         return _cells(self.sizes)
 
     def part(self, chunk: chunks.Chunk) -> "Plan":
-        """The plan cut to a chunk of its grid."""
+        """The plan of a chunk of the grid, which gives the same bits as the whole does there."""
 
         def cut(task: Task) -> Task:
             return replace(task, request=task.request.part(tuple(chunks.places(chunk, task.sizes).values())))
@@ -87,12 +86,11 @@ class Plan:
         coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
         return replace(self, sizes=sizes, coords=coords, tasks=tuple(map(cut, self.tasks)))
 
-    def tally(self, results: xr.Dataset) -> Tally:
-        """Modes and flags in a chunk of results."""
-        return Tally.of(results)
-
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-        """Compute everything at once; InputError: memory cannot hold it."""
+        """Compute everything at once; InputError: memory cannot hold it.
+
+        `progress` is told of cells as they are finished, from any thread.
+        """
         check_progress(progress)
         sizes = max((task.sizes for task in self.tasks), key=_cells, default={})
         needed = _cells(sizes) * self.cell_memory
@@ -115,6 +113,30 @@ class Plan:
 
         return self._table(zeros)
 
+    def lazy(self, lengths: chunks.Lengths) -> xr.Dataset:
+        """The results as dask arrays in chunks of these lengths: nothing is computed before it is asked for."""
+        import dask.array as da  # takes as long as xarray
+
+        # an array with one element a chunk of the grid, an object: all results of a chunk come out of one task
+        ones = tuple((1,) * len(own) for own in lengths.values())
+        meta = np.empty((0,) * len(ones), object)
+        solved = da.map_blocks(_solved, plan=self, lengths=dict(lengths), chunks=ones, dtype=object, meta=meta)
+        table, found = self.template(), {}
+        for name, result in table.data_vars.items():
+            # a result has some dimensions of the grid, in their order, and perhaps others of its own after them
+            own = [dim for dim in result.dims if dim in lengths]
+            values = da.map_blocks(
+                _result,
+                solved[tuple(slice(None) if dim in own else 0 for dim in lengths)] if lengths else solved,
+                result=name,
+                chunks=tuple(lengths[str(dim)] if dim in lengths else (result.sizes[dim],) for dim in result.dims),
+                new_axis=list(range(len(own), len(result.dims))) or None,
+                dtype=result.dtype,
+                meta=np.empty((0,) * result.ndim, result.dtype),
+            )
+            found[name] = xr.Variable(result.dims, values, result.attrs)
+        return xr.Dataset(found, table.coords, table.attrs)
+
     def _table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> xr.Dataset:
         """The results, with `evaluate` giving a task's arrays."""
         found = {
@@ -123,6 +145,20 @@ class Plan:
             for name, values in evaluate(task).items()
         }
         return xr.Dataset({name: found[name] for name in self.names}, self.coords, self.attrs)
+
+
+def _solved(plan: Plan, lengths: chunks.Lengths, block_id: tuple[int, ...]) -> np.ndarray:
+    """The results of a chunk, arrays by their names, as an element of an array."""
+    table = plan.part(chunks.chunk_at(lengths, block_id)).solve()
+    found = np.empty((1,) * len(block_id), object)
+    found[(0,) * len(block_id)] = {str(name): one.values for name, one in table.data_vars.items()}
+    return found
+
+
+def _result(chunk: Any, result: str) -> np.ndarray:
+    """One result of a chunk, which is an element of an array or an array of that alone."""
+    results = chunk.item() if isinstance(chunk, np.ndarray) else chunk
+    return np.asarray(results[result])
 
 
 def _cells(sizes: Mapping[str, int]) -> int:

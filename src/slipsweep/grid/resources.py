@@ -7,20 +7,14 @@ from pathlib import Path
 from slipsweep.errors import InputError
 
 
-def available_memory() -> int | None:
-    """Bytes of memory that can be had without swapping, or None where the system does not say."""
+def check_memory(what: str, needed: int, advice: str) -> None:
+    """Refuse what memory cannot hold, before any of it is taken; InputError: what takes how much, and the advice."""
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
     except OSError:
-        return None
-    fields = dict(line.split(":", 1) for line in lines)
-    return int(fields["MemAvailable"].split()[0]) * 1024 if "MemAvailable" in fields else None
-
-
-def check_memory(what: str, needed: int, advice: str) -> None:
-    """Refuse what memory cannot hold, before any of it is taken; InputError: what takes how much, and the advice."""
-    free = available_memory()
-    if free is not None and needed > free:
+        return
+    free = int(next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), needed)) * 1024
+    if needed > free:
         raise InputError(f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}")
 
 

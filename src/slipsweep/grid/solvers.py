@@ -33,16 +33,12 @@ ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 #: The same of `find_parameters`.
 _PARAMETER_ROWS = {name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))}
 
-#: Cells of the cycle solver that a cell of a record takes, about.
-_RECORD_COST = 200
-
 
 class Solver(NamedTuple):
     """What solves cells, of dtype `kernels.grid.CELL`, into results, (rows, cells)."""
 
     solve: Callable[[np.ndarray, np.ndarray], Any]
     rows: Mapping[str, int]  # of the results
-    cost: int  # the time of a cell in those of the sine's
 
 
 def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
@@ -60,7 +56,7 @@ def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
 def parameter_solver(problem: Problem) -> Solver:
     """What finds Eqs. 7-11 and λ of cells."""
     options = options_of(problem, wants_peak=False)
-    return Solver(lambda cells, results: find_parameters(cells, options, results), _PARAMETER_ROWS, 1)
+    return Solver(lambda cells, results: find_parameters(cells, options, results), _PARAMETER_ROWS)
 
 
 def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
@@ -81,29 +77,29 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     if isinstance(motion, Record):
         recorded = cutting.wave_of_record(motion, polarity)
         return Solver(
-            lambda cells, results: solve_record(cells, options, recorded, workspace_of(recorded), results),
-            ROWS,
-            max(64, recorded.pieces.shape[0] // 8),
+            lambda cells, results: solve_record(cells, options, recorded, workspace_of(recorded), results), ROWS
         )
     assert isinstance(motion, Waveform)
     if isinstance(problem.solver, Step):
         wave = cutting.wave_of(motion)
         steps = pieces.steps_of(wave, RULES[problem.solver.rule], problem.solver.steps_per_cycle)
-        return Solver(
-            lambda cells, results: solve_steps(cells, options, wave, pieces.own_steps(steps), results),
-            ROWS,
-            1 + problem.solver.steps_per_cycle // 16,
-        )
-    if isinstance(motion, Sine) and not motion.ramp_in and not motion.ramp_out:
-        return Solver(under_sine, ROWS, 1)
-    return Solver(under_wave, ROWS, 16)
+        return Solver(lambda cells, results: solve_steps(cells, options, wave, pieces.own_steps(steps), results), ROWS)
+    return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
 
 
-def cost_of(problem: Problem) -> float:
-    """What a cell takes, in cells of the cycle solver."""
-    if isinstance(problem.excitation, (Record, Suite)):
-        return _RECORD_COST
-    return 1.0 + problem.solver.steps_per_cycle / 16 if isinstance(problem.solver, Step) else 1.0
+def is_plain_sine(motion: Any) -> bool:
+    """Whether a motion is a sine without ramps, whose cells are solved in batches."""
+    return isinstance(motion, Sine) and not motion.ramp_in and not motion.ramp_out
+
+
+def cost_of(problem: Problem) -> int:
+    """What a cell takes, about, in those of a plain sine by the cycle solver."""
+    motion = problem.excitation
+    if isinstance(motion, Waveform):
+        if isinstance(problem.solver, Step):
+            return 1 + problem.solver.steps_per_cycle // 16
+        return 1 if is_plain_sine(motion) else 16
+    return max(64, max(one.times.size for one in (motion if isinstance(motion, Suite) else (motion,))) // 8)
 
 
 def memory_of(problem: Problem) -> int:

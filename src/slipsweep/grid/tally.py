@@ -1,32 +1,34 @@
-"""Counts of sliding modes and flags over a grid, and the spread of the displacement about Newmark's."""
+"""Counts of sliding modes and flags in results, and the spread of the displacement about Newmark's."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from slipsweep.errors import InputError
+from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
 
 #: Ratios are counted in this many classes of equal width in their logarithms, 0.1 % wide, between these.
 _CLASSES, _LEAST, _LARGEST = 32_000, 1e-7, 1e7
+
+_MOVED = ("permanent_displacement", "newmark_displacement")
 
 
 @dataclass
 class Ratios:
     """Ratios of displacements, counted in classes, so that those of any number of cells take little memory."""
 
-    counts: NDArray[np.int64]
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_CLASSES, np.int64))
 
-    @classmethod
-    def of(cls, values: NDArray[Any], others: NDArray[Any]) -> "Ratios":
+    def add(self, values: NDArray[Any], others: NDArray[Any]) -> None:
         """Count values over others, where neither is zero or missing; a negative one as the least."""
         there = (values != 0.0) & (others != 0.0) & np.isfinite(values) & np.isfinite(others)
         ratios = np.clip(np.divide(values[there], others[there], dtype=np.float64), _LEAST, _LARGEST)
-        return cls(np.histogram(np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST)))[0])
+        self.counts += np.histogram(np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST)))[0]
 
     @property
     def number(self) -> int:
@@ -43,74 +45,80 @@ class Ratios:
 
 @dataclass
 class Indices:
-    """Sobol indices of grid points, counted."""
+    """Sobol indices of grid points: how many have them, or why not; by input the means, and where it is the largest."""
 
-    status: dict[SensitivityStatus, int]  # grid points with indices, and without for each reason
-    first: dict[str, float]  # sums of the indices of each input
+    status: dict[SensitivityStatus, int]
+    first: dict[str, float]
     total: dict[str, float]
-    largest: dict[str, int]  # grid points at which the total index of an input is the largest
-
-    @classmethod
-    def counted(
-        cls, inputs: Sequence[str], first: NDArray[Any], total: NDArray[Any], status: NDArray[Any]
-    ) -> "Indices":
-        """Count indices, whose last dimension is that of the inputs, and their status."""
-        by_status = {one: int(np.count_nonzero(status == int(one))) for one in SensitivityStatus}
-        both = np.stack([first, total]).reshape(2, -1, len(inputs)).astype(np.float64)
-        # a file may have passed through other programs
-        rows = both[:, (status.ravel() == 0) & np.isfinite(both).all(axis=(0, 2))]
-        largest = np.bincount(rows[1].argmax(axis=1), minlength=len(inputs)).tolist()
-        by_input = [dict(zip(inputs, values, strict=True)) for values in (*rows.sum(axis=1).tolist(), largest)]
-        return cls(by_status, *by_input)
-
-    def mean(self, sums: Mapping[str, float], name: str) -> float:
-        """The mean of one of the sums over all grid points with indices."""
-        return sums[name] / max(self.status[SensitivityStatus.COMPUTED], 1)
+    largest: dict[str, int]
 
 
 @dataclass
 class Tally:
-    """Counts of cells, and among them of each sliding mode and each flag, and displacements over Newmark's.
+    """Counts of cells, all and those of each sliding mode and each flag, and displacements over Newmark's.
 
-    None: not stored.  Modes and flags are of all cells, or of `counted` if that is not 0.
+    None: not stored.  Of samples the cells are grid points, and a count is the sum of their shares.
     """
 
-    cells: int = 0
-    modes: dict[SlidingMode, int] | None = None
-    flags: dict[Validity, int] | None = None
+    cells: int
+    modes: dict[SlidingMode, float] | None = None
+    flags: dict[Validity, float] | None = None
     ratios: Ratios | None = None
     indices: Indices | None = None
-    counted: int = 0
 
-    @classmethod
-    def of(cls, results: xr.Dataset) -> "Tally":
-        """Count results; what is not counted is not read."""
-        tally = cls()
-        if "sliding_mode" in results:
-            modes = results["sliding_mode"].values
-            tally.modes = {mode: int(np.count_nonzero(modes == int(mode))) for mode in SlidingMode}
-        if "validity" in results:
-            validity = results["validity"].values.astype(np.int16, copy=False)
-            tally.flags = {flag: int(np.count_nonzero(validity & flag.value)) for flag in Validity}
-        if {"permanent_displacement", "newmark_displacement"} <= results.keys():
-            tally.ratios = Ratios.of(results["permanent_displacement"].values, results["newmark_displacement"].values)
-        return tally
-
-    def share(self, count: int) -> float:
-        """A count of a mode or a flag over all that was counted."""
-        return count / (self.counted or self.cells)
-
-    def merge(self, other: "Tally") -> None:
-        """Add the counts of other cells."""
-        vars(self).update(vars(_added(self, other)))
+    def share(self, count: float) -> float:
+        """A count over all cells."""
+        return count / max(self.cells, 1)
 
 
-def _added(one: Any, other: Any) -> Any:
-    """Counts, or dictionaries or classes of them, added one by one; None is not stored."""
-    if one is None or other is None:
-        return one if other is None else other
-    if isinstance(one, dict):
-        return {name: _added(count, other[name]) for name, count in one.items()}
-    if isinstance(one, (Ratios, Indices, Tally)):
-        return replace(one, **_added(vars(one), vars(other)))
-    return one + other
+def tally_of(results: xr.Dataset) -> Tally:
+    """Count results, read in chunks; what is not counted is not read (InputError: not of the same cells)."""
+    if {"flag_share", "valueless_share"} <= results.data_vars.keys():
+        return _tally_of_samples(results)
+    names = [name for name in ("sliding_mode", "validity") if name in results.data_vars]
+    if len({results[name].size for name in names}) > 1:
+        raise InputError("sliding_mode and validity are not of the same cells")
+    tally = Tally(max((results[name].size for name in names), default=0))
+    modes, flags = dict.fromkeys(SlidingMode, 0.0), dict.fromkeys(Validity, 0.0)
+    tally.modes, tally.flags = modes if "sliding_mode" in names else None, flags if "validity" in names else None
+    if results.data_vars.keys() >= {*_MOVED} and results[_MOVED[0]].sizes == results[_MOVED[1]].sizes:
+        names += _MOVED
+        tally.ratios = Ratios()
+    widest: Any = max((results[name].sizes for name in names), key=len, default={})
+    for chunk in grid_chunks(widest, CHUNK_CELLS) if names else ():
+        part = {name: results[name].isel(chunk, missing_dims="ignore").values for name in names}
+        for mode in SlidingMode if tally.modes else ():
+            modes[mode] += np.count_nonzero(part["sliding_mode"] == int(mode))
+        for flag in Validity if tally.flags else ():
+            flags[flag] += np.count_nonzero(part["validity"].astype(np.int16, copy=False) & flag.value)
+        if tally.ratios:
+            tally.ratios.add(part[_MOVED[0]], part[_MOVED[1]])
+    return tally
+
+
+def _tally_of_samples(results: xr.Dataset) -> Tally:
+    """Sum up the shares of samples at all grid points."""
+
+    def sums(name: str, own: str) -> dict[int, float]:
+        shares = results[name].transpose(..., own).values.reshape(-1, results.sizes[own])
+        return dict(zip(results[own].values.tolist(), shares.sum(axis=0, dtype=np.float64), strict=True))
+
+    valueless = results["valueless_share"]
+    tally = Tally(valueless.size, flags={Validity(flag): share for flag, share in sums("flag_share", "flag").items()})
+    if "mode_share" in results.data_vars:
+        tally.modes = {SlidingMode.MISSING: float(valueless.sum(dtype=np.float64))}
+        tally.modes |= {SlidingMode(mode): share for mode, share in sums("mode_share", "mode").items()}
+    if {"sensitivity_status", "first_order_index", "total_index"} <= results.data_vars.keys():
+        status = results["sensitivity_status"]
+        both = [results[name].transpose(*status.dims, "input").values for name in ("first_order_index", "total_index")]
+        rows = np.stack(both).reshape(2, -1, results.sizes["input"]).astype(np.float64)
+        # a file may have passed through other programs
+        rows = rows[:, (status.values.ravel() == 0) & np.isfinite(rows).all(axis=(0, 2))]
+        means = rows.sum(axis=1) / max(rows.shape[1], 1)
+        largest = np.bincount(rows[1].argmax(axis=1), minlength=rows.shape[2])
+        inputs = results["input"].values.astype(str).tolist()
+        tally.indices = Indices(
+            {one: int(np.count_nonzero(status == int(one))) for one in SensitivityStatus},
+            *(dict(zip(inputs, values.tolist(), strict=True)) for values in (*means, largest)),
+        )
+    return tally

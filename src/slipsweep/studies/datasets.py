@@ -11,7 +11,6 @@ import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
-from slipsweep.grid.chunks import lazy_dataset
 from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan, plan_friction_parameters, plan_sweep
 from slipsweep.model.choices import declared
@@ -299,4 +298,4 @@ def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
             raise ValueError
     except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError):
         raise InputError(f"chunks = {shown(chunks)}: must be whole numbers > 0 along {dims}") from None
-    return lazy_dataset(plan, dict(zip(plan.sizes, lengths, strict=True)))
+    return plan.lazy(dict(zip(plan.sizes, lengths, strict=True)))

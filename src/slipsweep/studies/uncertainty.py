@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.grid import chunks, engine, plans, resources, solvers, tally, threads
+from slipsweep.grid import chunks, engine, plans, resources, solvers, threads
 from slipsweep.grid import inputs as grid_inputs
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
@@ -256,14 +256,11 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.
             raise InputError(f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative')
 
 
-class SamplePlan:
+class SamplePlan(plans.Plan):
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
-    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.  A plan as all
-    others are (`chunks.AnyPlan`).
+    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.
     """
-
-    cell_memory = 0
 
     def __init__(
         self, sampling: Sampling, problem: grid_inputs.Problem, coords: dict[str, xr.Variable], attrs: dict[str, Any]
@@ -308,8 +305,7 @@ class SamplePlan:
         #: Samples and runs of a grid point, all draws with all that is pooled; how many points are solved together.
         self.samples, self.runs = (n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs))
         self.points = max(_CELLS // self.runs, 1)
-        # as in `chunks.AnyPlan`
-        self.cells = math.prod(self.solved.values()) * self.runs
+        # as of any plan
         self.together = tuple(self.scaled)
         self.cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
         run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
@@ -317,6 +313,11 @@ class SamplePlan:
         if sampling.sensitivity:
             self.cost += _SOBOL_COST
             self.memory += SOBOL_MEMORY + 64 * sampling.runs
+
+    @property
+    def cells(self) -> int:
+        """Number of samples to solve."""
+        return math.prod(self.solved.values()) * self.runs
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
@@ -440,21 +441,3 @@ class SamplePlan:
             # NaN leaves it to the estimate and its flag where that fails
             arrays[name] = np.where(parameters.BOUNDS[name].holds(values), values, np.nan)
         return arrays, tuple(sizes.values())
-
-    def tally(self, results: xr.Dataset) -> tally.Tally:
-        """Samples by sliding mode and by flag, from their shares; grid points by what moves the displacement."""
-
-        def counts(name: str, codes: Sequence[Any]) -> dict[Any, int]:
-            shares = results[name].values.reshape(-1, len(codes)).astype(np.float64)
-            return dict(zip(codes, np.rint(shares * self.samples).astype(np.int64).sum(axis=0).tolist(), strict=True))
-
-        found = tally.Tally(flags=counts("flag_share", tuple(variables.Validity)))
-        found.counted = results["valueless_share"].size * self.samples
-        if "mode_share" in results:
-            found.modes = counts("valueless_share", (variables.SlidingMode.MISSING,)) | counts("mode_share", _MODES)
-        if self.sampling.sensitivity:
-            found.indices = tally.Indices.counted(
-                ["+".join(one) for one in self.sampling.independent],
-                *(results[name].values for name in ("first_order_index", "total_index", "sensitivity_status")),
-            )
-        return found
