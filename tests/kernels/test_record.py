@@ -12,7 +12,7 @@ from numba import njit
 
 import slipsweep
 from slipsweep import InputError, Record, sweep
-from slipsweep.kernels.block import MONOTONE, Cell, block_of, interface_of
+from slipsweep.kernels.block import EQ12, MONOTONE, Cell, Options, block_of, interface_of
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.linear import held_stop
 from slipsweep.model.friction import exponential
@@ -49,7 +49,8 @@ def shaking() -> Record:
 
 @njit
 def _followed(cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray) -> tuple[float, float]:
-    block = block_of(exponential(), Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), MONOTONE, G)
+    options = Options(MONOTONE, EQ12, 1, True, G)
+    block = block_of(exponential(), 1.0, Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), options)
     return eq4_integrals(block, pieces[0], pieces[0].begin, pieces[0].finish)
 
 

@@ -16,11 +16,8 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
-#: What kernels call: such a function is compiled with each kernel, without what Python would need to call it, and may
-#: be passed as a value, as those of a friction law are.  `contract` fuses a*b + c, `arcp` divides by g once.
-scalar: Callable[[_Function], _Function] = numba.extending.register_jitable(
-    error_model="numpy", fastmath={"contract", "arcp"}
-)
+#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.
+scalar = part("arcp")
 
 #: The same for sums over quadrature nodes, whose order the compiler may then choose (SIMD).
 summed = part("arcp", "reassoc", "nsz")
@@ -34,6 +31,12 @@ single = part("arcp", inline="always")
 
 #: The same for elementary functions, which have no division to share.
 elementary = part("nsz", forceinline=True)
+
+#: The same for functions that are passed as values, those of a friction law: numba keeps a kernel on disk only if such
+#: a function is none that was compiled before.
+registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
+    error_model="numpy", fastmath={"contract", "arcp"}
+)
 
 _ffi = cffi.FFI()
 

@@ -152,12 +152,12 @@ def decay_rate_of(cell: Cell, delta_mu: float, minimum_friction: float, g: float
 
 
 @inlined
-def block_of(law: FrictionLaw, cell: Cell, interface: Interface, rise: int, g: float) -> Block:
-    """A cell's block, λ from Eq. 6 where it is not given."""
-    decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, g)
+def block_of(law: FrictionLaw, amplitude: float, cell: Cell, interface: Interface, options: Options) -> Block:
+    """A cell's block, λ from Eq. 6 where it is not given; the base's acceleration is the `amplitude` times w."""
+    decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, options.g)
     return Block(
-        cell.amplitude, interface.yield_acceleration, cell.mu_s, cell.tan_theta, interface.delta_mu, decay_rate, g,
-        rise, law,
+        amplitude, interface.yield_acceleration, cell.mu_s, cell.tan_theta, interface.delta_mu, decay_rate, options.g,
+        options.rise, law,
     )  # fmt: skip
 
 

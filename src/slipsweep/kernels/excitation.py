@@ -55,8 +55,6 @@ def integral(piece: Piece, start: float, end: float) -> float:
 @scalar
 def integrals(piece: Piece, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
-    if start == piece.begin and end == piece.finish:
-        return piece.whole, piece.whole_moment
     if piece.arc:
         sine_part = angle_minus_sine(start)
         remaining = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)

@@ -45,12 +45,7 @@ def block_in_pulse(
         cell.minimum_friction,
     )  # fmt: skip
     interface = physics.interface_of(in_pulse, options.rise, options.g)
-    own = physics.block_of(law, in_pulse, interface, options.rise, options.g)
-    block = Block(
-        cell.amplitude, own.yield_acceleration, own.mu_s, own.tan_theta, own.delta_mu, own.decay_rate, own.g,
-        own.rise, law,
-    )  # fmt: skip
-    return block, interface
+    return physics.block_of(law, cell.amplitude, in_pulse, interface, options), interface
 
 
 @inlined

@@ -152,7 +152,7 @@ def cell_solver_of(
     def solve_cell(law: FrictionLaw, cell: Cell, options: Options, wave: Wave, workspace: Any) -> Motion:
         """The response of a cell of any law that gives what the solver takes of it (`FrictionLaw.missing`)."""
         interface = interface_of(cell, options.rise, options.g)
-        block, mode = block_of(law, cell, interface, options.rise, options.g), interface.sliding_mode
+        block, mode = block_of(law, cell.amplitude, cell, interface, options), interface.sliding_mode
         validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
         found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
         if mode == eq.CONTINUOUS:

@@ -8,7 +8,7 @@ from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 
 import math
 
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model.variables import SlidingMode
 
@@ -93,7 +93,7 @@ def block_acceleration(ground_acceleration: float, friction: float, mu_s: float,
     return ground_acceleration - relative_acceleration(ground_acceleration, friction, mu_s, tan_theta, g)
 
 
-@scalar
+@registered
 def friction_coefficient(
     ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> float:

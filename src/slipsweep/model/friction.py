@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model import equations as eq
 
@@ -51,14 +51,14 @@ class FrictionLaw(NamedTuple):
         return tuple(name for name, function in self._asdict().items() if function is None)
 
 
-@scalar
+@registered
 def exponential_derivatives(friction: float, decay_rate: float, g: float) -> tuple[float, float]:
     """Derivatives of Eq. 6 by |Üg|: −(λ/g) μ and (λ/g)² μ."""
     rate = decay_rate / g
     return -rate * friction, rate * rate * friction
 
 
-@scalar
+@registered
 def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> float:
     """Where d²Ü/dÜg² of Eqs. 4 and 6 turns positive: (2 tan θ / λ − 1) g / tan θ; not positive where λ ≥ 2 tan θ.
 
@@ -67,13 +67,13 @@ def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> flo
     return (2.0 * tan_theta / decay_rate - 1.0) * g / tan_theta
 
 
-@scalar
+@registered
 def exponential_static_acceleration(mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
     """|Üg| at which Eq. 6 gives μs: (g/λ) ln((μs + Δμ)/μs)."""
     return g / decay_rate * log((mu_s + delta_mu) / mu_s)
 
 
-@scalar
+@registered
 def exponential_decay_length(decay_rate: float, g: float) -> float:
     """g/λ, over which μ of Eq. 6 falls to a part 1/e."""
     return g / decay_rate
@@ -85,7 +85,7 @@ _SERIES_END, _DECAYED = 2.0, 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
 
 
-@scalar
+@inlined
 def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
 
@@ -105,7 +105,7 @@ def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     return whole, early, late, (early - late) / z
 
 
-@scalar
+@registered
 def exponential_moments(
     start: float, change: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> tuple[float, float, float, float]:

@@ -66,7 +66,7 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 @scalar
 def classify(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
     """The block of each cell of a batch and the kind of its motion; mode and a-priori validity go into the results."""
-    g, slides, sticks = options.g, 0, 0
+    g, slides = options.g, 0
     for j in range(WIDTH):
         interface = interface_of(given(batch, j), options.rise, g)
         batch.yield_acceleration[j], batch.delta_mu[j] = interface.yield_acceleration, interface.delta_mu
@@ -74,10 +74,8 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
         batch.sliding_mode[j], batch.validity[j] = interface.sliding_mode, interface.validity
         batch.kind[j] = RESTS
         slides += 1 if interface.sliding_mode > STUCK else 0
-        sticks += 1 if interface.sliding_mode == STICK_SLIP else 0
     for j in range(batch.used):
         results[SLIDING_MODE, first + j], results[VALIDITY, first + j] = batch.sliding_mode[j], batch.validity[j]
-    # neighbours are mostly alike: what none of them needs is left out
     if slides == 0:
         return
     for j in range(WIDTH):
@@ -87,22 +85,16 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
         for j in range(WIDTH):
             batch.kind[j] = YIELD_GOVERNS if batch.sliding_mode[j] == STICK_SLIP else RESTS
         return
-    lagging = 0
-    if sticks > 0:
-        for j in range(WIDTH):
-            start, end = batch.yield_acceleration[j], batch.amplitude[j]
-            batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
-            batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
-            if batch.sliding_mode[j] == STICK_SLIP:
-                batch.kind[j] = pulse_kind(batch, j, g) if options.rise == MONOTONE else OTHER
-            lagging += 1 if batch.response_at_peak[j] >= batch.amplitude[j] else 0
-    if lagging > 0:
-        for j in range(WIDTH):
-            if (batch.sliding_mode[j] == STICK_SLIP) & stays_with_base(batch, j, g):
-                batch.kind[j] = RESTS
     for j in range(WIDTH):
-        gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
-        # for the peak velocity D has to be concave (`continuous`)
-        concave = batch.decay_rate[j] >= 2.0 * batch.tan_theta[j]
-        if batch.sliding_mode[j] == CONTINUOUS:
+        start, end = batch.yield_acceleration[j], batch.amplitude[j]
+        batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
+        batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
+    for j in range(WIDTH):
+        if batch.sliding_mode[j] == STICK_SLIP:
+            kind = pulse_kind(batch, j, g) if options.rise == MONOTONE else OTHER
+            batch.kind[j] = RESTS if stays_with_base(batch, j, g) else kind
+        elif batch.sliding_mode[j] == CONTINUOUS:
+            gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
+            # for the peak velocity D has to be concave (`continuous`)
+            concave = batch.decay_rate[j] >= 2.0 * batch.tan_theta[j]
             batch.kind[j] = SLIDES_ON if gentle & (concave | (not options.wants_peak)) else OTHER
