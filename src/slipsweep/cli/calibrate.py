@@ -3,7 +3,7 @@
 import itertools
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
@@ -71,8 +71,8 @@ def friction(
     paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
 
-    span, offsets, drifts = None if rest is None else _times(rest), _channels(offset), _channels(drift)
-    table = measured_friction(test, **block, g=g, offset=offsets, drift=drifts, rest=span, threshold=least)
+    span = None if rest is None else _times(rest)
+    table = measured_friction(test, **block, g=g, **_removed(offset, drift), rest=span, threshold=least)
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
@@ -101,7 +101,7 @@ def calibrate(
     phi: options.Phi = None,
     offset: Offset = None,
     drift: Drift = None,
-    cycles: Annotated[bool, TEST.flag("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
+    cycles: Annotated[bool, TEST("Fit each cycle separately, too.")] = True,
     output: Annotated[options.Paths, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: options.Overwrite = False,
     model: Model,
@@ -113,17 +113,17 @@ def calibrate(
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
-    offsets, drifts = _channels(offset), _channels(drift)
-    table = calibrated(tests, **block, model=model, offset=offsets, drift=drifts, cycles=cycles)
+    table = calibrated(tests, **block, model=model, **_removed(offset, drift), cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
-    common.write_outputs(paths, overwrite, table, toml=lambda path: path.write_text(text, encoding="utf-8"))
+    common.write_outputs(paths, overwrite, table, toml=lambda: text)
     if not quiet:
         _summarize(table)
         echo("", text, *paths)
 
 
-def _channels(given: list[str] | None) -> str | list[str]:
-    return "all" if given == ["all"] else given or []
+def _removed(offset: list[str] | None, drift: list[str] | None) -> dict[str, Any]:
+    """What is taken off the channels of a test, as Python's functions take it."""
+    return {name: "all" if one == ["all"] else one or [] for name, one in (("offset", offset), ("drift", drift))}
 
 
 def _times(text: str) -> tuple[float, float]:

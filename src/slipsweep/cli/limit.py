@@ -40,6 +40,7 @@ def limit(
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
     from slipsweep.files import jobs, opening, spec
+    from slipsweep.grid.resources import grid_text
 
     results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
@@ -62,30 +63,21 @@ def limit(
             table = job.plan.solve(progress)
     labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
     common.write_outputs(figures, overwrite, labelled)
-    if not quiet:
-        _summarize(table)
-        echo(*(output or ()))
-
-
-def _summarize(table: "xr.Dataset") -> None:
-    import numpy as np
-
-    from slipsweep.grid.resources import grid_text
-
-    limits, status, g = table["limit_amplitude"], table["limit_status"].values, float(table.attrs["g"])
-    grid = grid_text({str(dim): size for dim, size in limits.sizes.items()}) or "one cell"
-    echo(f"{limits.size} limits ({grid})")
+    if quiet:
+        return
+    limits, status = table["limit_amplitude"], table["limit_status"]
+    echo(f"{limits.size} limits ({grid_text({str(dim): size for dim, size in limits.sizes.items()}) or 'one cell'})")
     if limits.notnull().any():
         values = {"smallest": limits.min(), "median": limits.median(), "largest": limits.max()}
         echo(*(f"  {text:<24}{common.range_text('amplitude', [value.item()], g)}" for text, value in values.items()))
     wanted = ", ".join(f"{one:.6g}" for one in table["displacement"].values.flat)
-    highest = common.range_text("amplitude", [float(table.attrs["maximum_amplitude"])], g)
-    echo(f"displacement {wanted} m, searched up to {highest}", f"inputs: {table.attrs['friction_inputs']}")
+    end = common.range_text("amplitude", [float(table.attrs["maximum_amplitude"])], g)
+    echo(f"displacement {wanted} m, searched up to {end}", f"inputs: {table.attrs['friction_inputs']}")
     if limits.sizes.get("motion", 1) > 1:
         _summarize_suite(table, g)
-    shares = {one: np.mean(status == one) for one in LimitStatus}
+    shares = {one: float((status == one).mean()) for one in LimitStatus}
     rows = (f"  {one.name.lower():<24}{share:7.2%}  {one.text}" for one, share in shares.items() if share)
-    echo("status (limit_status):", *rows)
+    echo("status (limit_status):", *rows, *(output or ()))
 
 
 def _summarize_suite(table: "xr.Dataset", g: float) -> None:

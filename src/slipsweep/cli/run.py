@@ -9,6 +9,7 @@ from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
 from slipsweep.cli.options import Large
 from slipsweep.errors import InputError
+from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
 from slipsweep.model.variables import SlidingMode
@@ -55,7 +56,7 @@ def run(
     if name is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = opening.place_of(name or f"{sweep.stem}.nc")
-    common.check_ending(path, (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
+    outputs.check_endings([path], (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
     passed, sampling, job = common.stopwatch(), checked.sampling, jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
     report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)

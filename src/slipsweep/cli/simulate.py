@@ -88,22 +88,18 @@ def simulate(
 
     given: dict[str, Any] = vars(typed) | with_unit
     table = simulated(**given, excitation=motion, model=model, points_per_cycle=points)
-    if flags := variables.Validity(table["validity"].item()) & variables.VALUELESS:
+    validity = variables.Validity(table["validity"].item())
+    if flags := validity & variables.VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags)
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
     table.attrs["title"] = "Time history of a sliding block"
     recorded = None if isinstance(motion, Waveform) else motion
-    common.write_outputs(paths, overwrite, table, recorded, csv=lambda path: _write_csv(table, path))
+    common.write_outputs(paths, overwrite, table, recorded, csv=lambda: _csv(table))
     if quiet:
         return
     if recorded is not None:
         echo(f"record                  {recorded.summary()}")
-    _summarize(table)
-    echo(f"taken as                {taken_as}", *paths)
-
-
-def _summarize(table: "xr.Dataset") -> None:
     echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
@@ -112,8 +108,9 @@ def _summarize(table: "xr.Dataset") -> None:
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
     for kind in variables.FlagKind:
-        flags = variables.Validity(table["validity"].item()) & variables.flags_of(kind)
+        flags = validity & variables.flags_of(kind)
         echo(*(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}" for flag in flags))
+    echo(f"taken as                {taken_as}", *paths)
 
 
 def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":
@@ -132,7 +129,9 @@ def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform 
         raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
 
 
-def _write_csv(table: "xr.Dataset", path: Path) -> None:
-    titles = {name: f"{name} ({table[name].attrs['units']})" for name in ("time", *variables.HISTORY) if name in table}
-    frame = table[[name for name in titles if name != "time"]].to_dataframe()[[*titles][1:]]
-    frame.rename(columns=titles).to_csv(path, index_label=titles["time"])
+def _csv(table: "xr.Dataset") -> str:
+    from slipsweep.files.export import header
+
+    names = [name for name in variables.HISTORY if name in table]
+    frame = table[names].to_dataframe()[names].rename(columns=lambda name: header(table[name]))
+    return str(frame.to_csv(index_label=header(table["time"]), lineterminator="\n"))
