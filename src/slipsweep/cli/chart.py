@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
-from slipsweep.cli.options import Text, Texts, command, written
+from slipsweep.cli.options import OUTPUT, File, Text, Texts, command, written
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
 
@@ -82,7 +82,7 @@ def chart(
 @command("Draw", "slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite")
 def report(
     file: options.Swept,
-    output: Annotated[Path | None, written("PDF to write (default: OUT.pdf).", "OUT.pdf")] = None,
+    output: Annotated[File, written("PDF to write (default: OUT.pdf).", "OUT.pdf")] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Write all charts that fit a result to one PDF, with a title page."""
@@ -94,11 +94,9 @@ def report(
 @command("Draw", "slipsweep explore design_chart.nc -o design_chart.html")
 def explore(
     file: Annotated[Path, options.read("OUT.nc", "A file that slipsweep run wrote.")],
-    output: Annotated[Path | None, written("Page to write (default: the file's name, .html).", "PAGE.html")] = None,
+    output: Annotated[File, written("Page to write (default: the file's name, .html).", "PAGE.html")] = None,
     overwrite: options.Overwrite = False,
-    size: Annotated[
-        str, options.OUTPUT("Largest size of the page; larger results are thinned to it.", "SIZE")
-    ] = "10MB",
+    size: Annotated[str, OUTPUT("Largest size of the page; larger results are thinned to it.", "SIZE")] = "10MB",
     quiet: options.Quiet = False,
 ) -> None:
     """Write a page for the browser in which to explore a result."""

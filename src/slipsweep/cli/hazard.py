@@ -43,8 +43,11 @@ def hazard(
 
     From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
     """
+    import numpy as np
+
     from slipsweep.files.opening import read_result
     from slipsweep.files.selection import own_names, selected
+    from slipsweep.studies import suite_statistics
     from slipsweep.studies.hazard import displacement_hazard, fragility, openquake_fragility, read_hazard_curve
 
     paths = common.check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
@@ -69,16 +72,8 @@ def hazard(
         more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
         drawn = displacement_hazard(result, given, more).assign_attrs(marked=marked)
     common.write_outputs(paths, overwrite, drawn, xml=lambda: openquake_fragility(fragility(result, lengths)))
-    if not quiet:
-        _summarize(rates, g)
-        echo(*paths)
-
-
-def _summarize(rates: "xr.Dataset", g: float) -> None:
-    import numpy as np
-
-    from slipsweep.studies.suite_statistics import point_names
-
+    if quiet:
+        return
     low, high = (float(one) / g for one in rates.attrs["amplitude_range"])
     start, end = (float(one) / g for one in rates.attrs["hazard_curve_range"])
     # P is known between these, and the rate of what lies above and below is not
@@ -87,7 +82,7 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
     echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
     # a share without a value may lie along fewer dimensions: it does not depend on the frequency
     sizes = {dim: size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
-    for index, point in zip(np.ndindex(*sizes.values()), point_names(rates, sizes), strict=True):
+    for index, point in zip(np.ndindex(*sizes.values()), suite_statistics.point_names(rates, sizes), strict=True):
         echo(*([point] if point else ()))
         _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
@@ -101,7 +96,7 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
         "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
         "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate),
     }
-    echo(*(text for text, holds in notes.items() if holds.any()))
+    echo(*(text for text, holds in notes.items() if holds.any()), *paths)
 
 
 def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
-from slipsweep.cli.options import Large, Text, Texts
+from slipsweep.cli.options import Large, Text, Texts, read, written
 from slipsweep.errors import InputError
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus
@@ -21,13 +21,9 @@ _MOST_POINTS, _MOST_MOTIONS = 12, 60
 @options.command("Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png", large=Large)
 def limit(
     *,
-    sweep: Annotated[
-        Path, options.read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")
-    ],
+    sweep: Annotated[Path, read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")],
     displacement: Annotated[list[str], options.LENGTH],
-    output: Annotated[
-        Texts, options.written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")
-    ] = None,
+    output: Annotated[Texts, written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")] = None,
     maximum_amplitude: Annotated[
         Text, options.Panel("Limit")("End of the search: 2g, 15 (m/s²).  [default: 5g]", "ACCELERATION")
     ] = None,
@@ -96,11 +92,11 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     counts, beyond = (found[name].values.ravel() for name in ("value_count", "not_reached_count"))
     width = max(24, *map(len, names))
     echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
-    for number, point in enumerate(points[:_MOST_POINTS]):
-        of = f"of {counts[number]}" + (f", {beyond[number]} of them not reached" if beyond[number] else "")
-        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, quantiles[number]))} {of}")
-        if each.size <= _MOST_MOTIONS:
-            motions = zip(names, each[number], strict=True)
-            echo(*(f"    {name.removeprefix('motion = '):<{width}}{text(value)}" for name, value in motions))
-    if len(points) > _MOST_POINTS:
-        echo(f"  and {len(points) - _MOST_POINTS} grid points more")
+    rows = [*zip(points, quantiles, counts, beyond, each, strict=True)]
+    for point, values, count, more, motions in rows[:_MOST_POINTS]:
+        of = f"of {count}" + (f", {more} of them not reached" if more else "")
+        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, values))} {of}")
+        for name, value in zip(names, motions, strict=True) if each.size <= _MOST_MOTIONS else ():
+            echo(f"    {name.removeprefix('motion = '):<{width}}{text(value)}")
+    if len(rows) > _MOST_POINTS:
+        echo(f"  and {len(rows) - _MOST_POINTS} grid points more")

@@ -48,6 +48,7 @@ def written(about: str, metavar: str = "FILE") -> Any:
 
 Text = str | None
 Texts = list[str] | None
+File = Path | None
 Paths = list[Path] | None
 
 THETA = BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", "VALUE")
