@@ -311,6 +311,20 @@ def test_simulate_writes_every_kind(tmp_path: Path) -> None:
     assert "<svg" in (tmp_path / "a.svg").read_text()
 
 
+@pytest.mark.usefixtures("without_layout")
+def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
+    (small / "a.toml").write_text(f'{SMALL}[model]\nfriction = "newmark"\n')
+    assert command(small, "run", "a.toml").returncode == 0
+    done = command(small, "report", "a.nc")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "a.pdf\n", "")
+    content = (small / "a.pdf").read_bytes()
+    # contours, modes, families, dimensionless, spread; no ratio of Newmark's block to itself
+    assert len(re.findall(rb"/Type /Page\b", content)) == 1 + 5
+    assert_fails(command(small, "report", "a.nc"), 2, "a.pdf: exists already; give --overwrite")
+    assert_fails(command(small, "report", "a.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
+    assert (small / "a.pdf").read_bytes() == content
+
+
 # ------------------------------------------------------------------------- help and progress
 
 
@@ -354,20 +368,3 @@ def test_a_terminal_sees_progress(small: Path) -> None:
     os.close(reader)
     assert b"100%" in read
     assert (small / "small.nc").exists()
-
-
-# ---------------------------------------------------------------------------------- report
-
-
-@pytest.mark.usefixtures("without_layout")
-def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
-    (small / "a.toml").write_text(f'{SMALL}[model]\nfriction = "newmark"\n')
-    assert command(small, "run", "a.toml").returncode == 0
-    done = command(small, "report", "a.nc")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "a.pdf\n", "")
-    content = (small / "a.pdf").read_bytes()
-    # contours, modes, families, dimensionless, spread; no ratio of Newmark's block to itself
-    assert len(re.findall(rb"/Type /Page\b", content)) == 1 + 5
-    assert_fails(command(small, "report", "a.nc"), 2, "a.pdf: exists already; give --overwrite")
-    assert_fails(command(small, "report", "a.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
-    assert (small / "a.pdf").read_bytes() == content

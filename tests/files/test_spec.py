@@ -28,10 +28,9 @@ amplitude = 3
 [[cases]]
 theta = 6
 amplitude = 5
-[axes.mu_s]
-values = [0.3, 0.5, 0.7]
-[axes.frequency]
-values = [1, 2]
+[axes]
+mu_s.values = [0.3, 0.5, 0.7]
+frequency.values = [1, 2]
 """
 
 
@@ -81,26 +80,13 @@ def test_every_word_reaches_the_sweep(table: str, key: str) -> None:
 
 
 def test_options_reach_the_sweep() -> None:
-    sweep = spec.parse(
-        GOOD
-        + """
-        [model]
-        rise = "literal"
-        recoupling = "integrate"
-        yield_acceleration = 0.5
-        structure_frequency = 3
-        g = 9.8
-        [excitation]
-        cycles = 5
-        [solver]
-        method = "step"
-        steps_per_cycle = 512
-        rule = "simpson"
-        [output]
-        variables = ["validity"]
-        """,
-        "a.toml",
-    )
+    text = """
+    model = {rise = "literal", recoupling = "integrate", yield_acceleration = 0.5, structure_frequency = 3, g = 9.8}
+    excitation.cycles = 5
+    solver = {method = "step", steps_per_cycle = 512, rule = "simpson"}
+    output.variables = ["validity"]
+    """
+    sweep = spec.parse(text + GOOD, "a.toml")
     assert sweep.model == Mendez(rise="literal", recoupling="integrate", g=9.8)
     assert sweep.excitation == Sine(cycles=5)
     assert sweep.solver == Step(rule="simpson", steps_per_cycle=512)
