@@ -22,34 +22,20 @@ from tests.support.commands import SLIPSWEEP, command, run_command, slipsweep
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 SMALL = """
-[axes.theta]
-values = [0, 5]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-values = [1, 4]
-[axes.frequency]
-values = [1, 2]
+[axes]
+theta.values = [0, 5]
+mu_s.values = [0.3, 0.5]
+amplitude.values = [1, 4]
+frequency.values = [1, 2]
 """
 
 #: Two thousand million cells, a byte each: minutes of work.
 LONG = """
-[axes.theta]
-start = 0
-stop = 20
-num = 200
-[axes.mu_s]
-start = 0.2
-stop = 0.9
-num = 100
-[axes.amplitude]
-start = 0.5
-stop = 14
-num = 1000
-[axes.frequency]
-start = 0.1
-stop = 20
-num = 100
+[axes]
+theta = {start = 0, stop = 20, num = 200}
+mu_s = {start = 0.2, stop = 0.9, num = 100}
+amplitude = {start = 0.5, stop = 14, num = 1000}
+frequency = {start = 0.1, stop = 20, num = 100}
 [output]
 variables = ["sliding_mode"]
 """
@@ -151,7 +137,7 @@ def test_a_sweep_from_standard_input(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_fails_in_one_line(small: Path, arguments: tuple[str, ...], message: str) -> None:
-    (small / "bad.toml").write_text(SMALL.replace("values = [0, 5]", 'values = [0, 5]\nunits = "kg"'))
+    (small / "bad.toml").write_text(SMALL.replace("[0, 5]", '[0, 5]\ntheta.units = "kg"'))
     (small / "broken.toml").write_text("axes = [")
     (small / "named.toml").write_text(f'{SMALL}[output]\npath = "b.pdf"\n')
     (small / "small.csv").write_text("mine")
@@ -299,7 +285,7 @@ def test_info(small: Path) -> None:
     assert "  permanent_displacement  permanent displacement, downslope, m (float64)" in lines
     assert any(line.startswith("  stuck  ") and line.endswith("%") for line in lines)
     assert any(line.startswith("history: ") and line.endswith("slipsweep run small.toml") for line in lines)
-    assert "  [axes.mu_s]" in lines
+    assert "  mu_s.values = [0.3, 0.5]" in lines
 
 
 def test_simulate_writes_every_kind(tmp_path: Path) -> None:
@@ -325,20 +311,34 @@ def test_simulate_writes_every_kind(tmp_path: Path) -> None:
     assert "<svg" in (tmp_path / "a.svg").read_text()
 
 
+@pytest.mark.usefixtures("without_layout")
+def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
+    (small / "a.toml").write_text(f'{SMALL}[model]\nfriction = "newmark"\n')
+    assert command(small, "run", "a.toml").returncode == 0
+    done = command(small, "report", "a.nc")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "a.pdf\n", "")
+    content = (small / "a.pdf").read_bytes()
+    # contours, modes, families, dimensionless, spread; no ratio of Newmark's block to itself
+    assert len(re.findall(rb"/Type /Page\b", content)) == 1 + 5
+    assert_fails(command(small, "report", "a.nc"), 2, "a.pdf: exists already; give --overwrite")
+    assert_fails(command(small, "report", "a.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
+    assert (small / "a.pdf").read_bytes() == content
+
+
 # ------------------------------------------------------------------------- help and progress
 
 
-def test_help_is_there_at_once(tmp_path: Path) -> None:
-    heavy = {"numpy", "numba", "xarray", "netCDF4", "pint", "matplotlib", "dask", "pandas", "scipy"}
-    code = "import sys; from slipsweep.cli import main; main(['--help']); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert not heavy & {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
-
-
-def test_run_loads_no_figures(small: Path) -> None:
-    code = "import sys; from slipsweep.cli import main; main(['run', 'small.toml']); print(*sys.modules)"
+@pytest.mark.parametrize(
+    ("arguments", "heavy"),
+    [
+        (["--help"], {"numpy", "numba", "xarray", "netCDF4", "pint", "matplotlib", "dask", "pandas", "scipy"}),
+        (["run", "small.toml"], {"matplotlib"}),
+    ],
+)
+def test_what_a_command_does_not_need_is_not_loaded(small: Path, arguments: list[str], heavy: set[str]) -> None:
+    code = f"import sys; from slipsweep.cli import main; main({arguments}); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=small, capture_output=True, text=True, check=True)
-    assert "matplotlib" not in done.stdout.splitlines()[-1].split()
+    assert not heavy & {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
 
 
 @pytest.mark.parametrize("name", ["", *NAMES])

@@ -8,10 +8,7 @@ from slipsweep import cli
 from slipsweep._version import __version__
 
 BLOCK = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2")
-SWEEP = "".join(
-    f"[axes.{name}]\nvalues = [{value}]\n"
-    for name, value in (("theta", 5), ("mu_s", 0.4), ("amplitude", 4), ("frequency", 2))
-)
+SWEEP = "[axes]\ntheta.values = [5]\nmu_s.values = [0.4]\namplitude.values = [4]\nfrequency.values = [2]\n"
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> str:
@@ -105,7 +102,7 @@ def test_hazard_of_samples_has_a_table_for_each_frequency(capsys: pytest.Capture
     (tmp_path / "curve.csv").write_text("PGA (g),annual rate\n0.1,0.01\n1,0.0001\n")
     uncertain = '[uncertainty]\nsamples = 8\nthresholds = ["1cm"]\n'
     uncertain += '[uncertainty.mu_s]\ndistribution = "lognorm"\ns = 0.1\nscale = 0.4\n'
-    axes = SWEEP.replace("[axes.mu_s]\nvalues = [0.4]\n", "").replace("[4]", "[2, 5, 8]").replace("[2]", "[1, 2]")
+    axes = SWEEP.replace("mu_s.values = [0.4]\n", "").replace("[4]", "[2, 5, 8]").replace("[2]", "[1, 2]")
     (tmp_path / "a.toml").write_text(axes + uncertain)
     result = str(tmp_path / "a.nc")
     told(capsys, "run", str(tmp_path / "a.toml"), "-o", result)

@@ -21,34 +21,23 @@ from slipsweep.model.variables import Validity
 from tests.support.commands import command
 
 GRID = """
-[axes.theta]
-values = [0, 5, 20]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.displacement_amplitude]
-values = [0.01, 0.05, 0.1]
-[axes.frequency]
-values = [1, 2]
-[axes.decay_rate]
-values = [1.0, 2.5]
+[axes]
+theta.values = [0, 5, 20]
+mu_s.values = [0.3, 0.5]
+displacement_amplitude.values = [0.01, 0.05, 0.1]
+frequency.values = [1, 2]
+decay_rate.values = [1.0, 2.5]
 [output]
 variables = ["permanent_displacement", "sliding_mode", "validity", "limiting_acceleration"]
 dtype = "float32"
 """
 
 CASES = """
-[[cases]]
-label = "mild ± slope, wet"
-theta = 5
-mu_s = 0.38
-amplitude = 3.55
-[[cases]]
-label = "steep"
-theta = 25
-mu_s = 0.38
-amplitude = 3.55
-[axes.frequency]
-values = [1, 2, 3]
+cases = [
+    {label = "mild ± slope, wet", theta = 5, mu_s = 0.38, amplitude = 3.55},
+    {label = "steep", theta = 25, mu_s = 0.38, amplitude = 3.55},
+]
+axes.frequency.values = [1, 2, 3]
 """
 
 

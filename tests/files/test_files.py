@@ -16,85 +16,62 @@ from tests.support.commands import command
 
 #: Missing values, every sliding mode and four flags.
 GRID = """
-[axes.theta]
-values = [0, 5, 20]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-values = [1, 4, 8]
-[axes.frequency]
-values = [1, 2]
-[axes.structure_frequency]
-values = [0.5, 4]
+[axes]
+theta.values = [0, 5, 20]
+mu_s.values = [0.3, 0.5]
+amplitude.values = [1, 4, 8]
+frequency.values = [1, 2]
+structure_frequency.values = [0.5, 4]
 [output]
 variables = ["permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity", "acceleration_ratio"]
 """
 
 CASES = """
-[[cases]]
-label = "mild ± slope"
-theta = 5
-mu_s = 0.38
-amplitude = 3.55
-frequency = 1.8
-[[cases]]
-label = "steep"
-theta = 25
-mu_s = 0.38
-amplitude = 3.55
-frequency = 1.8
+cases = [
+    {label = "mild ± slope", theta = 5, mu_s = 0.38, amplitude = 3.55, frequency = 1.8},
+    {label = "steep", theta = 25, mu_s = 0.38, amplitude = 3.55, frequency = 1.8},
+]
 [output]
 dtype = "float32"
 """
 
+BLOCKS = """
+[axes]
+theta.values = [0, 5, 25]
+mu_s.values = [0.3, 0.4]
+scale.values = [1, 2]
+"""
+
 RECORD = f"""
+{BLOCKS}
 [excitation]
 record = "{Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"}"
 polarity = "both"
-[axes.theta]
-values = [0, 5, 25]
-[axes.mu_s]
-values = [0.3, 0.4]
-[axes.scale]
-values = [1, 2]
 """
 
 #: Labels beyond ASCII, and of different lengths.
-SUITE = """
+SUITE = f"""
+{BLOCKS}
 [excitation]
 records = "motions"
-[axes.theta]
-values = [0, 5, 25]
-[axes.mu_s]
-values = [0.3, 0.4]
-[axes.scale]
-values = [1, 2]
 """
 
-PAIRS = f"""
-{SUITE.replace('"motions"', '[["motions/a.csv", "motions/Düzce.csv"]]')}
-[axes.azimuth]
-values = [0, 45]
-"""
+PAIRS = SUITE.replace('"motions"', '[["motions/a.csv", "motions/Düzce.csv"]]') + "[axes.azimuth]\nvalues = [0, 45]\n"
 
 #: Statistics, with samples that have no value and a slope on which none has.
 STATISTICS = """
-[axes.theta]
-values = [0, 15, 60]
-[axes.amplitude]
-values = [2, 4]
-[axes.frequency]
-values = [1, 2]
+[axes]
+theta.values = [0, 15, 60]
+amplitude.values = [2, 4]
+frequency.values = [1, 2]
 [uncertainty]
 samples = 64
 sensitivity = true
-[uncertainty.mu_s]
-distribution = "lognorm"
-s = 0.2
-scale = 0.3
+mu_s = {distribution = "lognorm", s = 0.2, scale = 0.3}
 """
 
-NAMES = ("grid", "cases", "statistics", "history", "record", "suite", "pairs")
+SWEEPS = {"grid": GRID, "cases": CASES, "statistics": STATISTICS, "record": RECORD, "suite": SUITE, "pairs": PAIRS}
+NAMES = (*SWEEPS, "history")
 
 
 def run(*arguments: str | Path, folder: Path) -> str:
@@ -113,14 +90,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, sign in (("a", 1), ("Düzce", -1)):
         rows = (f"{at / 20},{sign * 3 * (at % 7 - 3)}\n" for at in range(60 + sign))
         (folder / "motions" / f"{name}.csv").write_text("time (s),acceleration (m/s2)\n" + "".join(rows))
-    for name, text in (
-        ("grid", GRID),
-        ("cases", CASES),
-        ("statistics", STATISTICS),
-        ("record", RECORD),
-        ("suite", SUITE),
-        ("pairs", PAIRS),
-    ):
+    for name, text in SWEEPS.items():
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
         assert command(folder, "run", f"{name}.toml", "--quiet").returncode == 0
     block = ("--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8")

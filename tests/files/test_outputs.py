@@ -10,14 +10,11 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs
 
 SWEEP = """
-[axes.theta]
-values = [0, 5]
-[axes.mu_s]
-values = [0.3, 0.4]
-[axes.amplitude]
-values = [3, 5]
-[axes.frequency]
-values = [1]
+[axes]
+theta.values = [0, 5]
+mu_s.values = [0.3, 0.4]
+amplitude.values = [3, 5]
+frequency.values = [1]
 """
 
 #: Every command that writes, with its output left out, and what it writes.

@@ -1,6 +1,7 @@
 """Sweep files: what they mean, and one clear line for each way to get them wrong."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,22 +13,11 @@ from slipsweep.files import spec
 from slipsweep.model import variables
 
 GOOD = """
-[axes.theta]
-start = 0
-stop = 20
-num = 5
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-start = 0.1
-stop = 1
-num = 4
-units = "g"
-[axes.frequency]
-start = 0.1
-stop = 10
-num = 3
-spacing = "log"
+[axes]
+theta = {start = 0, stop = 20, num = 5}
+mu_s = {values = [0.3, 0.5]}
+amplitude = {start = 0.1, stop = 1, num = 4, units = "g"}
+frequency = {start = 0.1, stop = 10, num = 3, spacing = "log"}
 """
 
 CASES = """
@@ -38,20 +28,15 @@ amplitude = 3
 [[cases]]
 theta = 6
 amplitude = 5
-[axes.mu_s]
-values = [0.3, 0.5, 0.7]
-[axes.frequency]
-values = [1, 2]
+[axes]
+mu_s.values = [0.3, 0.5, 0.7]
+frequency.values = [1, 2]
 """
-
-MU_S = "[axes.mu_s]\nvalues = [0.3, 0.5]"
 
 
 def axis(name: str, body: str) -> str:
     """Return a good sweep file but for one axis."""
-    before, _, rest = GOOD.partition(f"[axes.{name}]\n")
-    _, bracket, after = rest.partition("[axes")
-    return f"{before}[axes.{name}]\n{body}\n{bracket}{after}"
+    return re.sub(rf"(?m)^{name} = .*$", f"{name} = {{{body}}}", GOOD)
 
 
 def test_axes_become_arrays_in_the_parameters_own_units() -> None:
@@ -95,26 +80,13 @@ def test_every_word_reaches_the_sweep(table: str, key: str) -> None:
 
 
 def test_options_reach_the_sweep() -> None:
-    sweep = spec.parse(
-        GOOD
-        + """
-        [model]
-        rise = "literal"
-        recoupling = "integrate"
-        yield_acceleration = 0.5
-        structure_frequency = 3
-        g = 9.8
-        [excitation]
-        cycles = 5
-        [solver]
-        method = "step"
-        steps_per_cycle = 512
-        rule = "simpson"
-        [output]
-        variables = ["validity"]
-        """,
-        "a.toml",
-    )
+    text = """
+    model = {rise = "literal", recoupling = "integrate", yield_acceleration = 0.5, structure_frequency = 3, g = 9.8}
+    excitation.cycles = 5
+    solver = {method = "step", steps_per_cycle = 512, rule = "simpson"}
+    output.variables = ["validity"]
+    """
+    sweep = spec.parse(text + GOOD, "a.toml")
     assert sweep.model == Mendez(rise="literal", recoupling="integrate", g=9.8)
     assert sweep.excitation == Sine(cycles=5)
     assert sweep.solver == Step(rule="simpson", steps_per_cycle=512)
@@ -155,7 +127,7 @@ def test_the_plan_of_a_block() -> None:
     ],
 )
 def test_units(name: str, units: str, factor: float) -> None:
-    text = axis(name, f'values = [0.25, 0.5]\nunits = "{units}"')
+    text = axis(name, f'values = [0.25, 0.5], units = "{units}"')
     given = spec.parse(text, "a.toml").inputs.given
     np.testing.assert_allclose(given[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
 
@@ -168,17 +140,17 @@ def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:
 BAD = {
     # keys
     "unknown table": ("[sovler]\n" + GOOD, 'sovler: unknown key; did you mean "solver"?'),
-    "unknown axis": (GOOD.replace("axes.theta", "axes.thetta"), 'axes.thetta: unknown key; did you mean "theta"?'),
+    "unknown axis": (GOOD.replace("theta", "thetta"), 'axes.thetta: unknown key; did you mean "theta"?'),
     "unknown key": (axis("theta", "strat = 0"), 'axes.theta.strat: unknown key; did you mean "start"?'),
     "unknown key in a case": (CASES.replace("theta = 6", "thet = 6"), "cases[row 2].thet: unknown key; did you mean"),
-    "missing axis": (GOOD.replace(MU_S, ""), "mu_s: must be given"),
-    "missing amplitude": (axis("amplitude", "").replace("[axes.amplitude]", ""), "exactly one of them must be given"),
-    "missing stop": (axis("theta", "start = 0\nnum = 3"), "axes.theta.stop: missing"),
+    "missing axis": (GOOD.replace("mu_s", "# mu_s"), "mu_s: must be given"),
+    "missing amplitude": (GOOD.replace("amplitude", "# amplitude"), "exactly one of them must be given"),
+    "missing stop": (axis("theta", "start = 0, num = 3"), "axes.theta.stop: missing"),
     # types
     "text for a number": (axis("theta", 'values = ["a"]'), "axes.theta.values = ['a']: must be a number"),
     "number for a list": (axis("theta", "values = 3"), "axes.theta.values = 3: must be a list"),
     "number for a table": ("axes = 3", "axes = 3: must be a table"),
-    "fraction of a point": (axis("theta", "start = 0\nstop = 1\nnum = 2.5"), "axes.theta.num = 2.5: must be"),
+    "fraction of a point": (axis("theta", "start = 0, stop = 1, num = 2.5"), "axes.theta.num = 2.5: must be"),
     "wrong word": (GOOD + '[model]\nrise = "slow"', "model.rise = 'slow': must be one of 'monotone', 'literal'"),
     "waveform": (
         GOOD + '[excitation]\nwaveform = "sawtooth"',
@@ -189,25 +161,25 @@ BAD = {
     # axes
     "empty": (axis("theta", "values = []"), "axes.theta.values = []: must be a list of one number at least"),
     "unsorted": (axis("mu_s", "values = [0.5, 0.4]"), "axes.mu_s.values: 0.4 after 0.5: must increase"),
-    "backwards": (axis("theta", "start = 9\nstop = 3\nnum = 4"), "axes.theta.stop = 3.0: must be greater than start"),
+    "backwards": (axis("theta", "start = 9, stop = 3, num = 4"), "axes.theta.stop = 3.0: must be greater than start"),
     "logarithm of zero": (
-        axis("theta", 'start = 0\nstop = 3\nnum = 4\nspacing = "log"'),
+        axis("theta", 'start = 0, stop = 3, num = 4, spacing = "log"'),
         'axes.theta.start = 0.0: must be positive with spacing = "log"',
     ),
-    "two forms": (axis("theta", "values = [1, 2]\nnum = 4"), "axes.theta.num: not allowed beside values"),
+    "two forms": (axis("theta", "values = [1, 2], num = 4"), "axes.theta.num: not allowed beside values"),
     # units
     "incompatible": (
-        axis("theta", 'values = [1]\nunits = "kg"'),
+        axis("theta", 'values = [1], units = "kg"'),
         'axes.theta.units = "kg": must be a unit that converts',
     ),
     "grams": (
-        GOOD.replace("axes.amplitude", "axes.displacement_amplitude"),
+        GOOD.replace("amplitude", "displacement_amplitude"),
         'axes.displacement_amplitude.units = "g": must be a unit that converts to m',
     ),
     # range
     "not a number": (axis("theta", "values = [nan]"), "axes.theta.values = nan: must be 0 <= theta < 90"),
     "theta": (axis("theta", "values = [0, 90]"), "axes.theta.values = 90: must be 0 <= theta < 90 degrees"),
-    "mu_s": (axis("mu_s", "start = 0\nstop = 1\nnum = 3"), "axes.mu_s = 0: must be a finite number > 0"),
+    "mu_s": (axis("mu_s", "start = 0, stop = 1, num = 3"), "axes.mu_s = 0: must be a finite number > 0"),
     "cycles": (GOOD + "[excitation]\ncycles = 0", "excitation.cycles = 0: must be a whole number >= 1"),
     "decay rate": (GOOD + "[model]\ndecay_rate = -1", "model.decay_rate = -1: must be a finite number >= 0"),
     # tables against each other
@@ -254,13 +226,6 @@ def test_files_of_another_kind_are_refused(tmp_path: Path, name: str, content: b
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):
         spec.load(tmp_path / name)
-
-
-def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"a\.toml: cannot be read: No such file"):
-        spec.load(tmp_path / "a.toml")
-    with pytest.raises(InputError, match="cannot be read"):
-        spec.load(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -17,15 +17,10 @@ from slipsweep.files.opening import read_result
 from slipsweep.grid.tally import tally_of
 
 GRID = """
-[axes.theta]
-values = [0, 5, 10]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-start = 0.1
-stop = 1
-num = 4
-units = "g"
+[axes]
+theta.values = [0, 5, 10]
+mu_s.values = [0.3, 0.5]
+amplitude = {start = 0.1, stop = 1, num = 4, units = "g"}
 """
 
 WAVE = GRID + "[axes.frequency]\nvalues = [0.5, 1, 2]\n"
@@ -40,18 +35,9 @@ variables = ["permanent_displacement", "newmark_displacement", "limiting_acceler
     "newmark": WAVE + '[model]\nfriction = "newmark"\n',
     "step": WAVE + '[solver]\nmethod = "step"\nsteps_per_cycle = 64\n[excitation]\nwaveform = "triangle"\n',
     "cases": """
-[[cases]]
-label = "mild ± slope, wet"
-theta = 5
-amplitude = 3
-[[cases]]
-label = "steep"
-theta = 25
-amplitude = 5
-[axes.mu_s]
-values = [0.3, 0.5, 0.7]
-[axes.frequency]
-values = [1, 2]
+cases = [{label = "mild ± slope, wet", theta = 5, amplitude = 3}, {label = "steep", theta = 25, amplitude = 5}]
+axes.mu_s.values = [0.3, 0.5, 0.7]
+axes.frequency.values = [1, 2]
 """,
     "record": GRID + '[excitation]\nrecord = "motions/m1.csv"\nunits = "g"\npolarity = "both"\n',
     "suite": GRID + '[excitation]\nrecords = ["motions/*.csv"]\nunits = "g"\n',
@@ -179,8 +165,8 @@ def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
-    (folder / "large.toml").write_text(WAVE.replace("num = 4", "num = 9000000").replace("[0.5, 1, 2]", "[0.5, 1]"))
-    text = (folder / "large.toml").read_text().replace("values = [0.3, 0.5]", "start = 0.3\nstop = 1\nnum = 900000")
+    text = WAVE.replace("num = 4", "num = 9000000").replace("[0.5, 1, 2]", "[0.5, 1]")
+    text = text.replace("mu_s.values = [0.3, 0.5]", "mu_s = {start = 0.3, stop = 1, num = 900000}")
     (folder / "large.toml").write_text(text)
     for name in ("a.nc", "a.zarr"):
         with pytest.raises(InputError, match=rf"{name}: takes .*TB, but .* are free on the disk"):

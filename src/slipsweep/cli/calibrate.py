@@ -3,7 +3,7 @@
 import itertools
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
@@ -27,15 +27,15 @@ _COLUMNS = (
 Offset = Annotated[Texts, TEST("Channel with an offset, or all; may be repeated.", "CHANNEL")]
 Drift = Annotated[Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")]
 
-#: Slides as a table: results, what stands above, and its width.
+#: Slides as a table: results, and what stands above, as wide as the column.
 _SLIDES = {
-    "slide_onset": ("onset", 9),
-    "slide_peak": ("peak", 9),
-    "slide_stop": ("stop", 9),
-    "onset_acceleration": ("table at onset", 16),
-    "peak_block_acceleration": ("block at most", 15),
-    "least_friction": ("least of Eq. 1", 16),
-    "slide_free_body_friction": ("by statics", 12),
+    "slide_onset": "    onset",
+    "slide_peak": "    peak",
+    "slide_stop": "    stop",
+    "onset_acceleration": " table at onset",
+    "peak_block_acceleration": " block at most",
+    "least_friction": " least of Eq. 1",
+    "slide_free_body_friction": " by statics",
 }
 
 #: Parameters that a calibration finds, and those of a cycle.
@@ -71,20 +71,23 @@ def friction(
     paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
 
-    span, offsets, drifts = None if rest is None else _times(rest), _channels(offset), _channels(drift)
-    table = measured_friction(test, **block, g=g, offset=offsets, drift=drifts, rest=span, threshold=least)
+    span = None
+    if rest is not None:
+        try:
+            first, last = map(float, rest.split(":"))
+        except ValueError:
+            raise InputError(f"--rest {rest}: must be two times, s, as FROM:TO") from None
+        span = first, last
+    table = measured_friction(test, **block, g=g, **_removed(offset, drift), rest=span, threshold=least)
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
-    attrs, slides = table.attrs, table.sizes["slide"]
-    _echo_coefficients(
-        table, f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}", f"removed    {attrs['removed']}"
-    )
-    header = ["".join(f"{text:>{width}}" for text, width in _SLIDES.values())] if slides else []
-    echo(f"{slides} slides{', s and m/s2:' if slides else ''}", *header)
-    for row in zip(*(table[name].values for name in _SLIDES), strict=True):
-        echo("".join(f"{value:{width}.4g}" for value, (_, width) in zip(row, _SLIDES.values(), strict=True)))
-    echo(*paths)
+    attrs, slides = table.attrs, table[[*_SLIDES]].to_dataframe()[[*_SLIDES]].rename(columns=_SLIDES)
+    threshold = f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}"
+    _echo_coefficients(table, threshold, f"removed    {attrs['removed']}")
+    echo(f"{len(slides)} slides{', s and m/s2:' if len(slides) else ''}")
+    rows = slides.to_string(index=False, na_rep="nan", float_format="{:.4g}".format)
+    echo(*([rows] if len(slides) else ()), *paths)
 
 
 @command(
@@ -101,7 +104,7 @@ def calibrate(
     phi: options.Phi = None,
     offset: Offset = None,
     drift: Drift = None,
-    cycles: Annotated[bool, TEST.flag("Fit each cycle separately, too.", "--cycles/--no-cycles")] = True,
+    cycles: Annotated[bool, TEST("Fit each cycle separately, too.")] = True,
     output: Annotated[options.Paths, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: options.Overwrite = False,
     model: Model,
@@ -113,38 +116,11 @@ def calibrate(
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.findings import sweep_file_text
 
-    offsets, drifts = _channels(offset), _channels(drift)
-    table = calibrated(tests, **block, model=model, offset=offsets, drift=drifts, cycles=cycles)
+    table = calibrated(tests, **block, model=model, **_removed(offset, drift), cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
-    common.write_outputs(paths, overwrite, table, toml=lambda path: path.write_text(text, encoding="utf-8"))
-    if not quiet:
-        _summarize(table)
-        echo("", text, *paths)
-
-
-def _channels(given: list[str] | None) -> str | list[str]:
-    return "all" if given == ["all"] else given or []
-
-
-def _times(text: str) -> tuple[float, float]:
-    try:
-        first, last = text.split(":")
-        return float(first), float(last)
-    except ValueError:
-        raise InputError(f"--rest {text}: must be two times, s, as FROM:TO") from None
-
-
-def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
-    """That the friction is constant, and static and kinetic friction by statics, where the block was seen to slide."""
-    echo(*filter(None, [table.attrs["constant_friction"]]), *lines)
-    for kind in ("static", "kinetic"):
-        if f"{kind}_friction" in table and table[f"{kind}_friction"].notnull():
-            low, high = table[f"{kind}_friction_interval"].values
-            value = table[f"{kind}_friction"].item()
-            echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
-
-
-def _summarize(table: "xr.Dataset") -> None:
+    common.write_outputs(paths, overwrite, table, toml=lambda: text)
+    if quiet:
+        return
     _echo_coefficients(table)
     echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
     for name in _FOUND:
@@ -166,18 +142,31 @@ def _summarize(table: "xr.Dataset") -> None:
             echo(f"  {name:<32}{', '.join(parts)}")
     echo(f"removed: {table.attrs['removed']}")
     for number in range(table.sizes.get("test", 1)) if "cycle_start" in table else ():
-        _echo_cycles(table.isel(test=number, missing_dims="ignore"))
+        fitted = table.isel(test=number, missing_dims="ignore")
+        echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
+        columns = [fitted[f"cycle_{name}"].values for name in _OF_CYCLES]
+        for at, start in enumerate(fitted["cycle_start"].values):
+            if math.isfinite(start):
+                cells = (_number(column[at], ".3g") for column in columns)
+                echo("{:5d} {:10.4g} {:>12} {:>7} {:>7} {:>7}".format(at + 1, start, *cells))
     constant = table.attrs["constant_friction"]
     echo(*(f"note: {finding}" for finding in table.attrs["findings"].splitlines() if finding != constant))
+    echo("", text, *paths)
 
 
-def _echo_cycles(table: "xr.Dataset") -> None:
-    echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
-    columns = [table[f"cycle_{name}"].values for name in _OF_CYCLES]
-    for number, start in enumerate(table["cycle_start"].values):
-        if math.isfinite(start):
-            cells = (_number(column[number], ".3g") for column in columns)
-            echo("{:5d} {:10.4g} {:>12} {:>7} {:>7} {:>7}".format(number + 1, start, *cells))
+def _removed(offset: list[str] | None, drift: list[str] | None) -> dict[str, Any]:
+    """What is taken off the channels of a test, as Python's functions take it."""
+    return {name: "all" if one == ["all"] else one or [] for name, one in (("offset", offset), ("drift", drift))}
+
+
+def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
+    """That the friction is constant, and static and kinetic friction by statics, where the block was seen to slide."""
+    echo(*filter(None, [table.attrs["constant_friction"]]), *lines)
+    for kind in ("static", "kinetic"):
+        if f"{kind}_friction" in table and table[f"{kind}_friction"].notnull():
+            low, high = table[f"{kind}_friction_interval"].values
+            value = table[f"{kind}_friction"].item()
+            echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
 
 
 def _number(value: float, form: str) -> str:

@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
-from slipsweep.cli.options import Text, Texts, command, written
+from slipsweep.cli.options import OUTPUT, File, Text, Texts, command, written
 from slipsweep.errors import InputError
+from slipsweep.files import outputs
 
 CHART, AXES, LOOK = options.Panel("Chart"), options.Panel("Axes"), options.Panel("Look")
 
@@ -33,10 +34,10 @@ def chart(
     ] = None,
     units: Annotated[Literal["m/s2", "g"], LOOK("Unit of accelerations.")] = "m/s2",
     show_cautions: Annotated[
-        bool, LOOK.flag("Draw values flagged not_recoupled or upslope, too.", "--show-cautions")
+        bool, LOOK("Draw values flagged not_recoupled or upslope, too.", None, "--show-cautions")
     ] = False,
     width: Annotated[Text, LOOK("Width of the figure: 90mm, 3.5inch.", "LENGTH")] = None,
-    grey: Annotated[bool, LOOK.flag("Draw without colour.", "--grey")] = False,
+    grey: Annotated[bool, LOOK("Draw without colour.", None, "--grey")] = False,
     output: Annotated[
         options.Paths,
         written("Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf."),
@@ -45,11 +46,10 @@ def chart(
 ) -> None:
     """Draw design charts of a result."""
     given = output or []
-    for path in given:
-        common.check_ending(path, FIGURES)
+    outputs.check_endings(given, FIGURES)
 
     from slipsweep.charts import kinds, slices, style
-    from slipsweep.files import opening, outputs, selection
+    from slipsweep.files import opening, selection
 
     requested = [kinds.check_kind(name) for name in dict.fromkeys(kind or ())]
     if levels is not None and requested and {"contours", "fragility"}.isdisjoint(requested):
@@ -65,41 +65,38 @@ def chart(
         for path in given:
             if together and path.suffix != ".pdf":
                 raise InputError(f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several")
-        wanted = {name: given or [Path(f"{file.stem}-{name}.png")] for name in chosen}
-        outputs.check_outputs(given or [wanted[name][0] for name in chosen], overwrite, reads=[file])
+        default = {name: Path(f"{file.stem}-{name}.png") for name in chosen}
+        outputs.check_outputs(given or [*default.values()], overwrite, reads=[file])
         figures, left_out = kinds.draw_all(result, chosen, look, strict=bool(requested))
-        for path in given if together else ():
+        drawn = [(path, [*figures.values()]) for path in given]
+        for path, shown in drawn or [(default[name], [figure]) for name, figure in figures.items()]:
             with outputs.complete_or_absent(path, overwrite) as temporary:
-                kinds.write_book(temporary, result, figures.values())
+                if together:
+                    kinds.write_book(temporary, result, shown)
+                else:
+                    common.save(shown[0], temporary, path.suffix)
             echo(path)
-    for name in () if together else figures:
-        for path in wanted[name]:
-            with outputs.complete_or_absent(path, overwrite) as temporary:
-                common.save(figures[name], temporary, path.suffix)
-        echo(*wanted[name])
     echo(*(f"no {name}: {reason}" for name, reason in left_out.items()))
 
 
 @command("Draw", "slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite")
 def report(
     file: options.Swept,
-    output: Annotated[Path | None, written("PDF to write (default: OUT.pdf).", "OUT.pdf")] = None,
+    output: Annotated[File, written("PDF to write (default: OUT.pdf).", "OUT.pdf")] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Write all charts that fit a result to one PDF, with a title page."""
     path = output or Path(f"{file.stem}.pdf")
-    common.check_ending(path, (".pdf",))
+    outputs.check_endings([path], (".pdf",))
     chart(file, output=[path], overwrite=overwrite)
 
 
 @command("Draw", "slipsweep explore design_chart.nc -o design_chart.html")
 def explore(
     file: Annotated[Path, options.read("OUT.nc", "A file that slipsweep run wrote.")],
-    output: Annotated[Path | None, written("Page to write (default: the file's name, .html).", "PAGE.html")] = None,
+    output: Annotated[File, written("Page to write (default: the file's name, .html).", "PAGE.html")] = None,
     overwrite: options.Overwrite = False,
-    size: Annotated[
-        str, options.OUTPUT("Largest size of the page; larger results are thinned to it.", "SIZE")
-    ] = "10MB",
+    size: Annotated[str, OUTPUT("Largest size of the page; larger results are thinned to it.", "SIZE")] = "10MB",
     quiet: options.Quiet = False,
 ) -> None:
     """Write a page for the browser in which to explore a result."""
@@ -107,7 +104,7 @@ def explore(
     from slipsweep.grid.resources import parse_size, size_text
 
     path = output or file.with_suffix(".html")
-    common.check_ending(path, (".html", ".htm"))
+    outputs.check_endings([path], (".html", ".htm"))
     excerpt = pages.write_page(file, path, size=parse_size("--size", size), overwrite=overwrite)
     if quiet:
         return

@@ -13,6 +13,7 @@ import typer
 
 from slipsweep.cli.options import Large, displacements
 from slipsweep.errors import InputError
+from slipsweep.files import outputs
 from slipsweep.model import variables
 
 if TYPE_CHECKING:
@@ -22,28 +23,19 @@ if TYPE_CHECKING:
     from slipsweep.files.jobs import Job
     from slipsweep.files.running import Report
     from slipsweep.files.storing import Place
-    from slipsweep.grid.tally import Indices, Tally
+    from slipsweep.grid.tally import Tally
     from slipsweep.motion.records import Record
 
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
 
 
-def check_ending(path: "Place", endings: Sequence[str]) -> None:
-    """Refuse an output whose name ends in what the command cannot write."""
-    if Path(path).suffix not in endings:
-        raise InputError(f"{path}: the name must end in {'one of ' if len(endings) > 1 else ''}{', '.join(endings)}")
-
-
 def check_outputs(
     output: Sequence[Path] | None, endings: Sequence[str], overwrite: bool, reads: Sequence[Path | int]
 ) -> list[Path]:
     """Refuse outputs that cannot be written, before anything is computed; return those that there are."""
-    from slipsweep.files import outputs
-
     paths = list(output or ())
-    for path in paths:
-        check_ending(path, endings)
+    outputs.check_endings(paths, endings)
     outputs.check_outputs(paths, overwrite, reads=reads)
     return paths
 
@@ -53,20 +45,20 @@ def write_outputs(
     overwrite: bool,
     table: "xr.Dataset",
     recorded: "Record | None" = None,
-    **writers: Callable[[Path], object],
+    **texts: Callable[[], str],
 ) -> None:
     """Write each output of a command, complete or not at all.
 
-    By the writer of its ending, as a netCDF file, with the `recorded` motion that it is the response to, or as the
-    chart of the table, which is drawn once.
+    As the text of its ending, as a netCDF file, with the `recorded` motion that it is the response to, or as the chart
+    of the table, which is drawn once.
     """
-    from slipsweep.files import netcdf, outputs
+    from slipsweep.files import netcdf
 
     figure = None
     for path in paths:
         with outputs.complete_or_absent(path, overwrite) as temporary:
-            if path.suffix[1:] in writers:
-                writers[path.suffix[1:]](temporary)
+            if path.suffix[1:] in texts:
+                temporary.write_text(texts[path.suffix[1:]](), encoding="utf-8")
             elif path.suffix == ".nc":
                 plain, title = netcdf.without_time_axis(table), table.attrs["title"]
                 found = netcdf.described(plain, title=title, command=typed_command(), recorded=recorded)
@@ -83,13 +75,6 @@ def save(figure: "Figure", path: Path, ending: str) -> None:
     content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
     figure.savefig(content, format=ending[1:], dpi=150)
     path.write_bytes(content.getvalue())
-
-
-def write_fragility(table: "xr.Dataset", path: Path, lengths: Sequence[float] | None = None) -> None:
-    """Write P(u > d) along the axis amplitude as an .xml file of OpenQuake, for displacements in m."""
-    from slipsweep.studies import hazard
-
-    path.write_text(hazard.openquake_fragility(hazard.fragility(table, lengths)), encoding="utf-8")
 
 
 def run_job(job: "Job", path: "Place", large: Large, *, overwrite: bool, quiet: bool, unit: str = "cells") -> "Report":
@@ -169,7 +154,7 @@ def range_text(name: str, ends: Sequence[float], g: float) -> str:
 
 
 def echo_tally(tally: "Tally") -> None:
-    """Print the shares of sliding modes and of flags, flags that no cell has left out."""
+    """Print the shares of sliding modes and of the flags that cells have, and what moves the displacement."""
     if tally.modes is not None:
         echo("sliding modes:")
         echo(*(f"  {mode.name.lower():<24}{tally.share(count):7.2%}" for mode, count in tally.modes.items()))
@@ -179,17 +164,13 @@ def echo_tally(tally: "Tally") -> None:
         for kind in variables.FlagKind:
             flags = seen & variables.flags_of(kind)
             echo(*([f"  {kind}: {variables.FLAG_KIND_TEXT[kind]}"] if flags else ()))
-            shares = {flag: tally.share(tally.flags[flag]) for flag in flags}
-            echo(*(f"    {(flag.name or '').lower():<22}{share:7.2%}  {flag.text}" for flag, share in shares.items()))
+            for flag in flags:
+                echo(f"    {(flag.name or '').lower():<22}{tally.share(tally.flags[flag]):7.2%}  {flag.text}")
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
         echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
-    if tally.indices is not None:
-        _echo_indices(tally.indices)
-
-
-def _echo_indices(indices: "Indices") -> None:
-    """Print what moves the displacement, and why there are grid points that do not say."""
+    if (indices := tally.indices) is None:
+        return
     points, there = sum(indices.status.values()), indices.status[variables.SensitivityStatus.COMPUTED]
     echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points:")
     if there:

@@ -12,6 +12,9 @@ from slipsweep.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+#: What is needed of a result.
+_NEEDED = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
+
 #: The part of a rate that is worth a sentence.
 _MUCH = 0.05
 
@@ -40,11 +43,24 @@ def hazard(
 
     From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
     """
-    from slipsweep.studies.hazard import displacement_hazard, read_hazard_curve
+    import numpy as np
+
+    from slipsweep.files.opening import read_result
+    from slipsweep.files.selection import own_names, selected
+    from slipsweep.studies import suite_statistics
+    from slipsweep.studies.hazard import displacement_hazard, fragility, openquake_fragility, read_hazard_curve
 
     paths = common.check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
-    result = _read(file, at)
-    g = float(result.attrs["g"])
+    whole = read_result(file)
+    table = whole[[name for name in _NEEDED if name in whole]].load()
+    if "g" not in table.attrs:
+        raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
+    typed = own_names(whole, options.cuts(at))
+    chosen = selected(table, file, typed, ("amplitude", "motion", "threshold"))
+    for name in typed:
+        if chosen.sizes.get(name, 1) > 1:
+            raise InputError(f"{file}: --at {name}: {chosen.sizes[name]} values; must be one")
+    result, g = chosen.squeeze([name for name in typed if name in chosen.sizes]), float(table.attrs["g"])
     lengths = options.displacements(displacement, g)
     given = read_hazard_curve(curve, g, site)
     rates = displacement_hazard(result, given, lengths)
@@ -55,35 +71,9 @@ def hazard(
         marked = rates["threshold"].values
         more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
         drawn = displacement_hazard(result, given, more).assign_attrs(marked=marked)
-    common.write_outputs(paths, overwrite, drawn, xml=lambda path: common.write_fragility(result, path, lengths))
-    if not quiet:
-        _summarize(rates, g)
-        echo(*paths)
-
-
-def _read(file: Path, at: list[str] | None) -> "xr.Dataset":
-    """What is needed of a result, cut where one value of an axis is given."""
-    from slipsweep.files.opening import read_result
-    from slipsweep.files.selection import own_names, selected
-
-    result = read_result(file)
-    names = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
-    table = result[[name for name in names if name in result]].load()
-    if "g" not in table.attrs:
-        raise InputError(f"{file}: attribute g is missing: must be there, m/s2")
-    typed = own_names(result, options.cuts(at))
-    chosen = selected(table, file, typed, ("amplitude", "motion", "threshold"))
-    for name in typed:
-        if chosen.sizes.get(name, 1) > 1:
-            raise InputError(f"{file}: --at {name}: {chosen.sizes[name]} values; must be one")
-    return chosen.squeeze([name for name in typed if name in chosen.sizes])
-
-
-def _summarize(rates: "xr.Dataset", g: float) -> None:
-    import numpy as np
-
-    from slipsweep.studies.suite_statistics import point_names
-
+    common.write_outputs(paths, overwrite, drawn, xml=lambda: openquake_fragility(fragility(result, lengths)))
+    if quiet:
+        return
     low, high = (float(one) / g for one in rates.attrs["amplitude_range"])
     start, end = (float(one) / g for one in rates.attrs["hazard_curve_range"])
     # P is known between these, and the rate of what lies above and below is not
@@ -92,7 +82,7 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
     echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
     # a share without a value may lie along fewer dimensions: it does not depend on the frequency
     sizes = {dim: size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
-    for index, point in zip(np.ndindex(*sizes.values()), point_names(rates, sizes), strict=True):
+    for index, point in zip(np.ndindex(*sizes.values()), suite_statistics.point_names(rates, sizes), strict=True):
         echo(*([point] if point else ()))
         _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
@@ -106,7 +96,7 @@ def _summarize(rates: "xr.Dataset", g: float) -> None:
         "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
         "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate),
     }
-    echo(*(text for text, holds in notes.items() if holds.any()))
+    echo(*(text for text, holds in notes.items() if holds.any()), *paths)
 
 
 def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:

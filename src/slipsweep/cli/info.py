@@ -40,8 +40,7 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
         if name != jobs.RUN:
-            one = len(lines) == 1
-            echo(f"{name}: {lines[0]}".rstrip() if one else f"{name}:", *(f"  {line}" for line in lines if not one))
+            echo(f"{name}: {lines[0]}".rstrip() if len(lines) == 1 else "\n  ".join((f"{name}:", *lines)))
 
 
 @command(
@@ -56,8 +55,8 @@ def export(
     variables: Annotated[
         Texts, TABLE("Result to export (default: all); may be repeated.", "NAME", "--variable")
     ] = None,
-    words: Annotated[bool, TABLE.flag("Sliding modes and flags as words, not codes.", "--words")] = False,
-    in_g: Annotated[bool, TABLE.flag("Accelerations in g, not in m/s².", "--in-g")] = False,
+    words: Annotated[bool, TABLE("Sliding modes and flags as words, not codes.", None, "--words")] = False,
+    in_g: Annotated[bool, TABLE("Accelerations in g, not in m/s².", None, "--in-g")] = False,
     at: options.At = None,
     rows: Annotated[Text, TABLE("With --columns: axes of the rows (default: all others).", "NAME[,NAME]")] = None,
     columns: Annotated[Text, TABLE("Axis whose values become columns; one table per result.", "NAME")] = None,
@@ -73,10 +72,12 @@ def export(
     from slipsweep.grid.resources import size_text
 
     if output.suffix == ".xml":
+        from slipsweep.studies.hazard import fragility, openquake_fragility
+
         paths = common.check_outputs([output], (".xml",), overwrite, [Path(file)])
         # P(u > d) along the axis amplitude, of the values that --at takes of others
         chosen = selection.selected(opening.read_result(file), file, options.cuts(at), ("motion", "quantile"))
-        common.write_outputs(paths, overwrite, chosen, xml=lambda path: common.write_fragility(chosen, path))
+        common.write_outputs(paths, overwrite, chosen, xml=lambda: openquake_fragility(fragility(chosen)))
         echo(*([] if quiet else paths))
         return
     count = tables.export(

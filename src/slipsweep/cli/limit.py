@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
-from slipsweep.cli.options import Large, Text, Texts
+from slipsweep.cli.options import Large, Text, Texts, read, written
 from slipsweep.errors import InputError
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus
@@ -21,13 +21,9 @@ _MOST_POINTS, _MOST_MOTIONS = 12, 60
 @options.command("Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png", large=Large)
 def limit(
     *,
-    sweep: Annotated[
-        Path, options.read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")
-    ],
+    sweep: Annotated[Path, read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")],
     displacement: Annotated[list[str], options.LENGTH],
-    output: Annotated[
-        Texts, options.written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")
-    ] = None,
+    output: Annotated[Texts, written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")] = None,
     maximum_amplitude: Annotated[
         Text, options.Panel("Limit")("End of the search: 2g, 15 (m/s²).  [default: 5g]", "ACCELERATION")
     ] = None,
@@ -40,6 +36,7 @@ def limit(
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
     from slipsweep.files import jobs, opening, spec
+    from slipsweep.grid.resources import grid_text
 
     results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
@@ -62,30 +59,21 @@ def limit(
             table = job.plan.solve(progress)
     labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
     common.write_outputs(figures, overwrite, labelled)
-    if not quiet:
-        _summarize(table)
-        echo(*(output or ()))
-
-
-def _summarize(table: "xr.Dataset") -> None:
-    import numpy as np
-
-    from slipsweep.grid.resources import grid_text
-
-    limits, status, g = table["limit_amplitude"], table["limit_status"].values, float(table.attrs["g"])
-    grid = grid_text({str(dim): size for dim, size in limits.sizes.items()}) or "one cell"
-    echo(f"{limits.size} limits ({grid})")
+    if quiet:
+        return
+    limits, status = table["limit_amplitude"], table["limit_status"]
+    echo(f"{limits.size} limits ({grid_text({str(dim): size for dim, size in limits.sizes.items()}) or 'one cell'})")
     if limits.notnull().any():
         values = {"smallest": limits.min(), "median": limits.median(), "largest": limits.max()}
         echo(*(f"  {text:<24}{common.range_text('amplitude', [value.item()], g)}" for text, value in values.items()))
     wanted = ", ".join(f"{one:.6g}" for one in table["displacement"].values.flat)
-    highest = common.range_text("amplitude", [float(table.attrs["maximum_amplitude"])], g)
-    echo(f"displacement {wanted} m, searched up to {highest}", f"inputs: {table.attrs['friction_inputs']}")
+    end = common.range_text("amplitude", [float(table.attrs["maximum_amplitude"])], g)
+    echo(f"displacement {wanted} m, searched up to {end}", f"inputs: {table.attrs['friction_inputs']}")
     if limits.sizes.get("motion", 1) > 1:
         _summarize_suite(table, g)
-    shares = {one: np.mean(status == one) for one in LimitStatus}
+    shares = {one: float((status == one).mean()) for one in LimitStatus}
     rows = (f"  {one.name.lower():<24}{share:7.2%}  {one.text}" for one, share in shares.items() if share)
-    echo("status (limit_status):", *rows)
+    echo("status (limit_status):", *rows, *(output or ()))
 
 
 def _summarize_suite(table: "xr.Dataset", g: float) -> None:
@@ -104,11 +92,11 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     counts, beyond = (found[name].values.ravel() for name in ("value_count", "not_reached_count"))
     width = max(24, *map(len, names))
     echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
-    for number, point in enumerate(points[:_MOST_POINTS]):
-        of = f"of {counts[number]}" + (f", {beyond[number]} of them not reached" if beyond[number] else "")
-        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, quantiles[number]))} {of}")
-        if each.size <= _MOST_MOTIONS:
-            motions = zip(names, each[number], strict=True)
-            echo(*(f"    {name.removeprefix('motion = '):<{width}}{text(value)}" for name, value in motions))
-    if len(points) > _MOST_POINTS:
-        echo(f"  and {len(points) - _MOST_POINTS} grid points more")
+    rows = [*zip(points, quantiles, counts, beyond, each, strict=True)]
+    for point, values, count, more, motions in rows[:_MOST_POINTS]:
+        of = f"of {count}" + (f", {more} of them not reached" if more else "")
+        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, values))} {of}")
+        for name, value in zip(names, motions, strict=True) if each.size <= _MOST_MOTIONS else ():
+            echo(f"    {name.removeprefix('motion = '):<{width}}{text(value)}")
+    if len(rows) > _MOST_POINTS:
+        echo(f"  and {len(rows) - _MOST_POINTS} grid points more")

@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -30,15 +31,9 @@ class Panel(str):
         """An option of the group; names where its parameter does not give it, and what else typer takes."""
         return typer.Option(*names, help=about.replace("[", r"\["), metavar=metavar, rich_help_panel=self, **more)
 
-    def flag(self, about: str, *names: str) -> Any:
-        """An option of the group that takes no value."""
-        return self(about, None, *names)
-
 
 SHAKING, BLOCK, OUTPUT, LARGE = Panel("Shaking"), Panel("Block"), Panel("Output"), Panel("Large runs")
-
-#: The group of options that few cases need.
-RARE = Panel("Rare options")
+RARE = Panel("Rare options")  # that few cases need
 
 
 def read(metavar: str, about: str) -> Any:
@@ -53,13 +48,14 @@ def written(about: str, metavar: str = "FILE") -> Any:
 
 Text = str | None
 Texts = list[str] | None
+File = Path | None
 Paths = list[Path] | None
 
 THETA = BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", "VALUE")
 MuS = Annotated[float | None, BLOCK("Static friction coefficient.")]
 Phi = Annotated[Text, BLOCK("Friction angle instead of --mu-s: 21 (degrees).", "VALUE")]
-Overwrite = Annotated[bool, OUTPUT.flag("Replace an output that exists.", "--overwrite")]
-Quiet = Annotated[bool, OUTPUT.flag("No progress and no summary.", "--quiet", "-q")]
+Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", None, "--overwrite")]
+Quiet = Annotated[bool, OUTPUT("No progress and no summary.", None, "--quiet", "-q")]
 Swept = Annotated[Path, read("OUT.nc", 'A result of "slipsweep run".')]
 Result = Annotated[str, read("OUT.nc|OUT.zarr", "A file that slipsweep wrote.")]
 
@@ -75,7 +71,7 @@ At = Annotated[Texts, Panel("Selection")(_AT, "NAME=VALUE")]
 class Large:
     """Options of commands that may run for hours."""
 
-    resume: Annotated[bool, LARGE.flag("Continue an interrupted run from its finished chunks.", "--resume")] = False
+    resume: Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", None, "--resume")] = False
     memory: Annotated[Text, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", "SIZE")] = None
     workers: Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", "N")] = None
     scheduler: Annotated[Text, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", "ADDRESS")] = None
@@ -136,10 +132,9 @@ def command(
         def run(**given: Any) -> None:
             function(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
 
-        parameters: list[inspect.Parameter] = []
-        for name, one in inspect.signature(function).parameters.items():
-            parameters += _options(choices[name], one.default) if name in choices else [one]
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        given = inspect.signature(function).parameters.items()
+        expanded = (_options(choices[name], one.default) if name in choices else [one] for name, one in given)
+        run.__signature__ = inspect.Signature([*itertools.chain(*expanded)])  # type: ignore[attr-defined]
         app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))(run)
         return function
 
@@ -181,14 +176,12 @@ def _options(choice: Family[Any] | type[Any], default: Any) -> list[inspect.Para
     if not isinstance(choice, Family):
         if issubclass(choice, Choice):
             return [_declared(one, RARE) for one in declared(choice)]
-        return [_parameter(one.name, one.type, one.default) for one in fields(choice)]
+        return [_parameter(one.name, annotation=one.type, default=one.default) for one in fields(choice)]
     panel = SHAKING if choice.attribute == "waveform" else BLOCK
     names: Any = Literal[tuple(choice.names)]
-    may_be_none = default is None
-    note = f" (default: {choice.default})" if may_be_none else ""
+    note, first = (f" (default: {choice.default})", None) if default is None else ("", choice.default)
     about = panel(f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}.", "NAME", f"--{choice.attribute}")
-    which = Annotated[names | None, about] if may_be_none else Annotated[names, about]
-    found = [_parameter(choice.attribute, which, None if may_be_none else choice.default)]
+    found = [_parameter(choice.attribute, annotation=Annotated[names | None, about], default=first)]
     for name, one in choice.options.items():
         of = choice.having(name)
         every = len(of) == len(choice.choices)
@@ -204,8 +197,7 @@ def _declared(one: Option, panel: Panel, *notes: str) -> inspect.Parameter:
     noted = f" ({'; '.join(notes)})" if notes else ""
     text = f"{one.about[0].upper()}{one.about[1:]}{noted}."
     typed = panel(text, "A,B,..." if one.is_list else None, option_name(one.name))
-    return _parameter(one.name, Annotated[kind | None, typed], None)
+    return _parameter(one.name, annotation=Annotated[kind | None, typed], default=None)
 
 
-def _parameter(name: str, kind: Any, default: Any) -> inspect.Parameter:
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+_parameter = functools.partial(inspect.Parameter, kind=inspect.Parameter.KEYWORD_ONLY)

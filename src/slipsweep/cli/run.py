@@ -1,14 +1,16 @@
-"""`slipsweep run`: a sweep computed and written."""
+"""`slipsweep example` and `slipsweep run`: the sweep files that come with slipsweep, and a sweep computed."""
 
 import math
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
-from slipsweep.cli.options import Large
-from slipsweep.errors import InputError
+from slipsweep.cli.options import Large, Panel
+from slipsweep.errors import InputError, did_you_mean
+from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
 from slipsweep.model.variables import SlidingMode
@@ -22,6 +24,35 @@ if TYPE_CHECKING:
 _LOOKED_AT = 5000
 
 
+@options.command("Start", "slipsweep example", "slipsweep example paper")
+def example(
+    name: Annotated[options.Text, options.read("NAME", "Sweep file to write (default: list their names).")] = None,
+    overwrite: options.Overwrite = False,
+) -> None:
+    """List the sweep files that come with slipsweep, or write one with its data."""
+    # in the installed package, or at the top of the clone that is installed as it stands
+    package = Path(__file__).parents[1]
+    folder = next(path for path in (package / "sweeps", package.parents[1] / "sweeps") if path.is_dir())
+    sweeps = {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    if name is None:
+        titles = {stem: tomllib.loads(path.read_text("utf-8"))["output"]["title"] for stem, path in sweeps.items()}
+        echo(*(f"{stem:<14}{title}" for stem, title in titles.items()))
+        return
+    if name not in sweeps:
+        raise InputError(f"NAME = {name}: no such sweep file; {did_you_mean(name, list(sweeps))}")
+    from slipsweep.files import spec
+
+    # the sweep file is among the files that are read for it
+    wanted = {path.relative_to(folder): path for path in spec.load(sweeps[name]).files if isinstance(path, Path)}
+    present = [path for path in wanted if path.parent.is_dir()]
+    outputs.check_outputs(present, overwrite, reads=list(wanted.values()))
+    for path, source in wanted.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with outputs.complete_or_absent(path, overwrite) as temporary:
+            temporary.write_bytes(source.read_bytes())
+        echo(path)
+
+
 @options.command(
     "Compute",
     "slipsweep run sweeps/design_chart.toml",
@@ -33,7 +64,7 @@ def run(
     *,
     sweep: Annotated[Path, options.read("SWEEP.toml|OUT.nc", "Sweep file (-: standard input), or a result to repeat.")],
     solver: Annotated[
-        Literal["auto", "step", "cycle"] | None, options.Panel("Solver")("Solver, instead of solver.method.")
+        Literal["auto", "step", "cycle"] | None, Panel("Solver")("Solver, instead of solver.method.")
     ] = None,
     output: Annotated[
         str | None, options.written("File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr")
@@ -55,7 +86,7 @@ def run(
     if name is None and spec.is_stream(sweep):
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = opening.place_of(name or f"{sweep.stem}.nc")
-    common.check_ending(path, (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
+    outputs.check_endings([path], (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
     passed, sampling, job = common.stopwatch(), checked.sampling, jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
     report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)
@@ -94,19 +125,16 @@ def _unsound_text(table: "xr.Dataset") -> str:
     """How many sliding cells have a trend that no block has; of many cells some, evenly spaced, are looked at."""
     from slipsweep.charts import solved
 
-    drive = [name for name in (*variables.STRENGTHS, "displacement_amplitude") if name in table.coords]
-    moved = table.get(solved.DISPLACEMENT)
-    if moved is None or not drive or solved.is_newmark(table):
+    moved, drives = table.get(solved.DISPLACEMENT), {*variables.STRENGTHS, "displacement_amplitude"}
+    if moved is None or drives.isdisjoint(table.coords) or solved.is_newmark(table):
         return ""
     each = math.ceil((moved.size / _LOOKED_AT) ** (1.0 / max(moved.ndim, 1)))
-    some = table.isel({dim: slice(None, None, each) for dim in moved.dims}).load()
-    some = some.sortby([name for name in drive if name in some.dims])
+    some = table.thin(dict.fromkeys(moved.dims, each)).load()
     if "validity" in some:  # as charts leave out
         reliable = some["validity"] & variables.Validity.NOT_RECOUPLED == 0
         some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(reliable)
-    falls, below = solved.unsound(some, solved.newmark(some))
     slides = max(int((some[solved.DISPLACEMENT] > 0).sum()), 1)
-    text = solved.trend_text(falls, below, slides)
+    text = solved.trend_text(*solved.unsound(some, solved.newmark(some)), slides)
     return text and f"unsound: {text}"
 
 

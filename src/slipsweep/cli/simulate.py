@@ -3,22 +3,16 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
-from slipsweep.cli.options import BLOCK, RARE, SHAKING, Text
+from slipsweep.cli.options import BLOCK, OUTPUT, RARE, SHAKING, File, Text
 from slipsweep.errors import InputError, RunError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from slipsweep.motion.records import Record
 
 
 @dataclass(frozen=True)
@@ -66,15 +60,11 @@ def simulate(
     typed: Typed,
     model: Model,
     excitation: Waveform | None = None,
-    record: Annotated[
-        Path | None, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")
-    ] = None,
+    record: Annotated[File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")] = None,
     reading: Mapping[str, Any],
     output: Annotated[options.Paths, options.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: options.Overwrite = False,
-    points: Annotated[
-        int | None, options.OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)
-    ] = None,
+    points: Annotated[int | None, OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
@@ -83,27 +73,33 @@ def simulate(
     taken_as = ", ".join(
         f"{name.replace('_', ' ')} {common.range_text(name, (value,), model.g)}" for name, value in with_unit.items()
     )
-    motion = _motion(record, reading, excitation)
+    for name in reading if record is None else ():
+        raise InputError(f"{options.option_name(name)}: only with --record, the file of a recorded motion")
+    if record is not None and excitation is not None:
+        raise InputError(f"--waveform {excitation.name}: not allowed with --record, which is the shaking itself")
+    from slipsweep.motion.records import read_record
     from slipsweep.studies.history import simulate as simulated
 
+    try:
+        recorded = None if record is None else read_record(record, **reading)
+    except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
+        raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
     given: dict[str, Any] = vars(typed) | with_unit
-    table = simulated(**given, excitation=motion, model=model, points_per_cycle=points)
-    if flags := variables.Validity(table["validity"].item()) & variables.VALUELESS:
+    given["excitation"] = recorded or excitation or WAVEFORMS.of(WAVEFORMS.default)
+    table = simulated(**given, model=model, points_per_cycle=points)
+    validity = variables.Validity(table["validity"].item())
+    if flags := validity & variables.VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags)
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
     table.attrs["title"] = "Time history of a sliding block"
-    recorded = None if isinstance(motion, Waveform) else motion
-    common.write_outputs(paths, overwrite, table, recorded, csv=lambda path: _write_csv(table, path))
+    titles = {name: f"{name} ({table[name].attrs['units']})" for name in ("time", *variables.HISTORY) if name in table}
+    frame = table[[*titles][1:]].to_dataframe().reset_index()[[*titles]].rename(columns=titles)
+    common.write_outputs(paths, overwrite, table, recorded, csv=lambda: frame.to_csv(index=False, lineterminator="\n"))
     if quiet:
         return
     if recorded is not None:
         echo(f"record                  {recorded.summary()}")
-    _summarize(table)
-    echo(f"taken as                {taken_as}", *paths)
-
-
-def _summarize(table: "xr.Dataset") -> None:
     echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
@@ -112,27 +108,6 @@ def _summarize(table: "xr.Dataset") -> None:
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
     for kind in variables.FlagKind:
-        flags = variables.Validity(table["validity"].item()) & variables.flags_of(kind)
+        flags = validity & variables.flags_of(kind)
         echo(*(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}" for flag in flags))
-
-
-def _motion(record: Path | None, reading: Mapping[str, Any], waveform: Waveform | None) -> "Waveform | Record":
-    """The motion of the base that the options name."""
-    if record is None:
-        for name in reading:
-            raise InputError(f"{options.option_name(name)}: only with --record, the file of a recorded motion")
-        return waveform or WAVEFORMS.of(WAVEFORMS.default)
-    if waveform is not None:
-        raise InputError(f"--waveform {waveform.name}: not allowed with --record, which is the shaking itself")
-    from slipsweep.motion.records import read_record
-
-    try:
-        return read_record(record, **reading)
-    except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
-        raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
-
-
-def _write_csv(table: "xr.Dataset", path: Path) -> None:
-    titles = {name: f"{name} ({table[name].attrs['units']})" for name in ("time", *variables.HISTORY) if name in table}
-    frame = table[[name for name in titles if name != "time"]].to_dataframe()[[*titles][1:]]
-    frame.rename(columns=titles).to_csv(path, index_label=titles["time"])
+    echo(f"taken as                {taken_as}", *paths)

@@ -17,7 +17,7 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.netcdf import WITH_MISSING
 from slipsweep.files.opening import read_result, result_names, values_text
-from slipsweep.files.outputs import check_outputs, complete_or_absent
+from slipsweep.files.outputs import check_endings, check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.tally import tally_of
@@ -60,13 +60,9 @@ def export(
     The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions that none of them
     has are left out.  Sliding modes and flags are codes or `words`, accelerations in m/s² or `in_g`, that of the model.
     `at` says which values to keep of an axis, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along
-    the columns of a pivoted table, `rows` are those along its rows.
-
-    Raises
-    ------
-    InputError
-        `source` is not slipsweep's, `path` cannot be written, a variable, axis or value is not in the file, a
-        spreadsheet cannot hold the table, or the package is missing that writes it.
+    the columns of a pivoted table, `rows` are those along its rows.  InputError: `source` is not slipsweep's, `path`
+    cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot hold the table, or the package
+    is missing that writes it.
     """
     _check_format(path)
     check_outputs([path], overwrite, reads=[Path(source)])
@@ -114,8 +110,7 @@ def export(
 
 
 def _check_format(path: Path) -> None:
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"{path}: the name must end in one of {', '.join(SUFFIXES)}")
+    check_endings([path], SUFFIXES)
     module, extra = SUFFIXES[path.suffix] or ("csv", "")
     try:
         importlib.import_module(module)
@@ -188,16 +183,14 @@ class Table:
             shape = {dim: part.sizes[dim] for dim in self.rows}
             found = {header(part[name]): part[name].variable.set_dims(shape).values.ravel() for name in self.left}
             if self.columns is None:
-                for name in self.results:
-                    values = part[name].variable.set_dims(shape).values.ravel()
-                    found[header(part[name])] = self._column(part[name], values)
+                shown: dict[Any, xr.DataArray] = {header(part[name]): part[name] for name in self.results}
             else:
-                one = part[self.results[0]]
-                values = one.variable.set_dims({**shape, self.columns: across}).values.reshape(-1, across)
                 last = header(part[self.left[-1]]) if self.left else ""
-                found[f"{last} \\ {self._corner}"] = found.pop(last, np.arange(1, len(values) + 1))
-                for place, value in enumerate(axis_values(self.part, self.columns)):
-                    found[value] = self._column(one, values[:, place])
+                found[f"{last} \\ {self._corner}"] = found.pop(last, np.arange(1, 1 + math.prod(shape.values())))
+                one, values = part[self.results[0]], axis_values(self.part, self.columns)
+                shown = {value: one.isel({self.columns: place}) for place, value in enumerate(values)}
+            for title, one in shown.items():
+                found[title] = self._column(one, one.variable.set_dims(shape).values.ravel())
             yield pd.DataFrame(found)
 
     @property

@@ -7,7 +7,7 @@ import itertools
 import os
 import secrets
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -16,6 +16,14 @@ from slipsweep.grid.resources import size_text
 
 #: How an output that is there is refused.
 EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
+
+
+def check_endings(paths: Sequence[Path | str], endings: Collection[str]) -> None:
+    """Refuse outputs whose names end in what the command cannot write (InputError)."""
+    for path in paths:
+        if Path(path).suffix not in endings:
+            one_of = "one of " if len(endings) > 1 else ""
+            raise InputError(f"{path}: the name must end in {one_of}{', '.join(endings)}")
 
 
 def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Path | int]) -> None:

@@ -78,13 +78,9 @@ def run(
     leaves a complete output as it is.  The run takes so many bytes of `memory`, on so many `workers` of this machine or
     on those of a `scheduler`.  `progress` is called with a number of cells just solved.
 
-    Raises
-    ------
-    InputError
-        The output exists or cannot be written, the grid is too large for disk or memory, or there are chunks of an
-        interrupted run, and neither `resume` nor `overwrite` is given, or they are of another sweep or version.
-    RunError
-        Writing failed, or another run is writing `path`.  A note tells how many chunks are kept.
+    InputError: the output exists or cannot be written, the grid is too large for disk or memory, or there are chunks of
+    an interrupted run, of another sweep or version, or without `resume` and `overwrite`.  RunError: writing failed, or
+    another run is writing `path`; a note tells how many chunks are kept.
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers, --scheduler: give one of them, not both")

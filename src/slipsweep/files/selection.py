@@ -63,15 +63,9 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
 
     A text is equal to a value of the result in the digits that it has, in its own unit: what a message or a caption
     prints can be typed.  It may hold several values, with commas; labels, or their numbers from 1.  A parameter that is
-    one number for the whole result may be named too, with that number; it is not among what is returned.
+    one number for the whole result may be named too, with that number; it is not among what is returned.  InputError:
+    there is no such axis, or a value lies outside of it.
 
-    Raises
-    ------
-    InputError
-        There is no such axis, or a value lies outside of it.
-
-    Examples
-    --------
     >>> import slipsweep
     >>> from slipsweep.files.selection import find
     >>> result = slipsweep.sweep(5.0, 0.4, [2.0, 2.943, 4.0], 1.0)

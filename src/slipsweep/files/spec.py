@@ -181,29 +181,21 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Recorded
         model = _chosen(options.MODELS, tables["model"])
         rows = _cases(content["cases"]) if "cases" in content else []
         given = _inputs(tables["axes"], rows, numbers, model.g)
+        files: tuple[Path, ...] = ()
         if key := next((one for one in ("record", "records") if one in tables["excitation"]), None):
             given["polarity"] = tables["excitation"].pop("polarity", 1)
             motion: Any = _recorded_motion(key, tables, folder or Path(), recorded)
-            read = () if recorded else motion.components if isinstance(motion, suites.Suite) else (motion,)
-            files = tuple(Path(one.name) for one in read)
+            if recorded is None:
+                parts = motion.components if isinstance(motion, suites.Suite) else (motion,)
+                files = tuple(Path(one.name) for one in parts)
         else:
-            files = ()
             for other in (one for one in tables["excitation"] if one in _RECORD_KEYS):
                 raise InputError(f"excitation.{other}: only beside excitation.record, the file of a recorded motion")
             motion = _chosen(WAVEFORMS, tables["excitation"])
         sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
-        return SweepSpec(
-            source,
-            text,
-            Inputs(**given),
-            tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1)),
-            model,
-            motion,
-            _chosen(options.SOLVERS, tables["solver"]),
-            _output(tables["output"], sampling is not None),
-            sampling,
-            files,
-        )
+        labels = tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1))
+        solver, output = _chosen(options.SOLVERS, tables["solver"]), _output(tables["output"], sampling is not None)
+        return SweepSpec(source, text, Inputs(**given), labels, model, motion, solver, output, sampling, files)
 
 
 @contextmanager
@@ -309,7 +301,18 @@ def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
         if numbers.ndim != 1 or not numbers.size:
             raise InputError(f"{key} = {units.show(table['values'])}: must be a list of one number at least")
     else:
-        numbers = _spaced(key, table)
+        for part in ("start", "stop", "num"):
+            if part not in table:
+                raise InputError(f"{key}.{part}: missing: an axis is values = [...], or start, stop and num")
+        start, stop = (parameters.check_finite(f"{key}.{part}", table[part]) for part in ("start", "stop"))
+        num = parameters.check_whole(f"{key}.num", table["num"], 2, _MOST_POINTS)
+        spacing = parameters.check_choice(f"{key}.spacing", table.get("spacing", "linear"), ("linear", "log"))
+        if stop <= start:
+            raise InputError(f"{key}.stop = {stop}: must be greater than start, {start}")
+        if spacing == "log" and start <= 0.0:
+            raise InputError(f'{key}.start = {start}: must be positive with spacing = "log"')
+        with np.errstate(over="ignore", invalid="ignore"):
+            numbers = np.linspace(start, stop, num) if spacing == "linear" else np.geomspace(start, stop, num)
     unit = table.get("units")
     if unit is not None and not isinstance(unit, str):
         raise InputError(f"axes.{name}.units = {units.show(unit)}: must be a text")
@@ -319,21 +322,6 @@ def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
     for at in np.flatnonzero(np.diff(values) <= 0.0):
         raise InputError(f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the next")
     return values
-
-
-def _spaced(key: str, table: _Table) -> NDArray[np.float64]:
-    for part in ("start", "stop", "num"):
-        if part not in table:
-            raise InputError(f"{key}.{part}: missing: an axis is values = [...], or start, stop and num")
-    start, stop = (parameters.check_finite(f"{key}.{part}", table[part]) for part in ("start", "stop"))
-    num = parameters.check_whole(f"{key}.num", table["num"], 2, _MOST_POINTS)
-    spacing = parameters.check_choice(f"{key}.spacing", table.get("spacing", "linear"), ("linear", "log"))
-    if stop <= start:
-        raise InputError(f"{key}.stop = {stop}: must be greater than start, {start}")
-    if spacing == "log" and start <= 0.0:
-        raise InputError(f'{key}.start = {start}: must be positive with spacing = "log"')
-    with np.errstate(over="ignore", invalid="ignore"):
-        return np.linspace(start, stop, num) if spacing == "linear" else np.geomspace(start, stop, num)
 
 
 def _output(table: _Table, has_statistics: bool) -> Output:
