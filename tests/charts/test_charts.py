@@ -702,4 +702,4 @@ def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path
 def test_a_spoilt_result_is_refused_in_one_line(spoil: Any, message: str) -> None:
     data = slipsweep.sweep([5.0, 6.0], [0.3, 0.4], [2.0, 4.0], [1.0, 2.0])
     with pytest.raises(InputError, match=message):
-        kinds.figure_of(spoil(data), "a.nc", "contours")
+        spoil(data).slipsweep.chart("contours")

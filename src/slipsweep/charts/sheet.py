@@ -152,9 +152,13 @@ class Panel:
         """The sheet's slice at the panel's values."""
         return self._sheet.data.isel(self._where, missing_dims="ignore")
 
-    def grid(self, name: str | xr.DataArray) -> Any:
-        """A variable over (y, x); without y of one row."""
-        return over(self.data[name] if isinstance(name, str) else name, self.data, (self.y, self.x))
+    def grid(self, values: str | xr.DataArray, *dims: str | None) -> Any:
+        """Values over (y, x) or other dimensions, in that order, repeated along those they lack; None has length 1."""
+        data, dims = self.data, dims or (self.y, self.x)
+        array, named = data[values] if isinstance(values, str) else values, [dim for dim in dims if dim]
+        lacking = {dim: data.sizes.get(dim, 1) for dim in named if dim not in array.dims}
+        full = array.variable.set_dims({**lacking, **array.sizes}).transpose(*named)
+        return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
     def member(self, index: int) -> str:
         """What a curve is called."""
@@ -278,14 +282,6 @@ def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str
         return style.plain(labels[index])
     values = axis_numbers(data, dim) if dim in data.sizes else data[dim].values
     return style.value_text(data, dim, float(values[index]), options)
-
-
-def over(array: xr.DataArray, data: xr.Dataset, dims: Sequence[str | None]) -> Any:
-    """A variable's values over `dims`, in that order, repeated along those it lacks; None has length 1."""
-    named = [dim for dim in dims if dim]
-    lacking = {dim: data.sizes.get(dim, 1) for dim in named if dim not in array.dims}
-    full = array.variable.set_dims({**lacking, **array.sizes}).transpose(*named)
-    return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
 
 def is_log(values: Floats) -> bool:

@@ -260,9 +260,7 @@ def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
         if key not in attrs:
             raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
     try:
-        MODELS.from_attributes(attrs)
-        if not recorded:
-            WAVEFORMS.from_attributes(attrs)
+        model_text(attrs)
         drawn_text(attrs)
     except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise InputError(f"{name}: attributes do not say what was solved: {error}") from None
