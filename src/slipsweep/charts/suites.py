@@ -32,9 +32,6 @@ SCALING = {
     "mean_period": (0, 1),
 }
 
-#: Logarithms of an intensity measure within this are one value: motions scaled to it.
-_SAME = 1e-6
-
 _LABEL = "permanent displacement (mm)"
 
 _THIN: style.Look = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
@@ -215,7 +212,7 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: style.Floats, ys: style.Flo
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
     if slid.sum() < 3:
         panel.add_title("no regression: fewer than 3 motions slide")
-    elif np.ptp(np.log(xs[slid])) < _SAME:
+    elif np.ptp(np.log(xs[slid])) < 1e-6:  # motions scaled to it
         panel.add_title("no regression: one value for all motions")
     else:
         found: Any = stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
