@@ -76,8 +76,7 @@ def test_median_and_band_are_quantiles_of_all_motions(result: xr.Dataset, x: str
         np.testing.assert_allclose(line.get_ydata()[seen], row[seen], rtol=1e-12)
         assert (line.get_ydata()[~seen] < low).all()  # zero lies below the axis, not nowhere
     drawn = np.sort([line.get_ydata() for line in lines], axis=0)
-    settled = result.assign(permanent_displacement=result.permanent_displacement.where(
-        slipsweep.flags(result).not_recoupled == 0))  # fmt: skip
+    settled = result.where(slipsweep.flags(result).not_recoupled == 0)
     shown = np.sort(displacements(settled, **at).transpose("each", x), axis=0)
     np.testing.assert_allclose(drawn[shown >= low], shown[shown >= low], rtol=1e-12)
     zeros = (values == 0).sum("each").max().item()
@@ -110,23 +109,18 @@ def test_intensity_is_that_of_the_motion_as_it_shakes_the_block(suite: slipsweep
     stretched = 1.0 if measure == "mean_period" else 1.25  # it is of frequencies that time does not change
     result = slipsweep.sweep(5.0, 0.3, 5.0, excitation=suite, time_scale=stretched)
     figure = result.slipsweep.chart("intensity", x=measure)
-    factors = result.motion_factor.values
-    expected = []
-    for label, factor in zip(suite.labels, factors, strict=True):
-        one = suite[label]
-        assert isinstance(one, slipsweep.Record)
-        shaken = slipsweep.Record(one.times * stretched, one.acceleration * factor)
-        expected.append(intensity_measures(shaken)[measure])
-    (points,) = named(figure, "a motion")
+    pairs = zip(suite.components, result.motion_factor.values, strict=True)
+    shaken = [slipsweep.Record(one.times * stretched, one.acceleration * factor) for one, factor in pairs]
+    expected = np.array([intensity_measures(one)[measure] for one in shaken])
+    values = result.permanent_displacement.values * 1000.0
     if measure == "pga":  # all are scaled to it
         assert figure.axes[0].get_title() == "no regression: one value for all motions"
     else:
-        check_regression(figure, np.array(expected), result.permanent_displacement.values * 1000.0)
-    values = result.permanent_displacement.values * 1000.0
-    low = figure.axes[0].get_ylim()[0]
-    shown = values >= low
+        check_regression(figure, expected, values)
+    (points,) = named(figure, "a motion")
+    shown = values >= figure.axes[0].get_ylim()[0]
     assert shown.sum() > 3
-    np.testing.assert_allclose(points.get_xdata(), np.array(expected)[shown], rtol=1e-9)
+    np.testing.assert_allclose(points.get_xdata(), expected[shown], rtol=1e-9)
     np.testing.assert_allclose(points.get_ydata(), values[shown], rtol=1e-12)
 
 

@@ -329,20 +329,9 @@ def text_of(driver: Any, name: str) -> str:
     return str(text).replace("\u00a0", " ")
 
 
-def readout(driver: Any, name: str) -> str:
-    return text_of(driver, f"readout-{name}")
-
-
-#: What the readout says of flags: the kind and its text, the flag and its text.
-FLAG_ROWS = (
-    "return [...document.querySelectorAll('dd.flag')].map((dd) => [dd.previousSibling.textContent, dd.textContent])"
-)
-
-
-def chosen(driver: Any, element: str = "readout") -> list[int] | None:
+def chosen(driver: Any, element: str = "readout") -> Any:
     """The index of the cell that an element is of."""
-    index = driver.execute_script("return document.getElementById(arguments[0]).dataset.index", element)
-    return json.loads(index) if index else None
+    return json.loads(driver.execute_script("return document.getElementById(arguments[0]).dataset.index", element))
 
 
 AXES: list[Any] = [[0, 5, 20], [0.3, 0.5], np.linspace(1, 12, 23), np.geomspace(0.2, 10, 18)]
@@ -371,7 +360,8 @@ def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
             move(opened, theta, mu_s)
             point(opened, x, y)
             wait_for(opened, "document.getElementById('readout-title').textContent === 'Cell under the pointer'")
-            amplitude, frequency = (float(readout(opened, name).split()[0]) for name in ("amplitude", "frequency"))
+            places = (text_of(opened, f"readout-{name}") for name in ("amplitude", "frequency"))
+            amplitude, frequency = (float(text.split()[0]) for text in places)
             # the cell is where the pointer is: axes from half a cell before the first value to half a cell after
             assert abs(amplitude - (12.25 - 11.5 * y)) <= 0.27
             step = math.log(50) / 17
@@ -380,7 +370,7 @@ def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
                 amplitude=amplitude, frequency=frequency, method="nearest"
             )
             for name in ("permanent_displacement", "newmark_displacement"):
-                expected, text = float(cell[name]), readout(opened, name)
+                expected, text = float(cell[name]), text_of(opened, f"readout-{name}")
                 if math.isnan(expected):
                     assert text == "no value"
                 else:
@@ -391,16 +381,19 @@ def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
                 for kind in FlagKind
                 for flag in Validity(int(cell.validity)) & flags_of(kind)
             ]
-            assert opened.execute_script(FLAG_ROWS) == flags
+            rows = opened.execute_script(
+                "return [...document.querySelectorAll('dd.flag')]"
+                ".map((dd) => [dd.previousSibling.textContent, dd.textContent])"
+            )
+            assert rows == flags
             mode = SlidingMode(int(cell.sliding_mode)).name.lower()
-            assert readout(opened, "mode") == mode
+            assert text_of(opened, "readout-mode") == mode
             seen |= {mode, *(flag.split(":")[0] for _, flag in flags)}
         assert {"stuck", "stick_slip", "continuous", "missing", "statically_unstable"} <= seen
 
 
 def test_the_page_starts_on_a_sound_cell(opened: Any, result: Path) -> None:
     index = chosen(opened)
-    assert index is not None
     with xr.open_dataset(result, mask_and_scale=False) as data:
         cell = data.isel(dict(zip(("theta", "mu_s", "amplitude", "frequency"), index, strict=True)))
         assert cell.permanent_displacement > 0
@@ -433,7 +426,6 @@ def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
     move(opened, 1, 0)
     point(opened, 0.4, 0.25, click=True)
     index = chosen(opened)
-    assert index is not None
     assert chosen(opened, "history-note") == index
     theta, mu_s, amplitude, frequency = (float(axis[at]) for axis, at in zip(AXES, index, strict=True))
     assert (theta, mu_s) == (5, 0.3)
