@@ -16,11 +16,8 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import Collection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from slipsweep.charts import solved, style
@@ -117,18 +114,14 @@ class Drawing:
 def _without_colour(figure: Figure) -> None:
     """Replace all colours by their lightness."""
     for artist in figure.findobj():
-        kinds: tuple[str, ...] = ()
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            colours = artist.get_cmap()
-            ends = {"under": colours.get_under(), "over": colours.get_over()}
-            grey = ListedColormap(style.to_grey(colours(np.arange(colours.N))))
-            artist.set_cmap(grey.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
-        elif isinstance(artist, Line2D):
-            kinds = ("color", "markerfacecolor", "markeredgecolor")
-        elif isinstance(artist, Patch | Collection):
-            kinds = ("facecolor", "edgecolor")
-        for kind in kinds:
-            colours = getattr(artist, f"get_{kind}")()
+            given = artist.get_cmap()
+            ends = {"under": given.get_under(), "over": given.get_over()}
+            shades = ListedColormap(style.to_grey(given(np.arange(given.N))))
+            artist.set_cmap(shades.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
+            continue
+        for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
+            colours: Any = getattr(artist, f"get_{kind}", list)()
             if len(colours):
                 grey = style.to_grey(colours)
                 artist.set(**{kind: grey if len(grey) > 1 else tuple(grey[0])})
